@@ -1,0 +1,85 @@
+# GNU make and a POSIX shell. Paths are relative, so that a clone may lie in a
+# folder with spaces in its name.
+
+PYTHON ?= python3
+PIP_DISABLE_PIP_VERSION_CHECK := 1
+export PIP_DISABLE_PIP_VERSION_CHECK
+
+PY := .venv/bin/python
+PIP_INSTALL := $(PY) -m pip install -qq -c constraints.txt
+PYTEST := $(PY) -m pytest
+REQUIREMENTS := pyproject.toml constraints.txt
+# What the wheels need of the system: library=Debian package. The last two are for
+# the Graphviz inside pygraphviz.
+LIBRARIES := libglib-2.0.so.0=libglib2.0-0 libXrender.so.1=libxrender1 \
+  libXext.so.6=libxext6
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help demo test test-fast browser-test lint typecheck bench clean
+
+help: ## list the targets
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
+
+demo: .venv/.installed ## run the default scenario, with full audio, into results/
+	@$(PY) -m phonotaxis simulate
+
+test: .venv/.installed ## run all tests but those that need a browser
+	@$(PYTEST) -n 2
+
+test-fast: .venv/.installed ## run the tests that take seconds
+	@$(PYTEST) -n 2 -m "not slow and not browser"
+
+browser-test: .venv/.installed ## run the tests that open a page in Chromium
+	@$(PYTEST) -m browser
+
+lint: .venv/.installed-dev ## check style and format
+	@$(PY) -m ruff check .
+	@$(PY) -m ruff format --check .
+
+typecheck: .venv/.installed-dev ## check types
+	@$(PY) -m mypy
+
+bench: .venv/.installed ## measure speed and memory
+	@$(PY) -m benchmarks
+
+clean: ## remove the environment, caches and builds; keep results/
+	@rm -rf .venv .venv-newest build dist phonotaxis.egg-info
+	@rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# The stamps are as old as the last complete installation. What can be known to
+# fail is asked beforehand, since the packages take minutes to fetch.
+.venv/.installed: $(REQUIREMENTS)
+	@command -v $(PYTHON) >/dev/null || { \
+	  echo "$(PYTHON) is not installed. On Debian: apt install python3 python3-venv"; \
+	  exit 1; } >&2
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "$(PYTHON) is $$($(PYTHON) -V 2>&1); phonotaxis needs Python 3.11 or newer."; \
+	  echo "Name another one: make PYTHON=python3.13 $(MAKECMDGOALS)"; \
+	  exit 1; } >&2
+	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
+	  echo "$(PYTHON) cannot make environments. On Debian: apt install python3-venv"; \
+	  exit 1; } >&2
+	@missing=; for pair in $(LIBRARIES); do \
+	  test "$$(uname -s)" != Linux || \
+	  $(PYTHON) -c "import ctypes; ctypes.CDLL('$${pair%=*}')" 2>/dev/null || \
+	  missing="$$missing $${pair#*=}"; \
+	done; test -z "$$missing" || { \
+	  echo "System libraries are missing. On Debian: apt install$$missing"; \
+	  exit 1; } >&2
+	@echo "Installing into .venv (once; takes some minutes) ..." >&2
+	@$(PY) -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv
+	@$(PIP_INSTALL) -e '.[test]' || { \
+	  echo "The installation failed; the message above says why."; \
+	  echo "Drake has wheels for x86-64 Linux with glibc 2.34 or newer (Debian 12,"; \
+	  echo "Ubuntu 22.04), and for macOS on Apple silicon with Python 3.13 or newer."; \
+	  exit 1; } >&2
+	@$(PY) -c 'import pydrake.common' || { \
+	  echo "Drake is installed but does not load; the message above says why."; \
+	  exit 1; } >&2
+	@touch $@
+
+.venv/.installed-dev: .venv/.installed
+	@$(PIP_INSTALL) -e '.[dev]'
+	@touch $@

@@ -1,0 +1,1 @@
+"""Data in, data out: metrics, recordings, pictures of results."""

@@ -1,0 +1,213 @@
+"""The bodies of a replay: what Meshcat is given before anything moves.
+
+Meshcat records how objects move and whether they are visible, not that they
+come into being; so everything that is ever seen is made here.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.textpath import TextPath
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from analysis.scene import COLOURS, bounds, microphone_places, sensor_pose
+from diagrams import RunResult, Scenario
+
+__all__ = [
+    "RINGS",
+    "add_floor",
+    "add_obstacles",
+    "add_robot",
+    "add_source",
+    "add_trail",
+    "set_camera",
+]
+
+#: Heights are not modelled; these look right, m.
+ROBOT_HEIGHT_M = 0.16
+MICROPHONE_HEIGHT_M = 0.30
+SOURCE_HEIGHT_M = 0.30
+OBSTACLE_HEIGHT_M = 0.35
+SENSOR_HEIGHT_M = 0.14
+WHEEL_WIDTH_M = 0.035
+#: The body carries the microphone bar, which is wider; m of the bar's width.
+BODY_WIDTH_FRACTION = 0.45
+#: Radii of the ring that grows while the source sounds, m.
+RINGS = (0.28, 0.38, 0.48, 0.58, 0.68)
+
+
+def _colour(role: str, alpha: float = 1.0) -> Rgba:
+    return Rgba(*to_rgb(COLOURS[role]), alpha)
+
+
+def _at(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
+    return RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, z])
+
+
+def _line(meshcat: Meshcat, path: str, points: ArrayLike, role: str, z: float) -> None:
+    flat = np.asarray(points, dtype=float).T
+    vertices = np.asfortranarray(np.vstack([flat, np.full(flat.shape[1], z)]))
+    meshcat.SetLine(path, vertices, line_width=3.0, rgba=_colour(role))
+
+
+def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
+    """A floor that holds the whole run, a line a metre, and a title."""
+    x_low, x_high, y_low, y_high = floor_rectangle(result)
+    middle = _at((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
+    slab = Box(x_high - x_low, y_high - y_low, 0.02)
+    meshcat.SetObject("floor/slab", slab, Rgba(0.93, 0.93, 0.92))
+    meshcat.SetTransform("floor/slab", middle)
+    along = np.arange(x_low, x_high + 0.5)
+    across = np.arange(y_low, y_high + 0.5)
+    starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
+    ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
+    _segments(meshcat, "floor/grid", starts, ends, Rgba(0.72, 0.72, 0.72))
+    _write(meshcat, "floor/title", title, (x_low, y_low - 0.45), 0.3)
+    for x in along[:-1]:
+        _write(
+            meshcat, f"floor/x {x:.0f}", f"{x:.0f} m", (x + 0.05, y_low + 0.06), 0.13
+        )
+
+
+def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
+    """Smallest x, largest x, smallest y, largest y of the floor, whole metres.
+
+    At least the scenario's arena, about the middle of the run.
+    """
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
+    width, depth = result.scenario.arena_m
+    x_more = max(width - (x_high - x_low), 0.0) / 2.0
+    y_more = max(depth - (y_high - y_low), 0.0) / 2.0
+    return (
+        float(math.floor(x_low - x_more)),
+        float(math.ceil(x_high + x_more)),
+        float(math.floor(y_low - y_more)),
+        float(math.ceil(y_high + y_more)),
+    )
+
+
+def _segments(
+    meshcat: Meshcat, path: str, starts: ArrayLike, ends: ArrayLike, rgba: Rgba
+) -> None:
+    def lifted(points: ArrayLike) -> NDArray[np.float64]:
+        flat = np.asarray(points, dtype=float).T
+        return np.asfortranarray(np.vstack([flat, np.full(flat.shape[1], 0.004)]))
+
+    meshcat.SetLineSegments(path, lifted(starts), lifted(ends), 1.0, rgba)
+
+
+def _write(
+    meshcat: Meshcat, path: str, text: str, place: tuple[float, float], size: float
+) -> None:
+    """Outlines of letters on the floor: Meshcat has no text."""
+    starts: list[NDArray[np.float64]] = []
+    ends: list[NDArray[np.float64]] = []
+    for outline in TextPath(place, text, size=size).to_polygons():
+        starts.extend(outline[:-1])
+        ends.extend(outline[1:])
+    _segments(meshcat, path, starts, ends, Rgba(0.25, 0.25, 0.25))
+
+
+def add_robot(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The robot about the origin of B: body, wheels, microphone bar, cones."""
+    robot = scenario.robot
+    width = BODY_WIDTH_FRACTION * robot.width_m
+    body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
+    meshcat.SetObject("robot/body", body, _colour("robot"))
+    meshcat.SetTransform("robot/body", _at(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02))
+    for side, y in (("left", 0.5), ("right", -0.5)):
+        _add_wheel(meshcat, scenario, side, y * robot.wheel_separation_m)
+    _add_microphones(meshcat, scenario)
+    if scenario.obstacle_sensing == "ultrasonic":
+        for sensor in range(3):
+            _add_cone(meshcat, scenario, sensor)
+
+
+def _add_wheel(meshcat: Meshcat, scenario: Scenario, side: str, y: float) -> None:
+    """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
+    radius, path = scenario.robot.wheel_radius_m, f"robot/{side}"
+    lying = RollPitchYaw(-0.5 * math.pi, 0.0, 0.0)
+    meshcat.SetTransform(path, RigidTransform(lying, [0.0, y, radius]))
+    tyre = Cylinder(radius, WHEEL_WIDTH_M)
+    meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
+    spoke = Box(1.7 * radius, 0.25 * radius, WHEEL_WIDTH_M + 0.004)
+    meshcat.SetObject(f"{path}/wheel/spoke", spoke, Rgba(0.95, 0.95, 0.95))
+
+
+def _add_microphones(meshcat: Meshcat, scenario: Scenario) -> None:
+    robot = scenario.robot
+    bar = Box(0.02, robot.width_m, 0.02)
+    x = robot.control_point_m - 0.01
+    meshcat.SetObject("robot/bar", bar, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform("robot/bar", _at(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
+    mast = Cylinder(0.012, MICROPHONE_HEIGHT_M - ROBOT_HEIGHT_M)
+    middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
+    meshcat.SetObject("robot/mast", mast, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform("robot/mast", _at(x, 0.0, middle))
+    for number, (x_M, y_M) in enumerate(microphone_places(scenario), start=1):
+        path = f"robot/microphone_{number}"
+        meshcat.SetObject(path, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
+        meshcat.SetTransform(path, _at(x_M, y_M, MICROPHONE_HEIGHT_M))
+
+
+def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
+    """Both looks of a cone; the recording shows one at a time.
+
+    A cone without an echo is short: at its full 3 m it would hide the scene.
+    """
+    x, y, axis = sensor_pose(scenario, sensor)
+    path = f"robot/cone_{sensor + 1}"
+    # The cone's axis is z: tilt it forward, then turn it to the sensor's axis.
+    tilt = RollPitchYaw(0.0, 0.5 * math.pi, axis)
+    meshcat.SetTransform(path, RigidTransform(tilt, [x, y, SENSOR_HEIGHT_M]))
+    length = 0.8
+    radius = length * math.tan(math.radians(scenario.ultrasonic.beam_half_angle_deg))
+    for look, role, alpha in (("echo", "echo", 0.55), ("empty", "empty", 0.18)):
+        cone = MeshcatCone(length, 0.35 * radius, radius)
+        meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))
+
+
+def add_source(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The master robot about the origin of S, its loudspeaker and its rings."""
+    length, width = scenario.source_size
+    body = Box(length, width, SOURCE_HEIGHT_M)
+    meshcat.SetObject("source/body", body, _colour("source"))
+    meshcat.SetTransform("source/body", _at(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M))
+    horn = Cylinder(0.07, 0.06)
+    meshcat.SetObject("source/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
+    meshcat.SetTransform("source/loudspeaker", _at(0.0, 0.0, SOURCE_HEIGHT_M + 0.03))
+    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    for number, radius in enumerate(RINGS, start=1):
+        circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+        _line(meshcat, f"source/ring_{number}", circle, "source", SOURCE_HEIGHT_M)
+    meshcat.SetObject("estimate", Sphere(0.06), _colour("estimate"))
+
+
+def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The boxes where they are at the start."""
+    for obstacle in scenario.obstacles:
+        path = f"obstacles/{obstacle.name}"
+        box = Box(*obstacle.size_m, OBSTACLE_HEIGHT_M)
+        meshcat.SetObject(path, box, _colour("obstacle"))
+        x, y, theta = obstacle.path().pose(0.0)
+        meshcat.SetTransform(path, _at(x, y, 0.5 * OBSTACLE_HEIGHT_M, theta))
+
+
+def add_trail(
+    meshcat: Meshcat, path: str, points: NDArray[np.float64], role: str
+) -> None:
+    """One piece of a trail on the floor, through (n, 2) points in W, m."""
+    _line(meshcat, path, points, role, 0.01)
+
+
+def set_camera(meshcat: Meshcat, result: RunResult) -> None:
+    """Looks at the middle of the floor from the front and above."""
+    x_low, x_high, y_low, y_high = floor_rectangle(result)
+    middle = np.array([(x_low + x_high) / 2.0, (y_low + y_high) / 2.0, 0.0])
+    extent = max(x_high - x_low, y_high - y_low)
+    meshcat.SetCameraPose(middle + extent * np.array([0.0, -0.75, 0.75]), middle)

@@ -1,0 +1,136 @@
+"""Where things are at a time, and their colours: shared by all pictures."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import RunResult, Scenario
+from diagrams.scenario import robot_rectangle
+from systems.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+
+__all__ = [
+    "COLOURS",
+    "bounds",
+    "compose",
+    "contact_point",
+    "microphone_places",
+    "moving_and_static",
+    "picture_times",
+    "poses",
+    "sensor_pose",
+    "sound_bursts",
+    "tick_at",
+]
+
+#: Okabe and Ito's palette: told apart with any colour vision.
+COLOURS = {
+    "robot": "#0072B2",
+    "source": "#D55E00",
+    "estimate": "#CC79A7",
+    "obstacle": "#4D4D4D",
+    "echo": "#E69F00",
+    "empty": "#999999",
+    "attraction": "#D55E00",
+    "repulsion": "#4D4D4D",
+    "sound": "#F0E442",
+    "left": "#56B4E9",
+    "right": "#E69F00",
+}
+
+#: Spacings of instants that a reader can count in, s.
+_NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
+
+
+def poses(result: RunResult, body: str) -> NDArray[np.float64]:
+    """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
+    names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
+    return np.stack([result.columns[name] for name in names], axis=1)
+
+
+def tick_at(result: RunResult, time: float) -> int:
+    """Index of the tick nearest to a time in s."""
+    return int(np.argmin(np.abs(result.time - time)))
+
+
+def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
+    """Evenly spaced instants from the start, at most so many, s."""
+    end = result.simulated_s
+    period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
+    return np.arange(0.0, end + 1e-9, period)
+
+
+def sound_bursts(scenario: Scenario, end: float) -> list[tuple[float, float]]:
+    """(from, to) of every burst that begins before ``end``, s."""
+    sound = scenario.sound
+    starts = np.arange(sound.start_s, end, sound.period_s)
+    return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
+
+
+def microphone_places(scenario: Scenario) -> NDArray[np.float64]:
+    """p_BM: (3, 2) microphones from left to right, m."""
+    robot = scenario.robot
+    spread = np.array([1.0, 0.0, -1.0]) * robot.microphone_spacing_m
+    return np.column_stack([np.full(3, robot.control_point_m), spread])
+
+
+def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
+    """(x, y, theta) of an ultrasonic sensor in B, m and rad; sensor 0, 1 or 2."""
+    x, y = scenario.ultrasonic.positions_m[sensor]
+    axis = math.radians(scenario.ultrasonic.axes_deg[sensor])
+    return scenario.robot.control_point_m + x, y, axis
+
+
+def compose(
+    pose_WB: NDArray[np.float64], pose_BU: tuple[float, float, float]
+) -> tuple[float, float, float]:
+    """pose_WU from pose_WB and pose_BU: (x, y, theta), m and rad."""
+    dx, dy = rotate(pose_WB[2], pose_BU[0], pose_BU[1])
+    return pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]
+
+
+def moving_and_static(scenario: Scenario) -> tuple[list, list]:
+    """The obstacles that move, and those that never do."""
+    moving = [o for o in scenario.obstacles if o.path().moves]
+    return moving, [o for o in scenario.obstacles if not o.path().moves]
+
+
+def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
+    """Smallest x, largest x, smallest y, largest y of all bodies ever, m."""
+    scenario, times = result.scenario, picture_times(result, most=60)
+    centres = [poses(result, "WB")[:, :2], poses(result, "WS")[:, :2]]
+    for obstacle in scenario.obstacles:
+        path = obstacle.path()
+        centres.append(np.array([path.pose(t)[:2] for t in times]))
+    points = np.concatenate(centres)
+    low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    return float(low[0]), float(high[0]), float(low[1]), float(high[1])
+
+
+def contact_point(result: RunResult) -> NDArray[np.float64]:
+    """Where the robot touched what it hit, (2,) in W, m.
+
+    The mean of the corners of either rectangle that lie in the other, or of
+    the nearest ones if none does.
+
+    Raises:
+        ValueError: The run had no collision.
+    """
+    hit, scenario = result.collision, result.scenario
+    if hit is None:
+        raise ValueError(f"contact_point: the run ended by {result.cause!r}")
+    boxes = {o.name: (o.path(), o.size_m) for o in scenario.obstacles}
+    boxes["source"] = (scenario.source.path(), scenario.source_size)
+    path, size = boxes[hit.object]
+    body = np.array([*path.pose(hit.time), *size])
+    pose = poses(result, "WB")[tick_at(result, hit.time)]
+    footprint = robot_rectangle(pose, scenario.robot)
+    corners = np.concatenate([rectangle_corners(footprint), rectangle_corners(body)])
+    others = [body] * 4 + [footprint] * 4
+    away = [
+        math.hypot(*nearest_point_on_rectangle(corner, other))
+        for corner, other in zip(corners, others, strict=True)
+    ]
+    return np.mean(corners[np.array(away) <= min(away) + 1e-9], axis=0)

@@ -1,0 +1,24 @@
+"""Scenarios, the builder that wires blocks, and the run."""
+
+from diagrams.builder import SoundFollower, build_sound_follower
+from diagrams.loading import (
+    ScenarioError,
+    dump_scenario,
+    library_scenarios,
+    load_scenario,
+)
+from diagrams.scenario import Scenario
+from diagrams.simulation import RunResult, make_simulator, simulate
+
+__all__ = [
+    "RunResult",
+    "Scenario",
+    "ScenarioError",
+    "SoundFollower",
+    "build_sound_follower",
+    "dump_scenario",
+    "library_scenarios",
+    "load_scenario",
+    "make_simulator",
+    "simulate",
+]

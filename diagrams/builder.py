@@ -1,0 +1,238 @@
+"""Wires the blocks into the sound-following robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
+
+from diagrams.laws import make_controller
+from diagrams.scenario import Scenario
+from systems import (
+    CollisionVector,
+    DiffDrivePlant,
+    IdealObstacleSensor,
+    IdealSourceSensor,
+    MicArray,
+    Obstacles,
+    SoundEmitter,
+    SourceRobot,
+    SourceTracker,
+    TDOAEstimator,
+    UltrasonicArray,
+    WheelOdometry,
+    WheelSpeedCommand,
+)
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["SoundFollower", "block_seed", "build_sound_follower"]
+
+#: Ports that a logged build records at every tick, where they exist: (block, port).
+LOGGED_PORTS = (
+    ("plant", "pose_WB"),
+    ("plant", "velocity_WB"),
+    ("source", "pose_WS"),
+    ("hearing", "p_PS_B"),
+    ("hearing", "detected"),
+    ("hearing", "range_valid"),
+    ("tracker", "p_WS_estimated"),
+    ("tracker", "age"),
+    ("tracker", "target_valid"),
+    ("odometry", "pose_WB_estimated"),
+    ("collision", "collision_vectors_B"),
+    ("collision", "mask"),
+    ("controller", "forces_W"),
+    ("controller", "obstacle_speeds"),
+    ("command", "wheel_speeds"),
+    ("command", "v_WP"),
+    ("ultrasonic", "ranges"),
+    ("ultrasonic", "echo"),
+)
+
+
+@dataclass(frozen=True)
+class SoundFollower:
+    """A built diagram, with its blocks by role.
+
+    Roles: plant, odometry, source, obstacles, hearing, tracker, collision,
+    controller, command; with audio also emitter and microphones, with
+    ultrasonic sensing also ultrasonic.
+    """
+
+    diagram: Diagram
+    scenario: Scenario
+    blocks: dict[str, Any]
+    log: VectorLogSink | None
+    """Rows of the logged ports, one after the other; none unless asked for."""
+    logged: tuple[tuple[str, str], ...]
+    """(role, port) of what the log holds, in order."""
+
+    def port(self, role: str, name: str) -> Any:
+        """Output port of a block."""
+        return self.blocks[role].GetOutputPort(name)
+
+
+def block_seed(seed: int, name: str) -> int:
+    """A block's own seed: depends on the scenario's seed and its name alone."""
+    sequence = np.random.SeedSequence([seed, crc32(name.encode())])
+    return int(sequence.generate_state(1, np.uint64)[0])
+
+
+def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
+    """Builds the diagram of a scenario.
+
+    The same function builds every fidelity: ``hearing`` and
+    ``obstacle_sensing`` choose blocks with the same ports. With both ideal
+    and ``odometry.rounding`` off the diagram converts to AutoDiffXd.
+
+    Args:
+        scenario: What to build.
+        log: Whether to add a log of every port in ``LOGGED_PORTS``.
+
+    Raises:
+        ScenarioError: The law is not known.
+        ValueError: The sound file cannot be played.
+    """
+    builder = DiagramBuilder()
+    blocks = {
+        "source": SourceRobot(source=scenario.source),
+        "obstacles": Obstacles(obstacles=scenario.obstacles),
+        "plant": DiffDrivePlant(
+            robot=scenario.robot,
+            plant=scenario.plant,
+            initial_pose=scenario.start.pose,
+        ),
+        "odometry": WheelOdometry(
+            robot=scenario.robot,
+            odometry=scenario.odometry,
+            initial_pose=scenario.start.pose,
+        ),
+        **_hearing(scenario),
+        "tracker": _tracker(scenario),
+        **_obstacle_sensing(scenario),
+        "controller": make_controller(scenario),
+        "command": WheelSpeedCommand(robot=scenario.robot),
+    }
+    for block in blocks.values():
+        builder.AddNamedSystem(block.get_name(), block)
+    _connect_by_name(builder, list(blocks.values()))
+    sink, logged = _add_log(builder, blocks) if log else (None, ())
+    diagram = builder.Build()
+    diagram.set_name("sound_follower")
+    return SoundFollower(diagram, scenario, blocks, sink, logged)
+
+
+def _add_log(
+    builder: DiagramBuilder, blocks: dict[str, Any]
+) -> tuple[VectorLogSink, tuple[tuple[str, str], ...]]:
+    """One sink behind a multiplexer: a third cheaper than a sink a port."""
+    logged = tuple(key for key in LOGGED_PORTS if key[0] in blocks)
+    ports = [blocks[role].GetOutputPort(name) for role, name in logged]
+    multiplexer = builder.AddNamedSystem(
+        "log_multiplexer", Multiplexer([port.size() for port in ports])
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, multiplexer.get_input_port(index))
+    sink = LogVectorOutput(
+        multiplexer.get_output_port(0), builder, publish_period=FRAME_PERIOD_S
+    )
+    sink.set_name("log")
+    return sink, logged
+
+
+def _hearing(scenario: Scenario) -> dict[str, Any]:
+    if scenario.hearing == "ideal":
+        return {
+            "hearing": IdealSourceSensor(
+                robot=scenario.robot,
+                hearing=scenario.ideal_hearing,
+                on_s=scenario.sound.on_s,
+                period_s=scenario.sound.period_s,
+                start_s=scenario.sound.start_s,
+                seed=block_seed(scenario.seed, "ideal_source_sensor"),
+            )
+        }
+    return {
+        "emitter": SoundEmitter(
+            sound=scenario.sound,
+            acoustics=scenario.acoustics,
+            seed=block_seed(scenario.seed, "sound_emitter"),
+        ),
+        "microphones": MicArray(
+            parameters=scenario.microphones,
+            robot=scenario.robot,
+            acoustics=scenario.acoustics,
+            seed=block_seed(scenario.seed, "mic_array"),
+        ),
+        "hearing": TDOAEstimator(
+            parameters=scenario.tdoa,
+            robot=scenario.robot,
+            acoustics=scenario.acoustics,
+        ),
+    }
+
+
+def _tracker(scenario: Scenario) -> Any:
+    """An ideal estimate is a tick old, one from audio half a frame more."""
+    tracker, age = scenario.tracker, 1.5 * FRAME_PERIOD_S
+    if scenario.hearing == "ideal":
+        tracker = tracker.model_copy(update={"resolve_front_back": False})
+        age = FRAME_PERIOD_S
+    return SourceTracker(robot=scenario.robot, tracker=tracker, measurement_age_s=age)
+
+
+def _obstacle_sensing(scenario: Scenario) -> dict[str, Any]:
+    bodies: dict[str, Any] = {
+        "robot": scenario.robot,
+        "source_size": scenario.source_size,
+        "obstacle_count": len(scenario.obstacles),
+    }
+    if scenario.obstacle_sensing == "ideal":
+        return {
+            "collision": IdealObstacleSensor(
+                maximum_range_m=scenario.ultrasonic.maximum_range_m,
+                all_bodies=scenario.collision_vector.aggregation == "sum",
+                **bodies,
+            )
+        }
+    return {
+        "ultrasonic": UltrasonicArray(
+            parameters=scenario.ultrasonic,
+            acoustics=scenario.acoustics,
+            seed=block_seed(scenario.seed, "ultrasonic_array"),
+            **bodies,
+        ),
+        "collision": CollisionVector(
+            parameters=scenario.collision_vector, sensors=scenario.ultrasonic
+        ),
+    }
+
+
+def _connect_by_name(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
+    """Joins every input port to the one output port of the same name.
+
+    A quantity has one name on every port (see docs/model.md), so the wiring
+    needs no list; an input whose quantity nobody or more than one block
+    publishes is an error.
+    """
+    outputs: dict[str, list[Any]] = {}
+    for block in blocks:
+        for index in range(block.num_output_ports()):
+            port = block.get_output_port(index)
+            outputs.setdefault(port.get_name(), []).append(port)
+    for block in blocks:
+        for index in range(block.num_input_ports()):
+            port = block.get_input_port(index)
+            sources = outputs.get(port.get_name(), [])
+            if len(sources) != 1:
+                raise ValueError(
+                    f"{block.get_name()}: {len(sources)} blocks publish "
+                    f"{port.get_name()!r}, which it needs; give one block an output "
+                    "port of that name"
+                )
+            builder.Connect(sources[0], port)

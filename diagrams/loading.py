@@ -1,0 +1,197 @@
+"""Scenarios from the library, from YAML files and from the command line."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from io import StringIO
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from diagrams.scenario import Scenario
+
+__all__ = [
+    "ScenarioError",
+    "dump_scenario",
+    "library_scenarios",
+    "load_scenario",
+    "scenario_from_mapping",
+]
+
+_LIBRARY = Path(__file__).parent / "scenarios"
+
+
+class ScenarioError(ValueError):
+    """A scenario that cannot be run: which field, and how to mend it."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(f"{field}: {message}" if field else message)
+        self.field = field
+        self.message = message
+
+
+def library_scenarios() -> dict[str, Path]:
+    """Names and files of the scenarios that come with the package."""
+    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
+
+
+def load_scenario(
+    source: str | Path = "default", overrides: Iterable[str] = ()
+) -> Scenario:
+    """Loads a scenario.
+
+    Args:
+        source: A name of the library (``phonotaxis scenarios``) or a path.
+        overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``
+            or ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML.
+
+    Returns:
+        ``Scenario``.
+
+    Raises:
+        ScenarioError: Unknown name, unreadable file, or a field that is
+            unknown, of the wrong type or out of range; names the field by
+            its whole path.
+    """
+    path = _find(source)
+    data = _read(path)
+    data.setdefault("name", path.stem)
+    _resolve_sound(data, path.parent)
+    for override in overrides:
+        _override(data, override)
+    _resolve_sound(data, Path.cwd())
+    return scenario_from_mapping(data)
+
+
+def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
+    """Validates a mapping of plain values; see ``load_scenario``."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise _explain(error) from None
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """The whole scenario as YAML, loadable by ``load_scenario``."""
+    yaml = YAML()
+    yaml.default_flow_style = None
+    stream = StringIO()
+    yaml.dump(scenario.model_dump(mode="json"), stream)
+    return stream.getvalue()
+
+
+def _find(source: str | Path) -> Path:
+    library = library_scenarios()
+    if str(source) in library:
+        return library[str(source)]
+    path = Path(source)
+    if path.suffix in (".yaml", ".yml"):
+        if path.is_file():
+            return path
+        raise ScenarioError(
+            "scenario",
+            f"there is no file {source}; check the path, or use one of "
+            f"the library: {', '.join(library)}",
+        )
+    raise ScenarioError(
+        "scenario",
+        f"{str(source)!r} is not known; use one of {', '.join(library)}, or the path "
+        "of a .yaml file",
+    )
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        data = YAML(typ="safe").load(path)
+    except YAMLError as error:
+        text = " ".join(str(error).split())
+        raise ScenarioError(str(path), f"is not valid YAML: {text}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ScenarioError(str(path), f"cannot be read: {error}") from None
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise ScenarioError(
+            str(path), "must hold a mapping of fields, as 'duration_s: 40'"
+        )
+    return data
+
+
+def _resolve_sound(data: dict[str, Any], folder: Path) -> None:
+    """A relative sound file lies beside the scenario, or where one works."""
+    sound = data.get("sound")
+    if isinstance(sound, dict) and isinstance(sound.get("file"), str):
+        sound["file"] = str((folder / sound["file"]).resolve())
+
+
+def _override(data: dict[str, Any], text: str) -> None:
+    key, equals, value_text = text.partition("=")
+    if not equals or not key:
+        raise ScenarioError(text or "--set", "is not of the form key=value, as seed=2")
+    try:
+        value = YAML(typ="safe").load(value_text)
+    except YAMLError:
+        raise ScenarioError(key, f"{value_text!r} is not a YAML value") from None
+    *parents, last = key.split(".")
+    node: Any = data
+    for depth, part in enumerate(parents):
+        node = _descend(node, part, ".".join(parents[: depth + 1]))
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        node[last] = value
+    else:
+        raise ScenarioError(key, "leads into a plain value; shorten the key")
+
+
+def _descend(node: Any, part: str, key: str) -> Any:
+    if isinstance(node, list):
+        return node[_index(node, part, key)]
+    if isinstance(node, dict):
+        return node.setdefault(part, {})
+    raise ScenarioError(key, "leads into a plain value; shorten the key")
+
+
+def _index(node: list[Any], part: str, key: str) -> int:
+    if part.isdigit() and int(part) < len(node):
+        return int(part)
+    raise ScenarioError(
+        key, f"{part!r} is not an index of a list of {len(node)}; count from 0"
+    )
+
+
+def _explain(error: ValidationError) -> ScenarioError:
+    """The first complaint, as field, value and remedy on one line."""
+    first = error.errors(include_url=False)[0]
+    field = ".".join(str(part) for part in first["loc"])
+    kind, message = first["type"], first["msg"]
+    if kind == "extra_forbidden":
+        message = "is not a field of a scenario; remove it"
+        return ScenarioError(field, message + _near(field))
+    if kind == "value_error":
+        # A validator of several fields names the one to mend: "name: message".
+        message = message.removeprefix("Value error, ")
+        named = re.match(r"([a-z_0-9.]+)(?: \(.*?\))?: (.*)", message, re.DOTALL)
+        if named:
+            field = f"{field}.{named[1]}" if field else named[1]
+            message = message[named.start(2) :]
+        return ScenarioError(field, message)
+    value = first["input"]
+    return ScenarioError(field, f"is {value!r}; {message[0].lower()}{message[1:]}")
+
+
+def _near(field: str) -> str:
+    """A field of a similar name at the same place, if there is one."""
+    from difflib import get_close_matches
+
+    *parents, last = field.split(".")
+    model: Any = Scenario
+    for part in parents:
+        info = getattr(model, "model_fields", {}).get(part)
+        model = info.annotation if info else None
+    names = get_close_matches(last, getattr(model, "model_fields", {}), n=1)
+    return f" (did you mean {names[0]!r}?)" if names else ""

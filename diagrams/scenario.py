@@ -1,0 +1,158 @@
+"""The scenario: everything that a run depends on, in one tree.
+
+The tree is made of the blocks' own parameter models, so that a quantity has
+one name, one default and one legal range. See ``load_scenario`` for YAML.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, Strict, model_validator
+
+from systems.acoustics import AcousticParameters
+from systems.collision_vector import CollisionVectorParameters
+from systems.diff_drive_plant import PlantParameters
+from systems.geometry import rectangle_clearance
+from systems.ideal_source_sensor import IdealHearingParameters
+from systems.impedance import AttractionParameters, RepulsionParameters
+from systems.mic_array import MicArrayParameters
+from systems.obstacles import ObstacleParameters
+from systems.parameters import NonNegative, Parameters, Point, Positive
+from systems.robot import RobotParameters
+from systems.source_robot import SourceRobotParameters
+from systems.source_tracker import TrackerParameters
+from systems.tdoa_estimator import TDOAParameters
+from systems.ultrasonic_array import UltrasonicParameters
+from systems.waveforms import SoundParameters
+from systems.wheel_odometry import OdometryParameters
+
+__all__ = ["Scenario", "StartParameters", "StopParameters"]
+
+
+class StartParameters(Parameters):
+    """Where the robot starts, at rest."""
+
+    position_m: Point = (0.0, 0.0)
+    """Origin of B in W, m."""
+    heading_deg: float = 0.0
+    """Heading, deg CCW from the x axis of W."""
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """(x, y, theta), m and rad."""
+        return (*self.position_m, math.radians(self.heading_deg))
+
+
+class StopParameters(Parameters):
+    """When a run ends, and what counts as following."""
+
+    goal_margin_m: Positive = 0.3
+    """A resting source is reached within the follow distance plus this, m."""
+    following_band_m: Positive = 0.8
+    """Following: P is this near to the follow distance, m."""
+    stuck_after_s: Positive = 10.0
+    """Stuck: P stays within ``stuck_radius_m`` for so long, away from its goal."""
+    stuck_radius_m: Positive = 0.1
+    """See ``stuck_after_s``, m."""
+    lost_after_s: Positive = 20.0
+    """Lost: no valid target for so long, s."""
+    diverged_range_m: Positive = 20.0
+    """Diverged: the source is farther away than this, m."""
+
+
+class IntegratorParameters(Parameters):
+    """How Drake integrates the plant, with a fixed step."""
+
+    scheme: Literal["runge_kutta2", "runge_kutta3", "runge_kutta5"] = "runge_kutta3"
+    """Nothing changes between ticks but the motor lag's decay, so that one
+    third-order step a tick is within 5 um of the true path after 20 s."""
+    step_s: float = Field(default=0.025, gt=0.0, le=0.025)
+    """Largest step, s."""
+
+
+class Scenario(Parameters):
+    """One run. Every field has a default: the default scenario is complete."""
+
+    name: str = Field(default="default", min_length=1)
+    """Name in results."""
+    description: str = ""
+    """One line for ``phonotaxis scenarios``."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """Every random number of the run comes from it."""
+    duration_s: Positive = 40.0
+    """Longest simulated time, s."""
+    arena_m: Annotated[tuple[Positive, Positive], Strict(False)] = (7.0, 7.0)
+    """Extents of the floor in pictures, m; it has no walls."""
+    law: str = Field(default="active", min_length=1)
+    """``none``, ``conventional``, ``active``, or ``package.module:Name``."""
+    hearing: Literal["audio", "ideal"] = "audio"
+    """Sound waves and microphones, or exact positions."""
+    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
+    """Cones, or exact nearest points."""
+
+    start: StartParameters = StartParameters()
+    source: SourceRobotParameters = SourceRobotParameters()
+    obstacles: Annotated[tuple[ObstacleParameters, ...], Strict(False)] = ()
+    stop: StopParameters = StopParameters()
+
+    acoustics: AcousticParameters = AcousticParameters()
+    sound: SoundParameters = SoundParameters()
+    microphones: MicArrayParameters = MicArrayParameters()
+    tdoa: TDOAParameters = TDOAParameters()
+    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
+    tracker: TrackerParameters = TrackerParameters()
+    ultrasonic: UltrasonicParameters = UltrasonicParameters()
+    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
+    attraction: AttractionParameters = AttractionParameters()
+    repulsion: RepulsionParameters = RepulsionParameters()
+    robot: RobotParameters = RobotParameters()
+    plant: PlantParameters = PlantParameters()
+    odometry: OdometryParameters = OdometryParameters()
+    integrator: IntegratorParameters = IntegratorParameters()
+
+    @property
+    def source_size(self) -> tuple[float, float]:
+        """Length and width of the master robot, m."""
+        return self.source.length_m, self.source.width_m
+
+    @property
+    def goal_radius_m(self) -> NonNegative:
+        """A resting source is reached within this distance of P, m."""
+        return self.attraction.follow_distance_m + self.stop.goal_margin_m
+
+    @model_validator(mode="after")
+    def _check_names(self) -> Scenario:
+        names = [obstacle.name for obstacle in self.obstacles]
+        for name in names:
+            if names.count(name) > 1 or name == "source":
+                raise ValueError(
+                    f"obstacles: the name {name!r} is taken; give each obstacle a "
+                    "name of its own, other than 'source'"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_start(self) -> Scenario:
+        footprint = robot_rectangle(self.start.pose, self.robot)
+        bodies = [
+            (f"obstacles.{k} ({o.name!r})", (*o.path().pose(0.0), *o.size_m))
+            for k, o in enumerate(self.obstacles)
+        ]
+        bodies.append(("source", (*self.source.path().pose(0.0), *self.source_size)))
+        for field, body in bodies:
+            if rectangle_clearance(footprint, np.array(body)) < 0.0:
+                raise ValueError(
+                    f"{field}: stands on the robot's start at {self.start.position_m}; "
+                    "move its first waypoint or start.position_m"
+                )
+        return self
+
+
+def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
+    """The robot's footprint: a rectangle centred on the origin of B."""
+    x, y, theta = np.asarray(pose_WB)
+    return np.array([x, y, theta, robot.length_m, robot.width_m])

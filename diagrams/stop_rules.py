@@ -1,0 +1,150 @@
+"""When a run ends: exactly one cause, checked at every tick."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import EventStatus
+
+from diagrams.builder import SoundFollower
+from diagrams.scenario import robot_rectangle
+from systems.geometry import control_point, rectangle_clearance
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["Collision", "StopRules"]
+
+#: Contacts are looked for between ticks when the last clearance was below this:
+#: more than robot and obstacle cover in a tick.
+NEAR_M = 0.1
+#: Instants looked at between two ticks.
+BETWEEN_TICKS = 5
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Who touched whom."""
+
+    object: str
+    """Name of the obstacle, or ``source``."""
+    fault: str
+    """``robot`` or ``obstacle``: who closed in faster on the line of centres."""
+    time: float
+    """First contact, s, to a fifth of a tick."""
+
+
+@dataclass
+class StopRules:
+    """A monitor for Drake's simulator; remembers why it stopped the run."""
+
+    follower: SoundFollower
+    cause: str = ""
+    collision: Collision | None = None
+    _bodies: list[tuple[str, Any, tuple[float, float]]] = field(default_factory=list)
+    _pose: list[float] | None = None
+    _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
+    _valid_time: float = 0.0
+    _time: float = 0.0
+
+    def __post_init__(self) -> None:
+        scenario = self.follower.scenario
+        self._bodies = [(o.name, o.path(), o.size_m) for o in scenario.obstacles]
+        self._bodies.append(("source", scenario.source.path(), scenario.source_size))
+        self._source_rests = not scenario.source.path().moves
+        self._plant = self.follower.blocks["plant"]
+        self._tracker = self.follower.blocks["tracker"]
+        self._pose_port = self.follower.port("plant", "pose_WB")
+        self._valid_port = self.follower.port("tracker", "target_valid")
+        self._here = (
+            scenario.attraction.follow_distance_m + scenario.stop.following_band_m
+        )
+        robot = scenario.robot
+        self._reach = 0.5 * math.hypot(robot.length_m, robot.width_m) + NEAR_M
+
+    def __call__(self, context: Any) -> EventStatus:
+        """Called after every step of the simulator."""
+        time = context.get_time()
+        if self._pose is not None and time - self._time < 0.5 * FRAME_PERIOD_S:
+            return EventStatus.DidNothing()
+        pose = self._pose_port.Eval(self._plant.GetMyContextFromRoot(context)).tolist()
+        target = self._tracker.GetMyContextFromRoot(context)
+        valid = self._valid_port.Eval(target)[0] > 0.5
+        self.cause = self._judge(time, pose, valid=valid)
+        self._pose, self._time = pose, time
+        if self.cause:
+            return EventStatus.ReachedTermination(None, self.cause)
+        return EventStatus.DidNothing()
+
+    def final_cause(self) -> str:
+        """Cause of the run, once the simulator has returned."""
+        if self.cause:
+            return self.cause
+        return "timeout" if self._source_rests else "completed"
+
+    def _judge(self, time: float, pose: list[float], *, valid: bool) -> str:
+        stop = self.follower.scenario.stop
+        self.collision = self._find_collision(time, pose)
+        if self.collision is not None:
+            return "collision"
+        offset = self.follower.scenario.robot.control_point_m
+        x_P, y_P = control_point(pose, offset)
+        x_S, y_S, _ = self._bodies[-1][1].pose(time)
+        distance = math.hypot(x_S - x_P, y_S - y_P)
+        if not distance <= stop.diverged_range_m:
+            return "diverged"
+        if self._source_rests and distance <= self.follower.scenario.goal_radius_m:
+            return "reached"
+        if valid:
+            self._valid_time = time
+        elif time - self._valid_time > stop.lost_after_s:
+            return "lost"
+        away = distance > self._here and valid
+        return self._find_stuck(time, x_P, y_P, away=away)
+
+    def _find_stuck(self, time: float, x_P: float, y_P: float, *, away: bool) -> str:
+        """Stuck: at rest though there is a target, and it is away."""
+        stop = self.follower.scenario.stop
+        then, x, y = self._anchor
+        if not away or math.hypot(x_P - x, y_P - y) > stop.stuck_radius_m:
+            self._anchor = (time, x_P, y_P)
+            return ""
+        return "stuck" if time - then >= stop.stuck_after_s else ""
+
+    def _find_collision(self, time: float, pose: list[float]) -> Collision | None:
+        """First contact since the last tick, looked for between ticks if near."""
+        first = None
+        for name, path, size in self._bodies:
+            x, y, _ = path.pose(time)
+            reach = self._reach + 0.5 * math.hypot(*size)
+            if math.hypot(x - pose[0], y - pose[1]) > reach:
+                continue
+            instant = self._first_contact(time, pose, path, size)
+            if instant is not None and (first is None or instant < first.time):
+                first = Collision(name, self._fault(time, pose, path), instant)
+        return first
+
+    def _first_contact(
+        self, time: float, pose: list[float], path: Any, size: tuple[float, float]
+    ) -> float | None:
+        now = np.array(pose)
+        before = now if self._pose is None else np.array(self._pose)
+        robot = self.follower.scenario.robot
+        for part in np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS:
+            instant = self._time + part * (time - self._time)
+            footprint = robot_rectangle(before + part * (now - before), robot)
+            body = np.array([*path.pose(instant), *size])
+            if rectangle_clearance(footprint, body) < 0.0:
+                return float(instant)
+        return None
+
+    def _fault(self, time: float, pose: list[float], path: Any) -> str:
+        """Who moves faster towards the other, along the line of centres."""
+        x, y, _ = path.pose(time)
+        towards = np.array([x - pose[0], y - pose[1]])
+        before = np.array(pose if self._pose is None else self._pose)
+        span = max(time - self._time, FRAME_PERIOD_S)
+        robot_speed = float((np.array(pose) - before)[:2] @ towards) / span
+        body_speed = -float(np.array(path.velocity(time)[:2]) @ towards)
+        return "robot" if robot_speed >= body_speed else "obstacle"

@@ -1,0 +1,213 @@
+"""The command line: simulate, scenarios, locate."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, NoReturn
+
+__all__ = ["main"]
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+
+class InputError(ValueError):
+    """Bad input: which field, what is wrong with it, and how to mend it."""
+
+    def __init__(self, field: str, message: str) -> None:
+        super().__init__(f"{field}: {message}" if field else message)
+        self.field = field
+        self.message = message
+
+    @classmethod
+    def from_error(cls, error: ValueError) -> InputError:
+        """From an error whose text is 'field: message'."""
+        if hasattr(error, "field") and hasattr(error, "message"):
+            return cls(error.field, error.message)
+        field, colon, message = str(error).partition(": ")
+        return cls(field, message) if colon else cls("", str(error))
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        raise InputError("command line", f"{message}; see {self.prog} --help")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command.
+
+    Args:
+        arguments: Words after the program's name; none: those of the process.
+
+    Returns:
+        Exit status: 0 done, 2 bad input, 1 anything else.
+    """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        options = _parser().parse_args(words)
+        options.run(options)
+    except InputError as error:
+        _complain(error, as_json="--json" in words)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        print("phonotaxis: interrupted; nothing was written", file=sys.stderr)
+        return FAILED
+    except BrokenPipeError:
+        # The reader of our output has left; Python must not complain at exit.
+        sys.stdout = None
+        return FAILED
+    return DONE
+
+
+def _complain(error: InputError, *, as_json: bool) -> None:
+    if as_json:
+        document = {"error": {"field": error.field, "message": error.message}}
+        print(json.dumps(document))
+    else:
+        print(f"phonotaxis: {' '.join(str(error).split())}", file=sys.stderr)
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = _Parser(prog="phonotaxis", description="A robot that follows a sound.")
+    commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    simulate = commands.add_parser("simulate", help="run a scenario")
+    simulate.add_argument(
+        "scenario", nargs="?", default="default", help="library name or YAML file"
+    )
+    simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
+    simulate.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    simulate.add_argument(
+        "--law", help="none, conventional, active, or package.module:Name"
+    )
+    simulate.add_argument(
+        "--velocity-term",
+        metavar="TERM",
+        help="printed (|dC/dt|) or closing (the speed of approach alone)",
+    )
+    simulate.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as source.speed_m_s=0.2; may be repeated",
+    )
+    simulate.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    simulate.add_argument("--json", action="store_true", help="print one JSON document")
+    simulate.set_defaults(run=_simulate)
+
+    scenarios = commands.add_parser("scenarios", help="list the library's scenarios")
+    scenarios.add_argument(
+        "--json", action="store_true", help="print one JSON document"
+    )
+    scenarios.set_defaults(run=_scenarios)
+
+    locate = commands.add_parser(
+        "locate", help="range and bearing over time of a recording"
+    )
+    locate.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
+    locate.add_argument(
+        "--geometry", metavar="FILE.yaml", help="places of the microphones"
+    )
+    locate.add_argument("--json", action="store_true", help="print one JSON document")
+    locate.set_defaults(run=_locate)
+    return parser
+
+
+def _overrides(options: argparse.Namespace) -> list[str]:
+    """The options that stand for fields, after --set so that they win."""
+    overrides = list(options.set)
+    if options.sound is not None:
+        overrides += ["sound.kind=wav", f"sound.file={json.dumps(options.sound)}"]
+    for option, field in (
+        ("seed", "seed"),
+        ("law", "law"),
+        ("velocity_term", "repulsion.velocity_term"),
+    ):
+        value = getattr(options, option)
+        if value is not None:
+            overrides.append(f"{field}={value}")
+    return overrides
+
+
+def _simulate(options: argparse.Namespace) -> None:
+    from analysis.result_directory import choose_directory, whole_directory
+    from analysis.run_report import run_summary, summary_text, write_run
+    from diagrams import build_sound_follower, load_scenario, simulate
+
+    try:
+        out = choose_directory(options.out)
+        scenario = load_scenario(options.scenario, _overrides(options))
+        follower = build_sound_follower(scenario, log=True)
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    with _Progress(scenario.duration_s) as progress:
+        result = simulate(scenario, follower=follower, progress=progress)
+    summary = run_summary(result, out)
+    with whole_directory(out) as directory:
+        write_run(result, summary, directory)
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        print(summary_text(result, summary))
+        print(f"{'results':<21} {out}")
+
+
+class _Progress:
+    """A bar of simulated seconds on a terminal, nothing in a pipe."""
+
+    def __init__(self, duration: float) -> None:
+        from tqdm import tqdm
+
+        form = "{l_bar}{bar}| {n:.0f}/{total:.0f} s simulated, {remaining} left"
+        self._bar = tqdm(
+            total=duration,
+            disable=not sys.stderr.isatty(),
+            bar_format=form,
+            leave=False,
+        )
+
+    def __enter__(self) -> _Progress:
+        return self
+
+    def __call__(self, time: float) -> None:
+        self._bar.update(time - self._bar.n)
+
+    def __exit__(self, *exception: Any) -> None:
+        self._bar.close()
+
+
+def _scenarios(options: argparse.Namespace) -> None:
+    from diagrams import library_scenarios, load_scenario
+
+    rows = [(name, load_scenario(name).description) for name in library_scenarios()]
+    if options.json:
+        listed = [{"name": name, "description": text} for name, text in rows]
+        print(json.dumps({"schema_version": 1, "scenarios": listed}))
+        return
+    width = max(len(name) for name, _ in rows)
+    for name, text in rows:
+        print(f"{name:<{width}}  {text}")
+
+
+def _locate(options: argparse.Namespace) -> None:
+    from analysis.locate import load_geometry, locate
+
+    try:
+        geometry = load_geometry(Path(options.geometry)) if options.geometry else None
+        result = locate(Path(options.recording), geometry)
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    if options.json:
+        print(json.dumps(result.to_dict()))
+    else:
+        print(result.to_text())
+
+
+if __name__ == "__main__":
+    sys.exit(main())

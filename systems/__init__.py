@@ -1,0 +1,59 @@
+"""The blocks: one LeafSystem a file, with its pure function beside it.
+
+Templated blocks (float, AutoDiffXd) also have a name that ends in an
+underscore, as in Drake: ``DiffDrivePlant`` is ``DiffDrivePlant_[float]``.
+"""
+
+from systems.active_impedance_controller import (
+    ActiveImpedanceController,
+    ActiveImpedanceController_,
+)
+from systems.collision_vector import CollisionVector, CollisionVector_
+from systems.conventional_impedance_controller import (
+    ConventionalImpedanceController,
+    ConventionalImpedanceController_,
+)
+from systems.diff_drive_plant import DiffDrivePlant, DiffDrivePlant_
+from systems.ideal_obstacle_sensor import IdealObstacleSensor, IdealObstacleSensor_
+from systems.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
+from systems.mic_array import MicArray
+from systems.obstacles import Obstacles, Obstacles_
+from systems.radial_law_controller import RadialLawController, RadialLawController_
+from systems.sound_emitter import SoundEmitter
+from systems.source_robot import SourceRobot, SourceRobot_
+from systems.source_tracker import SourceTracker, SourceTracker_
+from systems.tdoa_estimator import TDOAEstimator
+from systems.ultrasonic_array import UltrasonicArray
+from systems.wheel_odometry import WheelOdometry, WheelOdometry_
+from systems.wheel_speed_command import WheelSpeedCommand, WheelSpeedCommand_
+
+__all__ = [
+    "ActiveImpedanceController",
+    "ActiveImpedanceController_",
+    "CollisionVector",
+    "CollisionVector_",
+    "ConventionalImpedanceController",
+    "ConventionalImpedanceController_",
+    "DiffDrivePlant",
+    "DiffDrivePlant_",
+    "IdealObstacleSensor",
+    "IdealObstacleSensor_",
+    "IdealSourceSensor",
+    "IdealSourceSensor_",
+    "MicArray",
+    "Obstacles",
+    "Obstacles_",
+    "RadialLawController",
+    "RadialLawController_",
+    "SoundEmitter",
+    "SourceRobot",
+    "SourceRobot_",
+    "SourceTracker",
+    "SourceTracker_",
+    "TDOAEstimator",
+    "UltrasonicArray",
+    "WheelOdometry",
+    "WheelOdometry_",
+    "WheelSpeedCommand",
+    "WheelSpeedCommand_",
+]

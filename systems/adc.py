@@ -1,0 +1,110 @@
+"""From sound pressure to counts: microphone, amplifier and converter."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+
+from systems.noise import tick_generator
+from systems.parameters import Parameters, Positive
+from systems.signals import SAMPLE_RATE_HZ
+
+__all__ = ["MicArrayParameters", "convert", "frame_noise"]
+
+_Triple = Annotated[tuple[float, float, float], Strict(False)]
+
+
+class MicArrayParameters(Parameters):
+    """Microphones, amplifier and converter (Han 2019, 4.1)."""
+
+    snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the noise, dB.
+
+    The noise is white and Gaussian over 0-50 kHz, of equal power in every
+    channel and independent of distance.
+    """
+    sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
+    """Sensitivity of the microphones, dB re 1 V/Pa."""
+    preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
+    """Gain between microphone and converter, dB."""
+    adc_full_scale_v: Positive = 1.65
+    """Voltage at which the converter clips, V, of either sign."""
+    adc_bits: int = Field(default=10, ge=2, le=16)
+    """Resolution of the converter, bits."""
+    channel_skew_s: _Triple = (0.0, 0.0, 0.0)
+    """Time by which each channel is sampled later, s; below one sample."""
+
+    @model_validator(mode="after")
+    def _check(self) -> MicArrayParameters:
+        if not all(0.0 <= skew < 1.0 / SAMPLE_RATE_HZ for skew in self.channel_skew_s):
+            raise ValueError(
+                f"channel_skew_s: {self.channel_skew_s} must lie in [0, "
+                f"{1.0 / SAMPLE_RATE_HZ:g}) s, one sample"
+            )
+        return self
+
+    @property
+    def full_scale(self) -> int:
+        """Counts of the positive full scale."""
+        return 2 ** (self.adc_bits - 1)
+
+    @property
+    def counts_per_pa(self) -> float:
+        """Counts for one pascal."""
+        gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
+        return gain * self.full_scale / self.adc_full_scale_v
+
+
+def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
+    """White noise of unit variance that only the seed and the tick decide."""
+    return tick_generator(seed, tick).standard_normal(shape, dtype=np.float32)
+
+
+@njit(cache=True)
+def _silent_counts(noise, sigma, full_scale, out):  # pragma: no cover  (compiled)
+    for m in range(noise.shape[0]):
+        for k in range(noise.shape[1]):
+            x = np.rint(sigma * noise[m, k])
+            out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
+
+
+@njit(cache=True)
+def _counts(
+    pressure, gain, noise, sigma, full_scale, out
+):  # pragma: no cover  (compiled)
+    for m in range(noise.shape[0]):
+        for k in range(noise.shape[1]):
+            x = np.rint(gain * pressure[m, k] + sigma * noise[m, k])
+            out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
+
+
+def convert(
+    pressure: NDArray[np.float32] | None,
+    noise: NDArray[np.float32],
+    noise_pa: float,
+    parameters: MicArrayParameters,
+) -> NDArray[np.int16]:
+    """Counts of the converter, rounded to nearest and clipped.
+
+    Args:
+        pressure: (m, n) sound pressure, Pa; None for silence.
+        noise: (m, n) noise of unit variance.
+        noise_pa: RMS of the noise, Pa.
+        parameters: Sensitivity, gain and resolution.
+
+    Returns:
+        (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
+    """
+    gain = np.float32(parameters.counts_per_pa)
+    sigma = np.float32(parameters.counts_per_pa * noise_pa)
+    full_scale = np.float32(parameters.full_scale)
+    out = np.empty(noise.shape, dtype=np.int16)
+    if pressure is None:
+        _silent_counts(noise, sigma, full_scale, out)
+    else:
+        _counts(pressure, gain, noise, sigma, full_scale, out)
+    return out

@@ -1,0 +1,32 @@
+"""One computation behind several output ports."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from pydrake.common.value import Value
+from pydrake.systems.framework import CacheEntry, DependencyTicket, ValueProducer
+
+__all__ = ["declare_cache"]
+
+
+def declare_cache(
+    system: Any,
+    description: str,
+    compute: Callable[[Any], Any],
+    prerequisites: set[DependencyTicket],
+) -> CacheEntry:
+    """Declares a cache entry that holds what ``compute(context)`` returns.
+
+    Ports that share it take ``{entry.ticket()}`` as their prerequisite and
+    read ``entry.Eval(context)``; they must not change the object.
+    """
+
+    def calc(context, value):
+        value.set_value(compute(context))
+
+    producer = ValueProducer(allocate=lambda: Value(object()), calc=calc)
+    return system.DeclareCacheEntry(
+        description, producer, prerequisites_of_calc=prerequisites
+    )

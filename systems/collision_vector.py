@@ -1,0 +1,242 @@
+"""From three ranges to the vector that points at the obstacle."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.cache import declare_cache
+from systems.parameters import NonNegative, Parameters
+from systems.ultrasonic_array import SENSORS, UltrasonicParameters
+
+__all__ = [
+    "SLOTS",
+    "CollisionVector",
+    "CollisionVectorParameters",
+    "CollisionVector_",
+    "collision_vectors",
+    "echo_point",
+    "foot_on_segment",
+]
+
+#: Collision vectors that a controller takes at once.
+SLOTS = 3
+
+Aggregation = Literal["paper", "nearest", "sum"]
+
+
+class CollisionVectorParameters(Parameters):
+    """How echoes become collision vectors."""
+
+    aggregation: Aggregation = "paper"
+    """``paper``: nearest echo, joined with its nearer neighbour where close
+    enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
+    own vector, whose forces add."""
+    pair_separation_m: NonNegative = 0.5
+    """Echoes farther apart than this are taken as two obstacles, m."""
+
+
+def echo_point(range_, axis, position):
+    """Where an echo is taken to lie: on the sensor's axis.
+
+    Args:
+        range_: Range r_i, m; float or AutoDiffXd.
+        axis: Direction phi_i of the sensor in B, rad.
+        position: Place p_PU_i of the sensor from P, m.
+
+    Returns:
+        (x, y) from P in B axes, m. Han 2019, eq. 11 prints a minus sign and
+        mixes d with r; eq. 13 swaps the axes.
+    """
+    return (
+        position[0] + range_ * math.cos(axis),
+        position[1] + range_ * math.sin(axis),
+    )
+
+
+def foot_on_segment(a, b):
+    """Point of the segment a-b that is nearest to the origin.
+
+    Args:
+        a: (x, y), m; floats or AutoDiffXd.
+        b: (x, y), m.
+
+    Returns:
+        (x, y), m. Han 2019, eq. 14 has a wrong sign and a singular slope, and
+        does not keep the foot on the segment; a foot outside of it points at
+        empty space.
+    """
+    ex, ey = b[0] - a[0], b[1] - a[1]
+    squared = ex * ex + ey * ey
+    if squared == 0.0:
+        return a
+    t = -(a[0] * ex + a[1] * ey) / squared
+    if t <= 0.0:
+        return a
+    if t >= 1.0:
+        return b
+    return a[0] + t * ex, a[1] + t * ey
+
+
+def collision_vectors(points, parameters: CollisionVectorParameters):
+    """Collision vectors from the points that the sensors see.
+
+    Args:
+        points: Three entries, left to right: (x, y) from P in m, or None
+            where there is no echo.
+        parameters: The aggregation rule.
+
+    Returns:
+        Up to three (feature, x, y). The feature names what the vector stands
+        on, so that a jump from one to another is not taken for a motion:
+        1, 2, 3 one sensor (case I, Han 2019, eq. 12), 4 sensors 1 and 2,
+        5 sensors 2 and 3 (case II, eq. 14).
+    """
+    heard = [k for k in range(SENSORS) if points[k] is not None]
+    if not heard:
+        return []
+    if parameters.aggregation == "sum":
+        return _all_vectors(points, parameters.pair_separation_m)
+    nearest = min(heard, key=lambda k: _squared(points[k]))
+    if parameters.aggregation == "paper":
+        partner = _partner(points, nearest, parameters.pair_separation_m)
+        if partner is not None:
+            left = min(nearest, partner)
+            return [_pair(points, left)]
+    return [(1.0 + nearest, *points[nearest])]
+
+
+def _squared(point):
+    return point[0] * point[0] + point[1] * point[1]
+
+
+def _close(a, b, separation):
+    return _squared((b[0] - a[0], b[1] - a[1])) < separation * separation
+
+
+def _pair(points, left):
+    return (4.0 + left, *foot_on_segment(points[left], points[left + 1]))
+
+
+def _partner(points, sensor, separation):
+    """The neighbour to join with: of those close enough the nearer to P."""
+    neighbours = [
+        k
+        for k in (sensor - 1, sensor + 1)
+        if 0 <= k < SENSORS
+        and points[k] is not None
+        and _close(points[sensor], points[k], separation)
+    ]
+    return min(neighbours, key=lambda k: _squared(points[k]), default=None)
+
+
+def _all_vectors(points, separation):
+    vectors = []
+    paired = set()
+    for left in range(SENSORS - 1):
+        a, b = points[left], points[left + 1]
+        if a is not None and b is not None and _close(a, b, separation):
+            vectors.append(_pair(points, left))
+            paired |= {left, left + 1}
+    vectors += [
+        (1.0 + k, *points[k])
+        for k in range(SENSORS)
+        if points[k] is not None and k not in paired
+    ]
+    return vectors
+
+
+def fill_slots(vectors, scalar):
+    """(vectors, mask, features) for the ports: 6, 3 and 3 elements."""
+    zero = scalar(0.0)
+    out = np.array([zero] * (2 * SLOTS))
+    mask = np.array([zero] * SLOTS)
+    features = np.array([zero] * SLOTS)
+    for slot, (feature, x, y) in enumerate(vectors):
+        out[2 * slot] = x
+        out[2 * slot + 1] = y
+        mask[slot] = scalar(1.0)
+        features[slot] = scalar(feature)
+    return out, mask, features
+
+
+def declare_collision_ports(system, slots):
+    """Declares the three output ports that every obstacle sensing ends in."""
+    for index, (name, size) in enumerate(
+        (("collision_vectors_B", 2 * SLOTS), ("mask", SLOTS), ("features", SLOTS))
+    ):
+        system.DeclareVectorOutputPort(
+            name=name,
+            size=size,
+            calc=lambda context, output, index=index: output.SetFromVector(
+                slots.Eval(context)[index]
+            ),
+            prerequisites_of_calc={slots.ticket()},
+        )
+
+
+@TemplateSystem.define("CollisionVector_", T_list=[float, AutoDiffXd])
+def CollisionVector_(T):
+    class Impl(LeafSystem_[T]):
+        """Turns echoes into collision vectors from P (cases I and II).
+
+        .. pydrake_system::
+
+            name: CollisionVector
+            input_ports:
+            - ranges [m]
+            - echo [0 or 1]
+            output_ports:
+            - collision_vectors_B [m, three slots of x and y]
+            - mask [0 or 1 a slot]
+            - features [number of the sensor or pair, 0 none]
+
+        A function of the present input: no state, no latency. Slots are
+        filled from the first; only ``aggregation: sum`` fills more than one.
+
+        Parameters: ``CollisionVectorParameters``; the sensors' places are
+        those of ``UltrasonicParameters``.
+
+        Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
+        """
+
+        def _construct(self, *, parameters=None, sensors=None, converter=None):
+            super().__init__(converter=converter)
+            self._parameters = parameters or CollisionVectorParameters()
+            self._sensors = sensors or UltrasonicParameters()
+            self._axes = [math.radians(axis) for axis in self._sensors.axes_deg]
+            self.set_name("collision_vector")
+            self._ranges = self.DeclareVectorInputPort(name="ranges", size=SENSORS)
+            self._echo = self.DeclareVectorInputPort(name="echo", size=SENSORS)
+            sources = {self._ranges.ticket(), self._echo.ticket()}
+            slots = declare_cache(self, "slots", self._slots, sources)
+            declare_collision_ports(self, slots)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                parameters=other._parameters,
+                sensors=other._sensors,
+                converter=converter,
+            )
+
+        def _slots(self, context):
+            ranges = self._ranges.Eval(context).tolist()
+            echo = self._echo.Eval(context).tolist()
+            points = [
+                echo_point(ranges[k], self._axes[k], self._sensors.positions_m[k])
+                if echo[k] > 0.5
+                else None
+                for k in range(SENSORS)
+            ]
+            return fill_slots(collision_vectors(points, self._parameters), T)
+
+    return Impl
+
+
+CollisionVector = CollisionVector_[None]

@@ -1,0 +1,91 @@
+"""The conventional virtual-impedance law."""
+
+from __future__ import annotations
+
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.impedance import ImpedanceLoop, RepulsionParameters
+
+__all__ = [
+    "ConventionalImpedanceController",
+    "ConventionalImpedanceController_",
+    "conventional_force",
+]
+
+
+def conventional_force(c, s, repulsion: RepulsionParameters):
+    """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
+
+    Args:
+        c: Distance of the obstacle, m; float or AutoDiffXd.
+        s: Its speed, m/s.
+        repulsion: K_0, D_0, rho_0.
+
+    Returns:
+        Force away from the obstacle, N. It steps by D_0 s at rho_0.
+    """
+    if c < repulsion.reach_m:
+        return (
+            repulsion.stiffness_n_m * (repulsion.reach_m - c)
+            + repulsion.damping_n_s_m * s
+        )
+    return 0.0 * c
+
+
+@TemplateSystem.define("ConventionalImpedanceController_", T_list=[float, AutoDiffXd])
+def ConventionalImpedanceController_(T):
+    class Impl(LeafSystem_[T], ImpedanceLoop):
+        """Follows the target; pushes off linearly within rho_0.
+
+        .. pydrake_system::
+
+            name: ConventionalImpedanceController
+            input_ports:
+            - p_WS_estimated [m]
+            - target_valid [0 or 1]
+            - collision_vectors_B [m, three slots of x and y]
+            - mask [0 or 1 a slot]
+            - features [number of what the vector stands on]
+            - pose_WB_estimated [m, m, rad]
+            - v_WP [m/s, of the virtual mass]
+            output_ports:
+            - acceleration_W [m/s^2]
+            - forces_W [N, attraction then repulsion, x and y each]
+            - obstacle_speeds [m/s, s of each slot]
+
+        Discrete state, 25 ms: the last collision vectors, for s. The outputs
+        are functions of state and present input: no latency.
+
+        Args:
+            robot: Mass and place of P.
+            attraction: ``AttractionParameters``.
+            repulsion: ``RepulsionParameters``; uses K_0, D_0 and rho_0.
+
+        Reference: Han 2019, eq. 18 (F_m) and 19-a.
+        """
+
+        def _construct(
+            self, *, robot=None, attraction=None, repulsion=None, converter=None
+        ):
+            super().__init__(converter=converter)
+            name = "conventional_impedance_controller"
+            self._declare_loop(T, name, robot, attraction, repulsion)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                attraction=other._attraction,
+                repulsion=other._repulsion,
+                converter=converter,
+            )
+
+        def _radial_force(self, c, s):
+            return conventional_force(c, s, self._repulsion)
+
+    return Impl
+
+
+ConventionalImpedanceController = ConventionalImpedanceController_[None]

@@ -1,0 +1,177 @@
+"""The differential-drive base: motors, wheels, motion."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated
+
+from pydantic import Field, Strict
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.math import cos, sin
+from pydrake.systems.framework import BasicVector_, LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.parameters import Parameters, Positive
+from systems.robot import RobotParameters
+
+__all__ = [
+    "DiffDrivePlant",
+    "DiffDrivePlant_",
+    "PlantParameters",
+    "body_twist",
+    "plant_derivatives",
+]
+
+_Slip = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class PlantParameters(Parameters):
+    """Motors and contact of the wheels."""
+
+    motor_lag_s: Positive = 0.05
+    """Time constant of each wheel's speed loop, s; not printed, ours."""
+    slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
+    """Part of the left and right rim speed that is lost; unseen by the encoders."""
+
+
+def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
+    """Forward speed, m/s, and yaw rate, rad/s, from wheel speeds in rad/s."""
+    left = robot.wheel_radius_m * (1.0 - slip[0]) * wheel_speeds[0]
+    right = robot.wheel_radius_m * (1.0 - slip[1]) * wheel_speeds[1]
+    return (left + right) / 2.0, (right - left) / robot.wheel_separation_m
+
+
+def plant_derivatives(state, commanded, robot, plant):
+    """Time derivatives of the plant.
+
+    Args:
+        state: x, y, theta, left and right wheel angle, left and right wheel
+            speed; m, rad, rad/s; floats or AutoDiffXd.
+        commanded: Left and right wheel speed, rad/s.
+        robot: Dimensions; its top wheel speed saturates the command.
+        plant: Motor lag and slip.
+
+    Returns:
+        Seven derivatives in the order of the state.
+    """
+    theta, left, right = state[2], state[5], state[6]
+    v, omega = body_twist((left, right), robot, plant.slip)
+    limit = robot.top_wheel_speed
+    return [
+        v * cos(theta),
+        v * sin(theta),
+        omega,
+        left,
+        right,
+        (_saturate(commanded[0], limit) - left) / plant.motor_lag_s,
+        (_saturate(commanded[1], limit) - right) / plant.motor_lag_s,
+    ]
+
+
+def _saturate(value, limit):
+    if value > limit:
+        return value * 0.0 + limit
+    if value < -limit:
+        return value * 0.0 - limit
+    return value
+
+
+@TemplateSystem.define("DiffDrivePlant_", T_list=[float, AutoDiffXd])
+def DiffDrivePlant_(T):
+    class Impl(LeafSystem_[T]):
+        """Moves the robot: motor lag, saturation, rolling wheels.
+
+        .. pydrake_system::
+
+            name: DiffDrivePlant
+            input_ports:
+            - wheel_speeds [rad/s, left and right, commanded]
+            output_ports:
+            - pose_WB [m, m, rad]
+            - velocity_WB [m/s, m/s, rad/s]
+            - wheel_angles [rad, left and right]
+
+        Continuous state: x, y, theta, two wheel angles, two wheel speeds.
+        The outputs are functions of the state; no feedthrough. The heading
+        is not wrapped.
+
+        Args:
+            robot: Dimensions and top speed.
+            plant: ``PlantParameters``.
+            initial_pose: (x, y, theta) at time zero, at rest.
+
+        Raises:
+            ValueError: A state or command is not finite, which an
+                error-controlled integrator would meet with endless steps.
+
+        Reference: Han 2019, table 6; the motor lag is ours.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            plant=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._robot = robot or RobotParameters()
+            self._plant = plant or PlantParameters()
+            self._initial_pose = tuple(initial_pose)
+            self.set_name("diff_drive_plant")
+            self._wheel_speeds = self.DeclareVectorInputPort(
+                name="wheel_speeds", size=2
+            )
+            initial_state = [T(value) for value in (*self._initial_pose, 0, 0, 0, 0)]
+            self.DeclareContinuousState(BasicVector_[T](initial_state))
+            ticket = {self.xc_ticket()}
+            for name, size, calc in (
+                ("pose_WB", 3, self._pose),
+                ("velocity_WB", 3, self._velocity),
+                ("wheel_angles", 2, self._angles),
+            ):
+                self.DeclareVectorOutputPort(
+                    name=name, size=size, calc=calc, prerequisites_of_calc=ticket
+                )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                plant=other._plant,
+                initial_pose=other._initial_pose,
+                converter=converter,
+            )
+
+        def DoCalcTimeDerivatives(self, context, derivatives):
+            state = context.get_continuous_state_vector().CopyToVector().tolist()
+            commanded = self._wheel_speeds.Eval(context).tolist()
+            if T is float and not math.isfinite(sum(state, sum(commanded))):
+                raise ValueError(
+                    f"DiffDrivePlant: state {state} or wheel_speeds {commanded} is "
+                    "not finite; look for the block upstream that made it so"
+                )
+            derivatives.SetFromVector(
+                plant_derivatives(state, commanded, self._robot, self._plant)
+            )
+
+        def _state(self, context):
+            return context.get_continuous_state_vector().CopyToVector()
+
+        def _pose(self, context, output):
+            output.SetFromVector(self._state(context)[:3])
+
+        def _velocity(self, context, output):
+            state = self._state(context).tolist()
+            v, omega = body_twist(state[5:], self._robot, self._plant.slip)
+            theta = state[2]
+            output.SetFromVector([v * cos(theta), v * sin(theta), omega])
+
+        def _angles(self, context, output):
+            output.SetFromVector(self._state(context)[3:5])
+
+    return Impl
+
+
+DiffDrivePlant = DiffDrivePlant_[None]

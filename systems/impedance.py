@@ -1,0 +1,279 @@
+"""What the impedance laws share: attraction, obstacle speed, sum of forces.
+
+    M p'' = F_m + sum of f(c, s) u,   u = -C/|C|,  c = |C|,  s = |dC/dt|
+
+Han 2019, eq. 17-18 print the repulsion with the wrong sign and with forces
+that grow with distance; eq. 19 replaces them. See docs/errata.md.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import model_validator
+from pydrake.math import log
+
+from systems.cache import declare_cache
+from systems.collision_vector import SLOTS
+from systems.geometry import control_point, rotate, safe_norm
+from systems.parameters import NonNegative, Parameters, Positive
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "AttractionParameters",
+    "ImpedanceLoop",
+    "RepulsionParameters",
+    "attraction_force",
+    "matched_decay",
+    "obstacle_speed",
+    "repulsion_force",
+]
+
+VelocityTerm = Literal["printed", "closing"]
+
+
+class AttractionParameters(Parameters):
+    """The spring and damper to the target (Han 2019, eq. 18 and section 5)."""
+
+    stiffness_n_m: NonNegative = 2.0
+    """K_r, N/m; printed without unit."""
+    damping_n_s_m: NonNegative = 1.0
+    """D_r, N s/m; printed without unit. Damping ratio 0.18 with K_r = 2."""
+    follow_distance_m: NonNegative = 1.2
+    """Distance d_f from the source at which the attraction rests, m; ours.
+    0 is as printed: P is pulled onto the source itself."""
+    brake_time_s: Positive = 0.5
+    """Time constant of the stop when there is no target, s; ours."""
+
+
+class RepulsionParameters(Parameters):
+    """The springs and dampers to obstacles (Han 2019, eq. 19-22, table 4).
+
+    K_0, k_ref, D_0 and d_ref are not printed; these defaults are ours and
+    provisional, see docs/model.md.
+    """
+
+    stiffness_n_m: Positive = 16.0
+    """K_0 of the conventional law, N/m."""
+    damping_n_s_m: Positive = 0.8
+    """D_0 of the conventional law, N s/m."""
+    reach_m: Positive = 0.8
+    """rho_0: the conventional law acts below this distance, m (Han 2019, 5.2)."""
+    reference_stiffness_n_m: Positive = 64.0
+    """k_ref of the active law, N/m, above K_0."""
+    reference_damping_n_s_m: Positive = 0.2
+    """d_ref of the active law, N s/m, below D_0."""
+    speed_limit_m_s: Positive = 0.72
+    """mu_0: the active velocity term acts below this speed, m/s (5.3)."""
+    velocity_term: VelocityTerm = "printed"
+    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RepulsionParameters:
+        if self.reference_stiffness_n_m <= self.stiffness_n_m:
+            raise ValueError(
+                f"reference_stiffness_n_m: {self.reference_stiffness_n_m} (k_ref) is "
+                f"not above stiffness_n_m {self.stiffness_n_m} (K_0), and alpha = "
+                "rho_0 / (2 ln(k_ref/K_0)) must be positive; raise it"
+            )
+        if self.reference_damping_n_s_m >= self.damping_n_s_m:
+            raise ValueError(
+                f"reference_damping_n_s_m: {self.reference_damping_n_s_m} (d_ref) is "
+                f"not below damping_n_s_m {self.damping_n_s_m} (D_0), and beta = "
+                "mu_0 / (2 ln(D_0/d_ref)) must be positive; lower it"
+            )
+        return self
+
+    @property
+    def alpha_m(self) -> float:
+        """Decay length of the active spring, m (Han 2019, eq. 21)."""
+        ratio = self.reference_stiffness_n_m / self.stiffness_n_m
+        return matched_decay(self.reach_m, ratio)
+
+    @property
+    def beta_m_s(self) -> float:
+        """Growth speed of the active damper, m/s (eq. 22, misprinted)."""
+        ratio = self.damping_n_s_m / self.reference_damping_n_s_m
+        return matched_decay(self.speed_limit_m_s, ratio)
+
+
+def matched_decay(limit: float, ratio: float) -> float:
+    """limit / (2 ln ratio): both laws are equal at half the limit."""
+    return limit / (2.0 * log(ratio))
+
+
+def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):
+    """Force on the virtual mass towards the follow point, N.
+
+    Args:
+        p_WP: Control point, m; floats or AutoDiffXd.
+        v_WP: Velocity of the virtual mass, m/s.
+        p_WS: Target, m.
+        valid: Whether there is a target; without one the mass is braked.
+        attraction: ``AttractionParameters``.
+        mass: kg.
+
+    Returns:
+        (Fx, Fy) in W: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
+    """
+    if not valid:
+        brake = mass / attraction.brake_time_s
+        return -brake * v_WP[0], -brake * v_WP[1]
+    dx, dy = p_WS[0] - p_WP[0], p_WS[1] - p_WP[1]
+    pull = attraction.stiffness_n_m
+    if attraction.follow_distance_m > 0.0:
+        pull = pull * (1.0 - attraction.follow_distance_m / safe_norm(dx, dy))
+    damping = attraction.damping_n_s_m
+    return pull * dx - damping * v_WP[0], pull * dy - damping * v_WP[1]
+
+
+def obstacle_speed(C_now, C_before, velocity_term: VelocityTerm, period):
+    """s in m/s: how fast the collision vector changes.
+
+    Args:
+        C_now: (x, y) in W, m; floats or AutoDiffXd.
+        C_before: The same feature one period ago, or None: 0 then.
+        velocity_term: ``printed`` |dC/dt|, or ``closing`` max(0, -d|C|/dt).
+        period: s.
+    """
+    if C_before is None:
+        return 0.0 * C_now[0]
+    if velocity_term == "printed":
+        return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period
+    closing = (safe_norm(*C_before) - safe_norm(*C_now)) / period
+    return closing if closing > 0.0 else 0.0 * closing
+
+
+def repulsion_force(vectors, before, law, velocity_term: VelocityTerm, period):
+    """Sum of the forces away from the obstacles.
+
+    Args:
+        vectors: [(feature, C_x, C_y)] in W, m; floats or AutoDiffXd.
+        before: {feature: (C_x, C_y)} one period ago.
+        law: ``law(c, s)``, N.
+        velocity_term: See ``obstacle_speed``.
+        period: s.
+
+    Returns:
+        (Fx, Fy) in W, N, and the list of s, m/s.
+    """
+    Fx = Fy = 0.0
+    speeds = []
+    for feature, *C_W in vectors:
+        s = obstacle_speed(C_W, before.get(_key(feature)), velocity_term, period)
+        c = safe_norm(*C_W)
+        f = law(c, s)
+        Fx, Fy = Fx - f * C_W[0] / c, Fy - f * C_W[1] / c
+        speeds.append(s)
+    return (Fx, Fy), speeds
+
+
+class ImpedanceLoop:
+    """Ports, state and sum of forces of every impedance controller.
+
+    A mix-in beside ``LeafSystem_[T]``: the controller's file adds its law as
+    ``_radial_force(c, s)`` in N. Each collision vector's s is the change over
+    one 25 ms period of the same feature; 0 where the feature is new.
+    """
+
+    def _declare_loop(self, scalar, name, robot, attraction, repulsion):
+        self._scalar = scalar
+        self._robot = robot or RobotParameters()
+        self._attraction = attraction or AttractionParameters()
+        self._repulsion = repulsion or RepulsionParameters()
+        self.set_name(name)
+        self._inputs = [
+            self.DeclareVectorInputPort(name=port_name, size=size)
+            for port_name, size in (
+                ("p_WS_estimated", 2),
+                ("target_valid", 1),
+                ("collision_vectors_B", 2 * SLOTS),
+                ("mask", SLOTS),
+                ("features", SLOTS),
+                ("pose_WB_estimated", 3),
+                ("v_WP", 2),
+            )
+        ]
+        self.DeclareDiscreteState([scalar(0.0)] * (3 * SLOTS))
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+        )
+        sources = {port.ticket() for port in self._inputs}
+        obstacles = {port.ticket() for port in self._inputs[2:6]}
+        self._vectors = declare_cache(self, "C_W", self._vectors_W, obstacles)
+        sources.add(self.xd_ticket())
+        self._forces = declare_cache(self, "forces", self._sum_forces, sources)
+        for port_name, size, calc in (
+            ("acceleration_W", 2, self._acceleration),
+            ("forces_W", 4, self._forces_W),
+            ("obstacle_speeds", SLOTS, self._speeds),
+        ):
+            self.DeclareVectorOutputPort(
+                name=port_name,
+                size=size,
+                calc=calc,
+                prerequisites_of_calc={self._forces.ticket()},
+            )
+
+    def _vectors_W(self, context):
+        """[(feature, C_x, C_y)] in W axes."""
+        vectors, mask, features, pose = (
+            port.Eval(context).tolist() for port in self._inputs[2:6]
+        )
+        return [
+            (features[k], *rotate(pose[2], *vectors[2 * k : 2 * k + 2]))
+            for k in range(SLOTS)
+            if mask[k] > 0.5
+        ]
+
+    def _sum_forces(self, context):
+        """(F_m, F_b, s of each slot)."""
+        target, valid = self._inputs[0].Eval(context), self._inputs[1].Eval(context)
+        pose, v_WP = self._inputs[5].Eval(context), self._inputs[6].Eval(context)
+        F_m = attraction_force(
+            control_point(pose.tolist(), self._robot.control_point_m),
+            v_WP.tolist(),
+            target.tolist(),
+            valid[0] > 0.5,
+            self._attraction,
+            self._robot.mass_kg,
+        )
+        F_b, speeds = repulsion_force(
+            self._vectors.Eval(context),
+            self._before(context),
+            self._radial_force,
+            self._repulsion.velocity_term,
+            FRAME_PERIOD_S,
+        )
+        speeds += [0.0] * (SLOTS - len(speeds))
+        zero = self._scalar(0.0)
+        return F_m, [zero + F for F in F_b], [zero + s for s in speeds]
+
+    def _before(self, context):
+        """{feature: C_W} of the last tick."""
+        state = context.get_discrete_state(0).CopyToVector().tolist()
+        rows = (state[3 * k : 3 * k + 3] for k in range(SLOTS))
+        return {_key(row[0]): row[1:] for row in rows if row[0] > 0.5}
+
+    def _remember(self, context, discrete_state):
+        rows = [value for row in self._vectors.Eval(context) for value in row]
+        rows += [self._scalar(0.0)] * (3 * SLOTS - len(rows))
+        discrete_state.get_mutable_vector().SetFromVector(rows)
+
+    def _acceleration(self, context, output):
+        F_m, F_b, _ = self._forces.Eval(context)
+        mass = self._robot.mass_kg
+        output.SetFromVector([(F_m[0] + F_b[0]) / mass, (F_m[1] + F_b[1]) / mass])
+
+    def _forces_W(self, context, output):
+        F_m, F_b, _ = self._forces.Eval(context)
+        output.SetFromVector([*F_m, *F_b])
+
+    def _speeds(self, context, output):
+        output.SetFromVector(self._forces.Eval(context)[2])
+
+
+def _key(feature) -> int:
+    """Number of a feature, whatever its scalar type."""
+    return round(feature if isinstance(feature, float) else feature.value())

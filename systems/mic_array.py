@@ -1,0 +1,140 @@
+"""Three microphones in a row, with their converter."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from systems.acoustics import AcousticParameters
+from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.propagation import microphone_paths, propagate
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame, Emission
+
+__all__ = ["FRAME_SAMPLES", "MicArray", "MicArrayParameters", "microphones_B"]
+
+#: Samples a channel in a frame.
+FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
+
+# Spacing of 2.5 ms: even a robot that spins at 4 rad/s bends the delay by
+# less than 1e-4 sample from a cubic in that time.
+_KNOTS = 11
+
+# Two instants closer than this are one tick of a 25 ms clock, s.
+_SAME_INSTANT_S = 1e-6
+
+
+def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
+    """(3, 2) microphones M1 (left), M2, M3 (right) in B, m."""
+    x, spacing = robot.control_point_m, robot.microphone_spacing_m
+    return np.array([[x, spacing], [x, 0.0], [x, -spacing]])
+
+
+class MicArray(LeafSystem):
+    """Records the sound at three microphones.
+
+    .. pydrake_system::
+
+        name: MicArray
+        input_ports:
+        - emission [Emission]
+        - pose_WB [m, m, rad]
+        - velocity_WB [m/s, m/s, rad/s]
+        output_ports:
+        - audio [AudioFrame]
+
+    A frame published at t covers [t - 25 ms, t). Between the two ticks the
+    robot follows a cubic Hermite polynomial; sound travels as in
+    ``systems.propagation``. A robot that has no tick behind it, or is read
+    between two ticks, is taken to have come at its present velocity.
+
+    State: time, pose and velocity of the robot at the last tick.
+    Rate and latency: a function of the state and the present inputs; no
+    latency. The state is updated every 25 ms.
+
+    Args:
+        parameters: Microphones, amplifier and converter.
+        robot: Places of the microphones.
+        acoustics: Speed of sound.
+        seed: Seed of the noise.
+    """
+
+    def __init__(
+        self,
+        *,
+        parameters: MicArrayParameters | None = None,
+        robot: RobotParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+        seed: int = 0,
+    ) -> None:
+        super().__init__()
+        self._parameters = parameters or MicArrayParameters()
+        self._p_BM = microphones_B(robot or RobotParameters())
+        self._c = (acoustics or AcousticParameters()).c
+        self._seed = seed
+        self._noise_ratio = 10.0 ** (-self._parameters.snr_db_at_1m / 20.0)
+        # Instants of the knots from the start of the frame, (3, knots).
+        self._instants = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS) + np.reshape(
+            self._parameters.channel_skew_s, (3, 1)
+        )
+
+        self.set_name("mic_array")
+        self._emission = self.DeclareAbstractInputPort(
+            name="emission", model_value=Value(object())
+        )
+        self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
+        self._velocity_WB = self.DeclareVectorInputPort(name="velocity_WB", size=3)
+        self.DeclareDiscreteState(np.array([-np.inf, *np.zeros(6)]))
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+        )
+        self.DeclareAbstractOutputPort(
+            name="audio",
+            alloc=lambda: Value(object()),
+            calc=self._record,
+            prerequisites_of_calc={
+                self.time_ticket(),
+                self.xd_ticket(),
+                self._emission.ticket(),
+                self._pose_WB.ticket(),
+                self._velocity_WB.ticket(),
+            },
+        )
+
+    def _remember(self, context, discrete_state) -> None:
+        pose, velocity = self._pose_WB.Eval(context), self._velocity_WB.Eval(context)
+        discrete_state.set_value(np.concatenate(([context.get_time()], pose, velocity)))
+
+    def _record(self, context, output) -> None:
+        emission = self._emission.Eval(context)
+        if not isinstance(emission, Emission):
+            raise TypeError(
+                f"MicArray: port emission carries a {type(emission).__name__}; "
+                "connect the emission of a SoundEmitter"
+            )
+        time = context.get_time()
+        begin = time - FRAME_PERIOD_S
+        pose, velocity = self._pose_WB.Eval(context), self._velocity_WB.Eval(context)
+        last = context.get_discrete_state_vector().value()
+        if abs(last[0] - begin) < _SAME_INSTANT_S:
+            pose_0, velocity_0 = last[1:4], last[4:7]
+        else:
+            pose_0, velocity_0 = pose - FRAME_PERIOD_S * velocity, velocity
+        instants = begin + self._instants
+        p_WM, v_WM = microphone_paths(
+            instants, begin, pose_0, velocity_0, time, pose, velocity, self._p_BM
+        )
+        pressure = propagate(emission, instants, p_WM, v_WM, FRAME_SAMPLES, self._c)
+        tick = round(time / FRAME_PERIOD_S)
+        noise = frame_noise((len(p_WM), FRAME_SAMPLES), self._seed, tick)
+        noise_pa = emission.level_pa * self._noise_ratio
+        output.set_value(
+            AudioFrame(
+                counts=convert(pressure, noise, noise_pa, self._parameters),
+                full_scale=self._parameters.full_scale,
+                sample_rate_hz=SAMPLE_RATE_HZ,
+                time=time,
+            )
+        )

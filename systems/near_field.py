@@ -1,0 +1,138 @@
+"""Range and bearing of a source from the delays at three microphones in a row.
+
+M1, M2 and M3 stand at y = l, 0, -l; the source lies ahead, x > 0. With
+a = c tau_12 and b = c tau_13, where tau_ij = t_j - t_i, Apollonius' theorem
+gives R1 = (2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; eq. 9 of
+Han 2019 is not consistent with its own eq. 7), R2 = R1 + a, R3 = R1 + b and
+sin(bearing) = (R3^2 - R1^2) / (4 l R2), exact at any distance.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NearFieldFix", "locate_source", "source_from_delays"]
+
+# Keeps the covariance finite for a source on the line of the microphones.
+_LEAST_COSINE = 1e-3
+
+
+@dataclass(frozen=True)
+class NearFieldFix:
+    """A source seen from M2, with first-order covariances."""
+
+    bearing: float
+    """rad, CCW from straight ahead, in [-pi/2, pi/2]."""
+    range: float
+    """m; 0 where it is not valid."""
+    range_valid: bool
+    """Whether the delays have a finite range."""
+    bearing_std: float
+    """rad."""
+    range_std: float
+    """m; infinity where the range is not valid."""
+    p_MS: tuple[float, float]
+    """(x, y) from M2, m; of unit length where the range is not valid."""
+    covariance: NDArray[np.float64]
+    """(2, 2) of p_MS, m^2; across the bearing only where no range is valid."""
+
+    def without_range(self) -> NearFieldFix:
+        """The same bearing alone, for a range that is too uncertain."""
+        return _bearing_only(self.bearing, self.bearing_std)
+
+
+def _bearing_only(bearing: float, bearing_std: float) -> NearFieldFix:
+    across = np.array([-math.sin(bearing), math.cos(bearing)])
+    return NearFieldFix(
+        bearing=bearing,
+        range=0.0,
+        range_valid=False,
+        bearing_std=bearing_std,
+        range_std=math.inf,
+        p_MS=(math.cos(bearing), math.sin(bearing)),
+        covariance=bearing_std**2 * np.outer(across, across),
+    )
+
+
+def _ranges(a: float, b: float, spacing: float) -> tuple[float, float, float] | None:
+    """R1, R2, R3 in m, or None where the delays have no finite range."""
+    if b - 2.0 * a <= 0.0:
+        return None
+    r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
+    r2, r3 = r1 + a, r1 + b
+    if min(r1, r2, r3) <= 0.0 or abs(r3 * r3 - r1 * r1) > 4.0 * spacing * r2:
+        return None
+    return r1, r2, r3
+
+
+def source_from_delays(
+    tau_12: float, tau_13: float, spacing: float, c: float
+) -> tuple[float, float, bool]:
+    """Bearing and range of the source from M2.
+
+    Args:
+        tau_12: Time by which the sound reaches M2 later than M1, s.
+        tau_13: Time by which the sound reaches M3 later than M1, s.
+        spacing: Distance l between neighbouring microphones, m.
+        c: Speed of sound, m/s.
+
+    Returns:
+        bearing in [-pi/2, pi/2] (rad, left positive), range (m) and whether
+        the range is valid. If not, the range is 0 and the bearing is that of
+        a source far away.
+    """
+    a, b = c * tau_12, c * tau_13
+    ranges = _ranges(a, b, spacing)
+    if ranges is None:
+        return math.asin(min(1.0, max(-1.0, b / (2.0 * spacing)))), 0.0, False
+    r1, r2, r3 = ranges
+    return math.asin((r3 * r3 - r1 * r1) / (4.0 * spacing * r2)), r2, True
+
+
+def locate_source(
+    tau_12: float,
+    tau_13: float,
+    covariance: NDArray[np.float64],
+    spacing: float,
+    c: float,
+) -> NearFieldFix:
+    """As ``source_from_delays``, with what the delays' errors make of it.
+
+    Args:
+        tau_12: Delay, s.
+        tau_13: Delay, s.
+        covariance: (2, 2) of the two delays, s^2.
+        spacing: Distance between neighbouring microphones, m.
+        c: Speed of sound, m/s.
+    """
+    bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    safe = max(cosine, _LEAST_COSINE)
+    if not valid:
+        to_bearing = np.array([0.0, c / (2.0 * spacing * safe)])
+        return _bearing_only(bearing, math.sqrt(to_bearing @ covariance @ to_bearing))
+    a, b = c * tau_12, c * tau_13
+    r1, r3 = r2 - a, r2 - a + b
+    gap = b - 2.0 * a
+    to_range = c * np.array([r1 + r3, -r3]) / gap
+    to_y = c * np.array([b * r2, -a * r3]) / (spacing * gap)
+    to_bearing = (to_y - sine * to_range) / (r2 * safe)
+    to_position = np.vstack(
+        (
+            cosine * to_range - r2 * sine * to_bearing,
+            sine * to_range + r2 * cosine * to_bearing,
+        )
+    )
+    return NearFieldFix(
+        bearing=bearing,
+        range=r2,
+        range_valid=True,
+        bearing_std=math.sqrt(to_bearing @ covariance @ to_bearing),
+        range_std=math.sqrt(to_range @ covariance @ to_range),
+        p_MS=(r2 * cosine, r2 * sine),
+        covariance=to_position @ covariance @ to_position.T,
+    )

@@ -1,0 +1,258 @@
+"""Sound from a moving source to moving microphones in the free field.
+
+Each microphone hears what left the source at the retarded time t_e, with
+c (t - t_e) = |p_M(t) - p_S(t_e)|. Doppler shifts (Han 2019, eq. 1) come out of
+that. Sound pressure falls as 1/R; the paper's text says with the square of the
+distance, which is true of intensity.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.signal.windows import kaiser
+
+from systems.signals import Emission
+
+__all__ = [
+    "KERNEL_REACH",
+    "MINIMUM_RANGE_M",
+    "microphone_paths",
+    "propagate",
+    "retarded_delays",
+]
+
+#: Samples that the interpolation kernel touches on either side.
+KERNEL_REACH = 6
+
+#: 1/R grows no further below this distance, m: no microphone is a point.
+MINIMUM_RANGE_M = 0.01
+
+# A Kaiser window of 12 taps and this beta leaves an error of 1e-5 up to 18 kHz:
+# at 100 kHz the nearest image starts at 82 kHz, so the transition is wide.
+_TAPS = 2 * KERNEL_REACH
+_BETA = 10.0
+_PHASES = 256
+
+# Vectorised sums need licence to reorder; NaN must still mean NaN.
+_REORDER = {"reassoc", "contract", "nsz", "arcp"}
+
+
+def _kernel() -> NDArray[np.float32]:
+    """(phases + 1, taps) windowed sinc for delays of 0 ... 1 sample."""
+    fraction = np.arange(_PHASES + 1)[:, None] / _PHASES
+    x = np.arange(_TAPS) - (KERNEL_REACH - 1) - fraction
+    fine = np.linspace(-KERNEL_REACH, KERNEL_REACH, 4801)
+    window = np.interp(x, fine, kaiser(4801, _BETA))
+    taps = np.sinc(x) * window
+    return (taps / taps.sum(axis=1, keepdims=True)).astype(np.float32)
+
+
+_KERNEL = _kernel()
+
+
+@njit(cache=True)
+def _hermite(s, h, a, b, da, db):  # pragma: no cover  (compiled)
+    """Value and derivative at s in [0, 1] of the cubic between two knots."""
+    s2, s3 = s * s, s * s * s
+    value = (
+        (2 * s3 - 3 * s2 + 1) * a
+        + (s3 - 2 * s2 + s) * h * da
+        + (3 * s2 - 2 * s3) * b
+        + (s3 - s2) * h * db
+    )
+    slope = (
+        6 * (s2 - s) * (a - b) / h + (3 * s2 - 4 * s + 1) * da + (3 * s2 - 2 * s) * db
+    )
+    return value, slope
+
+
+@njit(cache=True)
+def microphone_paths(
+    times, begin, pose_0, velocity_0, end, pose_1, velocity_1, p_BM
+):  # pragma: no cover  (compiled)
+    """Places and velocities of the microphones of a moving robot.
+
+    The pose follows the cubic Hermite polynomial between two ticks.
+
+    Args:
+        times: (m, k) instants of each microphone, s.
+        begin: Time of the first pose, s.
+        pose_0: (3,) x, y, theta in W, m and rad.
+        velocity_0: (3,) vx, vy in W and omega, m/s and rad/s.
+        end: Time of the second pose, s.
+        pose_1: (3,) as pose_0; theta may be wrapped.
+        velocity_1: (3,) as velocity_0.
+        p_BM: (m, 2) microphones in B, m.
+
+    Returns:
+        p_WM, (m, k, 2) m, and v_WM, (m, k, 2) m/s.
+    """
+    h = end - begin
+    turn = pose_1[2] - pose_0[2]
+    turn -= 2 * math.pi * round(turn / (2 * math.pi))
+    count, knots = times.shape
+    p_WM = np.empty((count, knots, 2))
+    v_WM = np.empty((count, knots, 2))
+    for m in range(count):
+        for k in range(knots):
+            s = (times[m, k] - begin) / h
+            x, vx = _hermite(s, h, pose_0[0], pose_1[0], velocity_0[0], velocity_1[0])
+            y, vy = _hermite(s, h, pose_0[1], pose_1[1], velocity_0[1], velocity_1[1])
+            theta, omega = _hermite(
+                s, h, pose_0[2], pose_0[2] + turn, velocity_0[2], velocity_1[2]
+            )
+            c, sn = math.cos(theta), math.sin(theta)
+            dx = c * p_BM[m, 0] - sn * p_BM[m, 1]
+            dy = sn * p_BM[m, 0] + c * p_BM[m, 1]
+            p_WM[m, k, 0], p_WM[m, k, 1] = x + dx, y + dy
+            v_WM[m, k, 0], v_WM[m, k, 1] = vx - omega * dy, vy + omega * dx
+    return p_WM, v_WM
+
+
+@njit(cache=True)
+def retarded_delays(
+    times, p_WM, v_WM, knot_times, p_WS, v_WS, c
+):  # pragma: no cover  (compiled)
+    """Travelling times of the sound that arrives at given instants.
+
+    Solves c d = |p_M(t) - p_S(t - d)| by Newton's method; the source is slower
+    than sound, hence the solution is unique.
+
+    Args:
+        times: (m, k) instants of arrival, s.
+        p_WM: (m, k, 2) microphones at those instants, m.
+        v_WM: (m, k, 2) their velocities, m/s.
+        knot_times: (n,) knots of the source's path, ascending, s.
+        p_WS: (n, 2) source at the knots, m.
+        v_WS: (n, 2) its velocity, m/s.
+        c: Speed of sound, m/s.
+
+    Returns:
+        d and its rate of change, each (m, k), s and s/s.
+    """
+    delays = np.empty(times.shape)
+    rates = np.empty(times.shape)
+    last = knot_times.size - 1
+    for m in range(times.shape[0]):
+        d = 0.0
+        for k in range(times.shape[1]):
+            for _ in range(20):
+                t_e = times[m, k] - d
+                n = min(max(np.searchsorted(knot_times, t_e) - 1, 0), last - 1)
+                h = knot_times[n + 1] - knot_times[n]
+                s = (t_e - knot_times[n]) / h
+                x, vx = _hermite(
+                    s, h, p_WS[n, 0], p_WS[n + 1, 0], v_WS[n, 0], v_WS[n + 1, 0]
+                )
+                y, vy = _hermite(
+                    s, h, p_WS[n, 1], p_WS[n + 1, 1], v_WS[n, 1], v_WS[n + 1, 1]
+                )
+                dx, dy = p_WM[m, k, 0] - x, p_WM[m, k, 1] - y
+                r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+                away = (dx * vx + dy * vy) / r
+                step = (r - c * d) / (c - away)
+                d += step
+                if abs(step) < 1e-13:
+                    break
+            closing = (dx * v_WM[m, k, 0] + dy * v_WM[m, k, 1]) / r
+            delays[m, k] = d
+            rates[m, k] = (closing - away) / (c - away)
+    return delays, rates
+
+
+@njit(cache=True, fastmath=_REORDER)
+def _interpolate(
+    samples, kernel, first, delays, rates, c, nearest, out
+):  # pragma: no cover  (compiled)
+    """Fills out (m, length) with samples of the delayed sound over distance.
+
+    In units of samples: first (m,) is the place among the samples of each
+    channel's first instant, delays and rates (m, k) stand at evenly spaced
+    knots, c is in m per sample and nearest the least distance in m.
+    """
+    taps = kernel.shape[1]
+    phases = kernel.shape[0] - 1
+    spans = delays.shape[1] - 1
+    h = out.shape[1] // spans
+    for m in range(out.shape[0]):
+        for k in range(spans):
+            for i in range(h):
+                d, _ = _hermite(
+                    i / h,
+                    h,
+                    delays[m, k],
+                    delays[m, k + 1],
+                    rates[m, k],
+                    rates[m, k + 1],
+                )
+                j = k * h + i
+                position = first[m] + j - d
+                whole = math.floor(position)
+                phase = (position - whole) * phases
+                row = int(phase)
+                part = np.float32(phase - row)
+                start = whole - taps // 2 + 1
+                total = np.float32(0.0)
+                for n in range(taps):
+                    low = kernel[row, n]
+                    weight = low + part * (kernel[row + 1, n] - low)
+                    total += weight * samples[start + n]
+                out[m, j] = total / np.float32(max(c * d, nearest))
+
+
+def propagate(
+    emission: Emission,
+    times: NDArray[np.float64],
+    p_WM: NDArray[np.float64],
+    v_WM: NDArray[np.float64],
+    count: int,
+    c: float,
+) -> NDArray[np.float32] | None:
+    """Sound pressure at moving microphones over one frame.
+
+    The delay is exact at the knots and follows cubic polynomials between them.
+    With knots every 2.5 ms and the bodies of this model, delays are right to
+    1e-3 sample from 0.1 to 18 kHz, and amplitudes to 1e-4.
+
+    Args:
+        emission: What left the source, and where.
+        times: (m, k) evenly spaced instants from the first sample of each
+            channel to one sample past its last, s.
+        p_WM: (m, k, 2) microphones at those instants, m.
+        v_WM: (m, k, 2) their velocities, m/s.
+        count: Samples a channel, a multiple of k - 1.
+        c: Speed of sound, m/s.
+
+    Returns:
+        (m, count) Pa, or None where the source is silent. Nearer than 1 cm,
+        the amplitude is that at 1 cm.
+
+    Raises:
+        ValueError: A microphone hears what left before the emission begins.
+    """
+    if not emission.sounding:
+        # One instant a channel is enough to tell that the source is in reach.
+        times, p_WM, v_WM = times[:, :1], p_WM[:, :1], v_WM[:, :1]
+    delays, rates = retarded_delays(
+        times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c
+    )
+    rate = emission.sample_rate_hz
+    first = (times[:, 0] - emission.start_time) * rate
+    delays *= rate
+    if (first - delays[:, 0]).min() < KERNEL_REACH:
+        raise ValueError(
+            f"MicArray: the source is {delays[:, 0].max() * c / rate:.2f} m away, "
+            "farther than the emission reaches back; raise maximum_range_m of "
+            "SoundEmitter"
+        )
+    if not emission.sounding:
+        return None
+    out = np.empty((len(times), count), dtype=np.float32)
+    _interpolate(
+        emission.samples, _KERNEL, first, delays, rates, c / rate, MINIMUM_RANGE_M, out
+    )
+    return out

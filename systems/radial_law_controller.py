@@ -1,0 +1,82 @@
+"""A user's own law in the place of the papers' laws."""
+
+from __future__ import annotations
+
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.impedance import ImpedanceLoop, RepulsionParameters
+
+__all__ = ["RadialLawController", "RadialLawController_", "no_force"]
+
+
+def no_force(c, s, repulsion: RepulsionParameters):
+    """No avoidance at all: the lower anchor of every comparison. N."""
+    return 0.0 * c
+
+
+@TemplateSystem.define("RadialLawController_", T_list=[float, AutoDiffXd])
+def RadialLawController_(T):
+    class Impl(LeafSystem_[T], ImpedanceLoop):
+        """Follows the target; pushes off by any function of c and s.
+
+        .. pydrake_system::
+
+            name: RadialLawController
+            input_ports:
+            - p_WS_estimated [m]
+            - target_valid [0 or 1]
+            - collision_vectors_B [m, three slots of x and y]
+            - mask [0 or 1 a slot]
+            - features [number of what the vector stands on]
+            - pose_WB_estimated [m, m, rad]
+            - v_WP [m/s, of the virtual mass]
+            output_ports:
+            - acceleration_W [m/s^2]
+            - forces_W [N, attraction then repulsion, x and y each]
+            - obstacle_speeds [m/s, s of each slot]
+
+        Discrete state, 25 ms: the last collision vectors, for s. The outputs
+        are functions of state and present input: no latency.
+
+        Args:
+            robot: Mass and place of P.
+            attraction: ``AttractionParameters``.
+            repulsion: ``RepulsionParameters``, handed to the law.
+            law: ``law(c, s, repulsion)``: force away from the obstacle in N at
+                distance c in m and speed s in m/s. Use pydrake.math, so that
+                it can be differentiated.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            attraction=None,
+            repulsion=None,
+            law=no_force,
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._law = law
+            name = "radial_law_controller"
+            self._declare_loop(T, name, robot, attraction, repulsion)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                attraction=other._attraction,
+                repulsion=other._repulsion,
+                law=other._law,
+                converter=converter,
+            )
+
+        def _radial_force(self, c, s):
+            return self._law(c, s, self._repulsion)
+
+    return Impl
+
+
+RadialLawController = RadialLawController_[None]

@@ -1,0 +1,74 @@
+"""What travels through the abstract ports: emitted sound and recorded audio."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["FRAME_PERIOD_S", "SAMPLE_RATE_HZ", "AudioFrame", "Emission"]
+
+#: Period of every discrete block (Han 2019, section 4.1; printed "25 m/s").
+FRAME_PERIOD_S = 0.025
+
+#: Rate of the analogue-to-digital converter (Han 2019, section 4.1).
+SAMPLE_RATE_HZ = 100_000
+
+
+class _Immutable:
+    """Shares read-only arrays instead of copying them with the context.
+
+    Drake deep-copies abstract values when it clones a context; numpy's copy
+    of a read-only array would be writable and cost a frame's memory.
+    """
+
+    def __post_init__(self) -> None:
+        for value in vars(self).values():
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Immutable:
+        return self
+
+
+@dataclass(frozen=True)
+class Emission(_Immutable):
+    """Sound that has left the loudspeaker, and where it left from.
+
+    Sample ``n`` was emitted at ``start_time + n / sample_rate_hz``. The
+    emitter's path is given at knots, position and velocity, to be joined by
+    cubic Hermite polynomials.
+    """
+
+    samples: NDArray[np.float32]
+    """(n,) sound pressure at 1 m, Pa."""
+    start_time: float
+    """Time of the first sample, s."""
+    sample_rate_hz: float
+    """Rate of ``samples``, Hz."""
+    knot_times: NDArray[np.float64]
+    """(k,) ascending; the last one is the time of publication, s."""
+    p_WS: NDArray[np.float64]
+    """(k, 2) emitter position in W, m."""
+    v_WS: NDArray[np.float64]
+    """(k, 2) emitter velocity in W, m/s."""
+    level_pa: float
+    """RMS pressure at 1 m while the source sounds, Pa; noise refers to it."""
+    sounding: bool
+    """False where every sample is zero, so that listeners may skip it."""
+
+
+@dataclass(frozen=True)
+class AudioFrame(_Immutable):
+    """One 25 ms frame of converter counts, covering ``[time - 25 ms, time)``."""
+
+    counts: NDArray[np.int16]
+    """(channels, samples), channels first."""
+    full_scale: int
+    """Counts that stand for the converter's positive full scale."""
+    sample_rate_hz: float
+    """Rate of each channel, Hz."""
+    time: float
+    """End of the frame, s."""

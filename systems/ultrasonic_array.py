@@ -1,0 +1,243 @@
+"""Three ultrasonic range finders at the control point."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+from pydrake.systems.framework import LeafSystem
+
+from systems.acoustics import AcousticParameters
+from systems.cache import declare_cache
+from systems.geometry import cone_range, control_point, rotate
+from systems.noise import tick_generator
+from systems.parameters import Fraction, NonNegative, Parameters, Point, Positive, Size
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "SENSORS",
+    "UltrasonicArray",
+    "UltrasonicParameters",
+    "cone_ranges",
+    "measured_ranges",
+    "world_rectangles",
+]
+
+#: The model holds three sensors, numbered from left to right.
+SENSORS = 3
+
+_Triple = Annotated[tuple[float, float, float], Strict(False)]
+_Places = Annotated[tuple[Point, Point, Point], Strict(False)]
+
+
+class UltrasonicParameters(Parameters):
+    """SRF-05 range finders (Han 2019, 4.2)."""
+
+    axes_deg: _Triple = (30.0, 0.0, -30.0)
+    """Directions of the cones in B, left to right, deg CCW from x."""
+    positions_m: _Places = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    """Places of the sensors from P, in B axes, m."""
+    beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
+    """Half of each cone's opening angle, deg."""
+    minimum_range_m: Positive = 0.03
+    """Nearer surfaces read this range, m."""
+    maximum_range_m: Positive = 3.0
+    """Farther surfaces give no echo, m."""
+    noise_m: NonNegative = 0.001
+    """Standard deviation of a range, m."""
+    dropout_probability: Fraction = 0.0
+    """Probability that an echo is missed."""
+    firing: Literal["simultaneous", "sequential"] = "simultaneous"
+    """All sensors at every tick, or one after the other, a tick each."""
+    assumed_sound_speed_m_s: Positive | None = None
+    """Speed by which the sensors turn time into range, m/s; none: the true one."""
+
+    @model_validator(mode="after")
+    def _check(self) -> UltrasonicParameters:
+        if self.minimum_range_m >= self.maximum_range_m:
+            raise ValueError(
+                f"minimum_range_m: {self.minimum_range_m} must be below "
+                f"maximum_range_m {self.maximum_range_m}"
+            )
+        if not self.axes_deg[0] > self.axes_deg[1] > self.axes_deg[2]:
+            raise ValueError(
+                f"axes_deg: {self.axes_deg} must fall from left to right, as 30, 0, -30"
+            )
+        return self
+
+
+def world_rectangles(poses_WO, sizes, pose_WS, source_size: Size):
+    """All bodies that can be seen or hit, (n + 1, 5); the master robot is last."""
+    count = len(sizes) // 2
+    rectangles = np.empty((count + 1, 5))
+    rectangles[:count, :3] = poses_WO.reshape(count, 3)
+    rectangles[:count, 3:] = sizes.reshape(count, 2)
+    rectangles[count, :3] = pose_WS
+    rectangles[count, 3:] = source_size
+    return rectangles
+
+
+def cone_ranges(
+    pose_WB, rectangles, parameters: UltrasonicParameters, control_point_m: float
+) -> NDArray[np.float64]:
+    """True distance to the nearest surface in each cone.
+
+    Args:
+        pose_WB: (x, y, theta) of the robot, m and rad.
+        rectangles: (n, 5) bodies in W.
+        parameters: The sensors.
+        control_point_m: Distance of P ahead of the axle, m.
+
+    Returns:
+        (3,) m; infinity where a cone is empty.
+    """
+    theta = pose_WB[2]
+    x_P, y_P = control_point(pose_WB, control_point_m)
+    half_angle = math.radians(parameters.beam_half_angle_deg)
+    ranges = np.empty(SENSORS)
+    for k, axis_deg in enumerate(parameters.axes_deg):
+        dx, dy = rotate(theta, *parameters.positions_m[k])
+        axis = theta + math.radians(axis_deg)
+        ranges[k] = cone_range(x_P + dx, y_P + dy, axis, half_angle, rectangles)
+    return ranges
+
+
+def measured_ranges(
+    true_ranges: NDArray[np.float64],
+    parameters: UltrasonicParameters,
+    sound_speed: float,
+    rng: Generator,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the sensors report of the true ranges.
+
+    Args:
+        true_ranges: (3,) m, infinity where a cone is empty.
+        parameters: The sensors.
+        sound_speed: True speed of sound, m/s.
+        rng: Source of noise and dropouts; two draws a sensor.
+
+    Returns:
+        (3,) ranges in [minimum, maximum], m, and (3,) echoes, 0 or 1. Without
+        an echo the range is finite and means nothing.
+    """
+    noise = rng.standard_normal(SENSORS).tolist()
+    luck = rng.random(SENSORS).tolist()
+    stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
+    low, high = parameters.minimum_range_m, parameters.maximum_range_m
+    ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
+    for k, true_range in enumerate(true_ranges.tolist()):
+        if true_range <= high and luck[k] >= parameters.dropout_probability:
+            measured = stretch * true_range + parameters.noise_m * noise[k]
+            ranges[k] = min(max(measured, low), high)
+            echo[k] = 1.0
+    return ranges, echo
+
+
+class UltrasonicArray(LeafSystem):
+    """Ranges of the nearest surfaces in three cones.
+
+    .. pydrake_system::
+
+        name: UltrasonicArray
+        input_ports:
+        - pose_WB [m, m, rad]
+        - poses_WO [m, m, rad each]
+        - sizes [m, m each]
+        - pose_WS [m, m, rad]
+        output_ports:
+        - ranges [m]
+        - echo [0 or 1]
+
+    The master robot is a body like the obstacles. Surfaces beyond the maximum
+    range give no echo; nearer than the minimum they read the minimum, for
+    dropping the echo at contact would drop the force. A cone reports a range,
+    not a direction.
+
+    State: ranges and echoes of the last tick, for sequential firing.
+    Rate and latency: a function of the present poses; no latency. Noise is
+    drawn once a 25 ms tick. With ``firing: sequential`` one sensor fires a
+    tick and the others hold.
+
+    Args:
+        parameters: The sensors.
+        robot: Place of P.
+        acoustics: Speed of sound; the time of flight uses it.
+        source_size: Length and width of the master robot, m.
+        obstacle_count: Number of boxes on the obstacle ports.
+        seed: Seed of the noise.
+    """
+
+    def __init__(
+        self,
+        *,
+        parameters: UltrasonicParameters | None = None,
+        robot: RobotParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+        source_size: Size = (0.326, 0.352),
+        obstacle_count: int = 0,
+        seed: int = 0,
+    ) -> None:
+        super().__init__()
+        self._parameters = parameters or UltrasonicParameters()
+        self._control_point = (robot or RobotParameters()).control_point_m
+        self._sound_speed = (acoustics or AcousticParameters()).c
+        self._source_size = source_size
+        self._seed = seed
+        self.set_name("ultrasonic_array")
+        self._inputs = [
+            self.DeclareVectorInputPort(name=name, size=size)
+            for name, size in (
+                ("pose_WB", 3),
+                ("poses_WO", 3 * obstacle_count),
+                ("sizes", 2 * obstacle_count),
+                ("pose_WS", 3),
+            )
+        ]
+        held = np.r_[np.full(SENSORS, self._parameters.maximum_range_m), np.zeros(3)]
+        self.DeclareDiscreteState(held)
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._hold
+        )
+        sources = {port.ticket() for port in self._inputs}
+        sources |= {self.time_ticket(), self.xd_ticket()}
+        self._readings = declare_cache(self, "readings", self._read, sources)
+        for name, calc in (("ranges", self._calc_ranges), ("echo", self._calc_echo)):
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=SENSORS,
+                calc=calc,
+                prerequisites_of_calc={self._readings.ticket()},
+            )
+
+    def _read(self, context) -> NDArray[np.float64]:
+        """(6,) ranges and echoes as they stand now."""
+        pose_WB, poses_WO, sizes, pose_WS = (
+            port.Eval(context) for port in self._inputs
+        )
+        tick = round(context.get_time() / FRAME_PERIOD_S)
+        rng = tick_generator(self._seed, tick)
+        rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
+        true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
+        ranges, echo = measured_ranges(true, self._parameters, self._sound_speed, rng)
+        now = np.concatenate([ranges, echo])
+        if self._parameters.firing == "simultaneous":
+            return now
+        held = context.get_discrete_state(0).CopyToVector()
+        fires = tick % SENSORS
+        held[[fires, SENSORS + fires]] = now[[fires, SENSORS + fires]]
+        return held
+
+    def _hold(self, context, discrete_state) -> None:
+        if self._parameters.firing == "sequential":
+            discrete_state.set_value(self._readings.Eval(context))
+
+    def _calc_ranges(self, context, output):
+        output.SetFromVector(self._readings.Eval(context)[:SENSORS])
+
+    def _calc_echo(self, context, output):
+        output.SetFromVector(self._readings.Eval(context)[SENSORS:])

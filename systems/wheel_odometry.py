@@ -1,0 +1,167 @@
+"""Dead reckoning from the wheel encoders."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.math import cos, sin
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.cache import declare_cache
+from systems.diff_drive_plant import body_twist
+from systems.parameters import Parameters
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "OdometryParameters",
+    "WheelOdometry",
+    "WheelOdometry_",
+    "advance_pose",
+    "encoder_angle",
+]
+
+
+class OdometryParameters(Parameters):
+    """Wheel encoders (Han 2019, 4.1)."""
+
+    pulses_per_revolution: int = Field(default=2600, gt=0)
+    """Encoder pulses a wheel revolution."""
+    rounding: bool = True
+    """Angles in whole pulses; off: exact angles, as linearisation needs."""
+
+
+def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
+    """Wheel angle in whole pulses, rad."""
+    pulse = math.tau / pulses_per_revolution
+    return math.floor(angle / pulse) * pulse
+
+
+def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
+    """Pose after the wheels have turned, by the arc's chord.
+
+    Args:
+        pose: (x, y, theta), m and rad; floats or AutoDiffXd.
+        wheel_angle_steps: Left and right angle turned, rad.
+        robot: Wheel radius and separation.
+
+    Returns:
+        (x, y, theta). The chord is taken along the mean heading; its length
+        is that of the arc, to second order in the angle.
+    """
+    distance, turn = body_twist(wheel_angle_steps, robot)
+    mean = pose[2] + turn / 2.0
+    return (
+        pose[0] + distance * cos(mean),
+        pose[1] + distance * sin(mean),
+        pose[2] + turn,
+    )
+
+
+@TemplateSystem.define("WheelOdometry_", T_list=[float, AutoDiffXd])
+def WheelOdometry_(T):
+    class Impl(LeafSystem_[T]):
+        """Estimates pose and velocity from the wheels' encoders.
+
+        .. pydrake_system::
+
+            name: WheelOdometry
+            input_ports:
+            - wheel_angles [rad, left and right]
+            output_ports:
+            - pose_WB_estimated [m, m, rad]
+            - velocity_WB_estimated [m/s, m/s, rad/s]
+
+        Discrete state, 25 ms: pose and encoder angles at the last tick. The
+        outputs continue it to the present angles: no latency. The velocity
+        is the mean over the tick in progress (at a tick: the last 25 ms).
+        Slip goes unseen.
+
+        Args:
+            robot: Wheel radius and separation.
+            odometry: ``OdometryParameters``.
+            initial_pose: (x, y, theta) at time zero, known.
+
+        Raises:
+            ValueError: Rounding is on in an AutoDiffXd system.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            odometry=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._robot = robot or RobotParameters()
+            self._odometry = odometry or OdometryParameters()
+            self._initial_pose = tuple(initial_pose)
+            if self._odometry.rounding and T is not float:
+                raise ValueError(
+                    "WheelOdometry: odometry.rounding is true, and a rounded angle "
+                    "has no derivative; set odometry.rounding to false"
+                )
+            self.set_name("wheel_odometry")
+            self._angles = self.DeclareVectorInputPort(name="wheel_angles", size=2)
+            self.DeclareDiscreteState([T(v) for v in (*self._initial_pose, 0, 0)])
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+            )
+            sources = {self._angles.ticket(), self.xd_ticket()}
+            self._now = declare_cache(self, "pose now", self._advance, sources)
+            self.DeclareVectorOutputPort(
+                name="pose_WB_estimated",
+                size=3,
+                calc=self._pose,
+                prerequisites_of_calc={self._now.ticket()},
+            )
+            self.DeclareVectorOutputPort(
+                name="velocity_WB_estimated",
+                size=3,
+                calc=self._velocity,
+                prerequisites_of_calc={self._now.ticket()},
+            )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                odometry=other._odometry,
+                initial_pose=other._initial_pose,
+                converter=converter,
+            )
+
+        def _advance(self, context):
+            """Pose and encoder angles now, a list of five."""
+            angles = self._angles.Eval(context).tolist()
+            if self._odometry.rounding:
+                pulses = self._odometry.pulses_per_revolution
+                angles = [encoder_angle(angle, pulses) for angle in angles]
+            held = self._held(context)
+            steps = (angles[0] - held[3], angles[1] - held[4])
+            return [*advance_pose(held[:3], steps, self._robot), *angles]
+
+        def _held(self, context):
+            return context.get_discrete_state(0).CopyToVector().tolist()
+
+        def _update(self, context, discrete_state):
+            discrete_state.get_mutable_vector().SetFromVector(self._now.Eval(context))
+
+        def _pose(self, context, output):
+            output.SetFromVector(self._now.Eval(context)[:3])
+
+        def _velocity(self, context, output):
+            now, held = self._now.Eval(context), self._held(context)
+            output.SetFromVector(
+                [(now[k] - held[k]) / FRAME_PERIOD_S for k in range(3)]
+            )
+
+    return Impl
+
+
+WheelOdometry = WheelOdometry_[None]

@@ -1,0 +1,140 @@
+"""From the law's acceleration of P to wheel speeds."""
+
+from __future__ import annotations
+
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.math import abs as magnitude
+from pydrake.systems.framework import LeafSystem_
+from pydrake.systems.scalar_conversion import TemplateSystem
+
+from systems.geometry import rotate, safe_norm
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "WheelSpeedCommand",
+    "WheelSpeedCommand_",
+    "hand_position_twist",
+    "integrate_velocity",
+    "limited_wheel_speeds",
+]
+
+
+def integrate_velocity(v_WP, acceleration_W, period, top_speed):
+    """Velocity of the virtual mass after one period, its magnitude clamped.
+
+    The clamp acts on the state: without it v_P would wind up to F_m/D_r,
+    2 m/s for each metre to go.
+
+    Args:
+        v_WP: (vx, vy), m/s; floats or AutoDiffXd.
+        acceleration_W: (ax, ay), m/s^2.
+        period: s.
+        top_speed: m/s.
+    """
+    vx = v_WP[0] + period * acceleration_W[0]
+    vy = v_WP[1] + period * acceleration_W[1]
+    speed = safe_norm(vx, vy)
+    if speed > top_speed:
+        vx, vy = vx * (top_speed / speed), vy * (top_speed / speed)
+    return vx, vy
+
+
+def hand_position_twist(v_WP, theta, control_point_m):
+    """Forward speed and yaw rate that give P the velocity v_WP.
+
+    v = v_P . x_B and omega = v_P . y_B / epsilon: exact, and smooth at
+    standstill.
+    """
+    along, across = rotate(-theta, v_WP[0], v_WP[1])
+    return along, across / control_point_m
+
+
+def limited_wheel_speeds(v, omega, robot: RobotParameters):
+    """Left and right wheel speed, rad/s, scaled together to the limit."""
+    half = omega * robot.wheel_separation_m / 2.0
+    left = (v - half) / robot.wheel_radius_m
+    right = (v + half) / robot.wheel_radius_m
+    largest = magnitude(left)
+    largest = max(largest, magnitude(right))
+    if largest > robot.top_wheel_speed:
+        scale = robot.top_wheel_speed / largest
+        left, right = left * scale, right * scale
+    return left, right
+
+
+@TemplateSystem.define("WheelSpeedCommand_", T_list=[float, AutoDiffXd])
+def WheelSpeedCommand_(T):
+    class Impl(LeafSystem_[T]):
+        """Integrates the virtual mass at P and commands the wheels.
+
+        .. pydrake_system::
+
+            name: WheelSpeedCommand
+            input_ports:
+            - acceleration_W [m/s^2]
+            - pose_WB_estimated [m, m, rad]
+            output_ports:
+            - wheel_speeds [rad/s, left and right]
+            - v_WP [m/s]
+
+        Discrete state, 25 ms: velocity of the virtual mass and wheel speeds.
+        An update at t uses the acceleration at t and acts from t on: from
+        echo to wheels 0 ms, from the end of an audio frame to the wheels
+        25 ms (the estimator's tick). Outputs are state; no feedthrough.
+
+        Args:
+            robot: Dimensions and top speed.
+
+        Reference: ours; the papers do not say how an acceleration becomes
+        wheel speeds.
+        """
+
+        def _construct(self, *, robot=None, converter=None):
+            super().__init__(converter=converter)
+            self._robot = robot or RobotParameters()
+            self.set_name("wheel_speed_command")
+            self._acceleration = self.DeclareVectorInputPort(
+                name="acceleration_W", size=2
+            )
+            self._pose = self.DeclareVectorInputPort(name="pose_WB_estimated", size=3)
+            self.DeclareDiscreteState(4)
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+            )
+            for name, calc in (("wheel_speeds", self._wheels), ("v_WP", self._v_WP)):
+                self.DeclareVectorOutputPort(
+                    name=name,
+                    size=2,
+                    calc=calc,
+                    prerequisites_of_calc={self.xd_ticket()},
+                )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(self, robot=other._robot, converter=converter)
+
+        def _state(self, context):
+            return context.get_discrete_state(0).CopyToVector()
+
+        def _update(self, context, discrete_state):
+            v_WP = integrate_velocity(
+                self._state(context).tolist()[:2],
+                self._acceleration.Eval(context).tolist(),
+                FRAME_PERIOD_S,
+                self._robot.top_speed_m_s,
+            )
+            theta = self._pose.Eval(context).tolist()[2]
+            twist = hand_position_twist(v_WP, theta, self._robot.control_point_m)
+            wheels = limited_wheel_speeds(*twist, self._robot)
+            discrete_state.get_mutable_vector().SetFromVector([*v_WP, *wheels])
+
+        def _wheels(self, context, output):
+            output.SetFromVector(self._state(context)[2:])
+
+        def _v_WP(self, context, output):
+            output.SetFromVector(self._state(context)[:2])
+
+    return Impl
+
+
+WheelSpeedCommand = WheelSpeedCommand_[None]

@@ -1,0 +1,61 @@
+"""The whole chain with full audio: does the robot follow?"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import soundfile
+
+from analysis.metrics import run_metrics
+from diagrams import load_scenario, simulate
+
+pytestmark = pytest.mark.slow
+
+
+def test_following_error_settles_and_stays_bounded():
+    """After the second burst, while the source moves at 0.3 m/s."""
+    result = simulate(load_scenario("obstacle_free"))
+    assert result.cause == "completed"
+    columns = result.columns
+    path = result.scenario.source.path()
+    moving = columns["t"] < path.length / result.scenario.source.speed_m_s
+    error = columns["source_range_true"] - result.scenario.attraction.follow_distance_m
+    settled = (columns["t"] > 2.5) & moving
+    assert np.count_nonzero(settled) > 1000
+    assert np.max(np.abs(error[settled])) < 1.2
+    # Steady state of K_r e = D_r v, and what the law's push off the master
+    # robot and the wait for the next burst (0.3 m/s x 1.5 s) add at most.
+    late = (columns["t"] > 10.0) & moving
+    assert 0.1 < np.mean(error[late]) < 0.15 + 0.45 + 0.2
+
+
+def test_estimates_are_where_the_source_is():
+    metrics = run_metrics(simulate(load_scenario("obstacle_free", ["duration_s=20"])))
+    assert metrics["detections_with_range"] > 150
+    assert metrics["source_error_p95_m"] < 0.05
+    assert metrics["source_outlier_fraction"] == 0.0
+
+
+def test_tone_that_is_ambiguous_in_phase_gives_no_confident_wrong_target(tmp_path):
+    """8.19 kHz: 9.6 wavelengths from microphone to microphone."""
+    time = np.arange(int(0.5 * 48000)) / 48000
+    tone = np.sin(2 * np.pi * 8190 * time)
+    soundfile.write(tmp_path / "tone.wav", 0.5 * tone, 48000)
+    overrides = ["sound.kind=wav", f"sound.file={tmp_path / 'tone.wav'}"]
+    result = simulate(load_scenario("obstacle_free", [*overrides, "duration_s=10"]))
+    columns = result.columns
+    heard = columns["detected"] > 0.5
+    error = np.hypot(
+        columns["p_WS_estimated_x"] - columns["p_WS_x"],
+        columns["p_WS_estimated_y"] - columns["p_WS_y"],
+    )
+    assert not np.any(error[heard] > 0.5)
+
+
+@pytest.mark.parametrize("kind", ["band_noise", "horn"])
+def test_other_sounds_are_followed(kind):
+    overrides = [f"sound.kind={kind}", "duration_s=20"]
+    result = simulate(load_scenario("obstacle_free", overrides))
+    distance = result.columns["source_range_true"]
+    error = distance - result.scenario.attraction.follow_distance_m
+    assert np.max(np.abs(error[result.time > 2.5])) < 1.2

@@ -1,0 +1,59 @@
+"""A source that ends up behind the robot, with full audio.
+
+A line of microphones hears a source behind as one in front. The tests show
+what comes of that as printed, and that the defaults do not run away.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagrams import RunResult, load_scenario, simulate
+
+pytestmark = pytest.mark.slow
+
+
+def run(*overrides: str) -> RunResult:
+    return simulate(load_scenario("default", ["obstacles=[]", *overrides]))
+
+
+def resting_source(bearing_deg: float, distance: float = 2.5) -> str:
+    x = 0.175 + distance * np.cos(np.radians(bearing_deg))
+    y = distance * np.sin(np.radians(bearing_deg))
+    return f"source.waypoints_m=[[{x:.3f}, {y:.3f}]]"
+
+
+@pytest.mark.parametrize("bearing_deg", [80, 100, -120, 150, 180])
+def test_a_source_beside_or_behind_the_start_is_reached(bearing_deg):
+    result = run(resting_source(bearing_deg), "duration_s=60")
+    assert result.cause == "reached"
+    assert np.max(result.columns["source_range_true"]) < 2.5 + 2.0
+
+
+def test_default_follow_distance_does_not_run_away():
+    """The source rests after 3 m; the robot overshoots nothing for a minute."""
+    result = run("source.waypoints_m=[[1.6, 0], [4.6, 0]]", "duration_s=60")
+    assert result.cause == "completed"
+    assert np.max(result.columns["source_range_true"]) < 3.0
+
+
+@pytest.mark.parametrize("resolve", [True, False])
+def test_without_the_resolver_the_robot_chases_the_mirror_image(resolve):
+    """As printed: P is pulled onto the source, which is heard in front.
+
+    A source straight behind then drives the robot away for good.
+    """
+    result = run(
+        resting_source(180.0),
+        "attraction.follow_distance_m=0",
+        f"tracker.resolve_front_back={str(resolve).lower()}",
+        "law=none",
+        "duration_s=60",
+    )
+    farthest = np.max(result.columns["source_range_true"])
+    if resolve:
+        assert farthest < 4.5
+    else:
+        assert result.cause == "diverged"
+        assert farthest > 20.0

@@ -1,0 +1,98 @@
+"""One block on a bench: fixed inputs, a set state, and its outputs read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import ArrayLike, NDArray
+from pydrake.autodiffutils import (
+    AutoDiffXd,
+    ExtractGradient,
+    ExtractValue,
+    InitializeAutoDiff,
+)
+from pydrake.systems.framework import LeafSystem_
+
+
+class Bench:
+    """A block with its inputs fixed, float or AutoDiffXd."""
+
+    def __init__(
+        self, block: Any, *, time: float = 0.0, state: Any = None, **inputs: Any
+    ) -> None:
+        self.block = block
+        self.context = block.CreateDefaultContext()
+        self.context.SetTime(time)
+        if state is not None and self.context.num_continuous_states():
+            self.context.SetContinuousState(self._vector(state))
+        elif state is not None:
+            self.context.SetDiscreteState(0, self._vector(state))
+        for name, value in inputs.items():
+            port = block.GetInputPort(name)
+            port.FixValue(self.context, self._vector(value))
+
+    def _vector(self, values: Any) -> Any:
+        if isinstance(self.block, LeafSystem_[AutoDiffXd]):
+            return np.array(
+                [v if isinstance(v, AutoDiffXd) else AutoDiffXd(v) for v in values]
+            )
+        return np.asarray(values, dtype=float)
+
+    def output(self, name: str) -> Any:
+        """Value of an output port."""
+        return self.block.GetOutputPort(name).Eval(self.context)
+
+    def updated(self) -> Any:
+        """Discrete state after the periodic update."""
+        update = self.block.EvalUniquePeriodicDiscreteUpdate(self.context)
+        return update.get_vector(0).CopyToVector()
+
+    def tick(self) -> Bench:
+        """Takes the periodic update over into the state, 25 ms later."""
+        self.context.SetDiscreteState(0, self.updated())
+        self.context.SetTime(self.context.get_time() + 0.025)
+        return self
+
+
+def _check_gradient(
+    block: Any,
+    respond: Callable[[Any, Any], Any],
+    point: ArrayLike,
+    *,
+    step: float = 1e-6,
+    tolerance: float = 1e-6,
+) -> None:
+    """AutoDiffXd against the float block: its values, and central differences.
+
+    ``respond(block, x)`` gives a vector for a block of either scalar type.
+    """
+    x = np.asarray(point, dtype=float)
+    converted = block.ToAutoDiffXd()
+    dual = np.asarray(respond(converted, InitializeAutoDiff(x).ravel()), dtype=object)
+    dual = dual.reshape(-1, 1)
+    value = np.asarray(respond(block, x), dtype=float)
+    np.testing.assert_allclose(ExtractValue(dual).ravel(), value, rtol=1e-12)
+    gradient = ExtractGradient(dual, x.size)
+    differences = np.empty_like(gradient)
+    for k in range(x.size):
+        shift: NDArray[np.float64] = np.zeros(x.size)
+        shift[k] = step
+        high = np.asarray(respond(block, x + shift), dtype=float)
+        low = np.asarray(respond(block, x - shift), dtype=float)
+        differences[:, k] = (high - low) / (2.0 * step)
+    np.testing.assert_allclose(gradient, differences, rtol=tolerance, atol=tolerance)
+
+
+@pytest.fixture
+def bench() -> type[Bench]:
+    """The class, to be called with a block and its inputs."""
+    return Bench
+
+
+@pytest.fixture
+def check_gradient() -> Callable[..., None]:
+    """Compares a block's AutoDiffXd gradient with central differences."""
+    return _check_gradient

@@ -1,0 +1,150 @@
+"""The order in which the packages may import one another, and what they may not.
+
+Imports are read from the source: what a function imports counts as well.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+OURS = {"systems", "diagrams", "analysis", "phonotaxis", "tests", "benchmarks"}
+MAY_IMPORT = {
+    "systems": {"systems"},
+    "diagrams": {"systems", "diagrams"},
+    "analysis": {"systems", "diagrams", "analysis"},
+    "phonotaxis": {"systems", "diagrams", "analysis"},
+}
+
+
+def sources(package: str) -> list[Path]:
+    """The Python files of a package or of a module."""
+    module = ROOT / f"{package}.py"
+    return [module] if module.is_file() else sorted((ROOT / package).rglob("*.py"))
+
+
+def imported(tree: ast.AST) -> Iterator[str]:
+    """Every name that is imported, at any depth: `from a import b` is `a.b`."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            origin = "." * node.level + (node.module or "")
+            yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def imported_on_load(tree: ast.AST) -> Iterator[str]:
+    """The names whose import runs with the module's own.
+
+    That leaves out the bodies of functions and of `if TYPE_CHECKING`.
+    """
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.Import | ast.ImportFrom):
+            yield from imported(ast.Module([node], []))
+        elif isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            yield from imported_on_load(ast.Module(node.orelse, []))
+        elif not isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            yield from imported_on_load(node)
+
+
+def top(name: str) -> str:
+    """`a` of `a.b.c`."""
+    return name.partition(".")[0]
+
+
+SAMPLE = ast.parse(
+    """
+import a.b
+from c import d, e as f
+from .g import h
+if TYPE_CHECKING:
+    import i
+else:
+    import j
+try:
+    import k
+except ImportError:
+    pass
+class Block:
+    import m
+    def method(self):
+        from n import o
+"""
+)
+
+
+def test_reader_sees_every_import() -> None:
+    assert set(imported(SAMPLE)) == {
+        "a.b", "c.d", "c.e", ".g.h", "i", "j", "k", "m", "n.o"
+    }  # fmt: skip
+
+
+def test_reader_knows_what_runs_on_load() -> None:
+    assert set(imported_on_load(SAMPLE)) == {
+        "a.b", "c.d", "c.e", ".g.h", "j", "k", "m"
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_imports_point_downwards(package: str) -> None:
+    forbidden = OURS - MAY_IMPORT[package]
+    files = sources(package)
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in files
+        for name in imported(ast.parse(path.read_text("utf-8")))
+        if top(name) in forbidden
+    ]
+    assert files
+    assert not wrong
+
+
+@pytest.mark.parametrize("package", MAY_IMPORT)
+def test_imports_are_absolute_and_narrow(package: str) -> None:
+    """Drake advises against `pydrake.all` in libraries."""
+    wrong = [
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in sources(package)
+        for name in imported(ast.parse(path.read_text("utf-8")))
+        if name.startswith((".", "pydrake.all"))
+    ]
+    assert not wrong
+
+
+def test_command_line_imports_nothing_but_python_on_load() -> None:
+    """`--help` and a mistyped option answer at once."""
+    tree = ast.parse((ROOT / "phonotaxis.py").read_text("utf-8"))
+    wrong = {top(name) for name in imported_on_load(tree)} - sys.stdlib_module_names
+    assert not wrong
+
+
+@pytest.mark.parametrize("package", ["systems", "diagrams"])
+def test_simulation_loads_no_plotting(package: str) -> None:
+    """Nor python-control and pydrake.all, whose imports cost a second each."""
+    code = f"import sys, {package}; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    assert package in loaded
+    assert not {"matplotlib", "control", "pydrake.all"} & set(loaded)
+
+
+def test_every_folder_with_code_is_a_package() -> None:
+    """A folder without `__init__.py` would be left out of the installation."""
+    bare = [
+        path.parent.relative_to(ROOT)
+        for package in ("systems", "diagrams", "analysis")
+        for path in sources(package)
+        if not (path.parent / "__init__.py").is_file()
+    ]
+    assert not bare
