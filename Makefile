@@ -9,10 +9,7 @@ PY := .venv/bin/python
 PIP_INSTALL := $(PY) -m pip install -qq -c constraints.txt
 PYTEST := $(PY) -m pytest
 REQUIREMENTS := pyproject.toml constraints.txt
-# What the wheels need of the system: library=Debian package. The last two are for
-# the Graphviz inside pygraphviz.
-LIBRARIES := libglib-2.0.so.0=libglib2.0-0 libXrender.so.1=libxrender1 \
-  libXext.so.6=libxext6
+FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -61,12 +58,9 @@ clean: ## remove the environment, caches and builds; keep results/
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || { \
 	  echo "$(PYTHON) cannot make environments. On Debian: apt install python3-venv"; \
 	  exit 1; } >&2
-	@missing=; for pair in $(LIBRARIES); do \
-	  test "$$(uname -s)" != Linux || \
-	  $(PYTHON) -c "import ctypes; ctypes.CDLL('$${pair%=*}')" 2>/dev/null || \
-	  missing="$$missing $${pair#*=}"; \
-	done; test -z "$$missing" || { \
-	  echo "System libraries are missing. On Debian: apt install$$missing"; \
+	@test "$$(uname -s)" != Linux || $(PYTHON) -c '$(FIND_GLIB)' 2>/dev/null || { \
+	  echo "Drake needs the system library libglib-2.0.so.0, which is missing."; \
+	  echo "On Debian: apt install libglib2.0-0"; \
 	  exit 1; } >&2
 	@echo "Installing into .venv (once; takes some minutes) ..." >&2
 	@$(PY) -c 'import pip' 2>/dev/null || $(PYTHON) -m venv --clear .venv

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import signal
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -138,7 +139,12 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 def _simulate(options: argparse.Namespace) -> None:
     from analysis.result_directory import choose_directory, whole_directory
     from analysis.run_report import run_summary, summary_text, write_run
-    from diagrams import build_sound_follower, load_scenario, simulate
+    from diagrams import (
+        build_sound_follower,
+        load_scenario,
+        make_simulator,
+        simulate,
+    )
 
     try:
         out = choose_directory(options.out)
@@ -147,6 +153,8 @@ def _simulate(options: argparse.Namespace) -> None:
     except ValueError as error:
         raise InputError.from_error(error) from None
     with _Progress(scenario.duration_s) as progress:
+        # Compiled functions load, or at first compile, before the clock starts.
+        make_simulator(follower).AdvanceTo(0.1)
         result = simulate(scenario, follower=follower, progress=progress)
     summary = run_summary(result, out)
     with whole_directory(out) as directory:
@@ -159,7 +167,11 @@ def _simulate(options: argparse.Namespace) -> None:
 
 
 class _Progress:
-    """A bar of simulated seconds on a terminal, nothing in a pipe."""
+    """A bar of simulated seconds on a terminal, nothing in a pipe.
+
+    Holds Ctrl-C back to the next simulated second: compiled callbacks turn an
+    exception that strikes inside them into a SystemError.
+    """
 
     def __init__(self, duration: float) -> None:
         from tqdm import tqdm
@@ -171,14 +183,22 @@ class _Progress:
             bar_format=form,
             leave=False,
         )
+        self._interrupted = False
 
     def __enter__(self) -> _Progress:
+        self._handler = signal.signal(signal.SIGINT, self._interrupt)
         return self
+
+    def _interrupt(self, *_: Any) -> None:
+        self._interrupted = True
 
     def __call__(self, time: float) -> None:
         self._bar.update(time - self._bar.n)
+        if self._interrupted:
+            raise KeyboardInterrupt
 
     def __exit__(self, *exception: Any) -> None:
+        signal.signal(signal.SIGINT, self._handler)
         self._bar.close()
 
 

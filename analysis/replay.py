@@ -5,6 +5,7 @@ from __future__ import annotations
 import html
 import logging
 import math
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,13 +13,14 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, MeshcatParams
-from pydrake.math import RigidTransform, RollPitchYaw
 
 from analysis import replay_scene
+from analysis.replay_scene import upright
 from analysis.scene import moving_and_static, poses, sound_bursts
 from diagrams import RunResult
+from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["write_replay"]
+__all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
 
 #: Meshcat records at most so many frames a second.
 FRAMES_PER_S = 32.0
@@ -47,13 +49,15 @@ def write_replay(result: RunResult, path: str | Path) -> None:
         meshcat = Meshcat(MeshcatParams(host="localhost"))
         _build_scene(meshcat, result)
         meshcat.StartRecording(FRAMES_PER_S, set_visualizations_while_recording=False)
-        _record(meshcat, result)
+        record_run(meshcat, result)
         meshcat.StopRecording()
         meshcat.PublishRecording()
         page = meshcat.StaticHtml()
         del meshcat
     title = html.escape(f"{_title(result)} - replay")
-    page = page.replace("<title>MeshCat</title>", f"<title>{title}</title>", 1)
+    page = re.sub(
+        "<title>.*?</title>", lambda _: f"<title>{title}</title>", page, count=1
+    )
     Path(path).write_text(page, encoding="utf-8")
 
 
@@ -76,16 +80,15 @@ def _title(result: RunResult) -> str:
 
 def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
     scenario = result.scenario
-    meshcat.SetProperty("/Grid", "visible", value=False)
-    meshcat.SetProperty("/Axes", "visible", value=False)
     replay_scene.add_floor(meshcat, result, _title(result))
     replay_scene.add_obstacles(meshcat, scenario)
     replay_scene.add_source(meshcat, scenario)
     replay_scene.add_robot(meshcat, scenario)
-    replay_scene.set_camera(meshcat, result)
+    replay_scene.set_stage(meshcat, result)
 
 
-def _record(meshcat: Meshcat, result: RunResult) -> None:
+def record_run(meshcat: Meshcat, result: RunResult) -> None:
+    """Records all motion of a run; the bodies must have been made before."""
     frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
     _record_robot(meshcat, result, frames)
     _record_source(meshcat, result, frames)
@@ -93,10 +96,6 @@ def _record(meshcat: Meshcat, result: RunResult) -> None:
     _record_obstacles(meshcat, result, frames)
     _record_trail(meshcat, result, "trail/robot", ("p_WP_x", "p_WP_y"), "robot")
     _record_trail(meshcat, result, "trail/source", ("p_WS_x", "p_WS_y"), "source")
-
-
-def _planar(x: float, y: float, z: float, theta: float) -> RigidTransform:
-    return RigidTransform(RollPitchYaw(0.0, 0.0, theta), [x, y, z])
 
 
 def _at_frames(
@@ -119,7 +118,7 @@ def _record_path(
     height: float = 0.0,
 ) -> None:
     for time, (x, y, theta) in zip(frames, pose_at, strict=True):
-        meshcat.SetTransform(path, _planar(x, y, height, theta), float(time))
+        meshcat.SetTransform(path, upright(x, y, height, theta), float(time))
 
 
 def _record_switch(
@@ -146,7 +145,7 @@ def _record_robot(
     for side, angles in wheel_angles(result).items():
         turned = np.interp(frames, result.time, angles)
         for time, angle in zip(frames, turned, strict=True):
-            spin = RigidTransform(RollPitchYaw(0.0, 0.0, angle), [0.0, 0.0, 0.0])
+            spin = upright(0.0, 0.0, 0.0, angle)
             meshcat.SetTransform(f"robot/{side}/wheel", spin, float(time))
     for number in (1, 2, 3):
         if f"echo_{number}" in result.columns:
@@ -209,9 +208,9 @@ def _record_estimate(meshcat: Meshcat, result: RunResult) -> None:
             # Without this the ball would glide here from the last burst on.
             x_0, y_0 = places[tick - 1]
             before = float(result.time[tick - 1])
-            meshcat.SetTransform("estimate", _planar(x_0, y_0, height, 0.0), before)
+            meshcat.SetTransform("estimate", upright(x_0, y_0, height, 0.0), before)
         time = float(result.time[tick])
-        meshcat.SetTransform("estimate", _planar(x, y, height, 0.0), time)
+        meshcat.SetTransform("estimate", upright(x, y, height, 0.0), time)
 
 
 def _record_obstacles(
@@ -230,7 +229,7 @@ def _record_trail(
 ) -> None:
     """Pieces that are there from the start and seen once they are driven."""
     points = np.stack([result.columns[name] for name in names], axis=1)
-    step = max(1, round(TRAIL_PIECE_S / float(np.diff(result.time[:2])[0])))
+    step = round(TRAIL_PIECE_S / FRAME_PERIOD_S)
     for number, start in enumerate(range(0, len(points) - 1, step)):
         piece = points[start : start + step + 1]
         if not np.ptp(piece, axis=0).any():

@@ -7,6 +7,7 @@ come into being; so everything that is ever seen is made here.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import to_rgb
@@ -25,7 +26,8 @@ __all__ = [
     "add_robot",
     "add_source",
     "add_trail",
-    "set_camera",
+    "set_stage",
+    "upright",
 ]
 
 #: Heights are not modelled; these look right, m.
@@ -45,29 +47,52 @@ def _colour(role: str, alpha: float = 1.0) -> Rgba:
     return Rgba(*to_rgb(COLOURS[role]), alpha)
 
 
-def _at(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
-    return RigidTransform(RollPitchYaw(0.0, 0.0, yaw), [x, y, z])
+def upright(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
+    """A body at a height above the floor, turned about the vertical."""
+    return _placed(0.0, 0.0, yaw, [x, y, z])
 
 
-def _line(meshcat: Meshcat, path: str, points: ArrayLike, role: str, z: float) -> None:
-    flat = np.asarray(points, dtype=float).T
-    vertices = np.asfortranarray(np.vstack([flat, np.full(flat.shape[1], z)]))
-    meshcat.SetLine(path, vertices, line_width=3.0, rgba=_colour(role))
+def _placed(
+    roll: float, pitch: float, yaw: float, place: list[float]
+) -> RigidTransform:
+    return RigidTransform(RollPitchYaw(roll, pitch, yaw), _plain(place))
+
+
+def _plain(values: ArrayLike) -> Any:
+    """An array in column order, untyped: Drake's stubs take ndarray amiss."""
+    return np.asfortranarray(values)
+
+
+def _ribbon(
+    meshcat: Meshcat, path: str, points: ArrayLike, rgba: Rgba, z: float, width: float
+) -> None:
+    """A flat band along (n, 2) points, m: lines are a pixel wide in most browsers."""
+    middle = np.asarray(points, dtype=float)
+    along = np.gradient(middle, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    aside = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0]])
+    edges = np.concatenate([middle + aside, middle - aside]).T
+    vertices = np.vstack([edges, np.full(edges.shape[1], z)])
+    n = len(middle)
+    left, right = np.arange(n - 1), n + np.arange(n - 1)
+    faces = np.hstack([[left, right, right + 1], [left, right + 1, left + 1]])
+    triangles = _plain(faces.astype(np.int32))
+    meshcat.SetTriangleMesh(path, _plain(vertices), triangles, rgba)
 
 
 def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
     """A floor that holds the whole run, a line a metre, and a title."""
     x_low, x_high, y_low, y_high = floor_rectangle(result)
-    middle = _at((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
+    middle = upright((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
     slab = Box(x_high - x_low, y_high - y_low, 0.02)
-    meshcat.SetObject("floor/slab", slab, Rgba(0.93, 0.93, 0.92))
+    meshcat.SetObject("floor/slab", slab, Rgba(1.0, 1.0, 0.99))
     meshcat.SetTransform("floor/slab", middle)
     along = np.arange(x_low, x_high + 0.5)
     across = np.arange(y_low, y_high + 0.5)
     starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
     ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
-    _segments(meshcat, "floor/grid", starts, ends, Rgba(0.72, 0.72, 0.72))
-    _write(meshcat, "floor/title", title, (x_low, y_low - 0.45), 0.3)
+    _segments(meshcat, "floor/grid", starts, ends, Rgba(0.55, 0.55, 0.55))
+    _write(meshcat, "floor/title", title, (x_low + 0.1, y_high - 0.4), 0.28)
     for x in along[:-1]:
         _write(
             meshcat, f"floor/x {x:.0f}", f"{x:.0f} m", (x + 0.05, y_low + 0.06), 0.13
@@ -94,9 +119,9 @@ def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
 def _segments(
     meshcat: Meshcat, path: str, starts: ArrayLike, ends: ArrayLike, rgba: Rgba
 ) -> None:
-    def lifted(points: ArrayLike) -> NDArray[np.float64]:
+    def lifted(points: ArrayLike) -> Any:
         flat = np.asarray(points, dtype=float).T
-        return np.asfortranarray(np.vstack([flat, np.full(flat.shape[1], 0.004)]))
+        return _plain(np.vstack([flat, np.full(flat.shape[1], 0.004)]))
 
     meshcat.SetLineSegments(path, lifted(starts), lifted(ends), 1.0, rgba)
 
@@ -107,7 +132,8 @@ def _write(
     """Outlines of letters on the floor: Meshcat has no text."""
     starts: list[NDArray[np.float64]] = []
     ends: list[NDArray[np.float64]] = []
-    for outline in TextPath(place, text, size=size).to_polygons():
+    for polygon in TextPath(place, text, size=size).to_polygons():
+        outline = np.asarray(polygon)
         starts.extend(outline[:-1])
         ends.extend(outline[1:])
     _segments(meshcat, path, starts, ends, Rgba(0.25, 0.25, 0.25))
@@ -119,7 +145,7 @@ def add_robot(meshcat: Meshcat, scenario: Scenario) -> None:
     width = BODY_WIDTH_FRACTION * robot.width_m
     body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
     meshcat.SetObject("robot/body", body, _colour("robot"))
-    meshcat.SetTransform("robot/body", _at(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02))
+    meshcat.SetTransform("robot/body", upright(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02))
     for side, y in (("left", 0.5), ("right", -0.5)):
         _add_wheel(meshcat, scenario, side, y * robot.wheel_separation_m)
     _add_microphones(meshcat, scenario)
@@ -131,8 +157,7 @@ def add_robot(meshcat: Meshcat, scenario: Scenario) -> None:
 def _add_wheel(meshcat: Meshcat, scenario: Scenario, side: str, y: float) -> None:
     """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
     radius, path = scenario.robot.wheel_radius_m, f"robot/{side}"
-    lying = RollPitchYaw(-0.5 * math.pi, 0.0, 0.0)
-    meshcat.SetTransform(path, RigidTransform(lying, [0.0, y, radius]))
+    meshcat.SetTransform(path, _placed(-0.5 * math.pi, 0.0, 0.0, [0.0, y, radius]))
     tyre = Cylinder(radius, WHEEL_WIDTH_M)
     meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
     spoke = Box(1.7 * radius, 0.25 * radius, WHEEL_WIDTH_M + 0.004)
@@ -144,15 +169,15 @@ def _add_microphones(meshcat: Meshcat, scenario: Scenario) -> None:
     bar = Box(0.02, robot.width_m, 0.02)
     x = robot.control_point_m - 0.01
     meshcat.SetObject("robot/bar", bar, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform("robot/bar", _at(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
+    meshcat.SetTransform("robot/bar", upright(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
     mast = Cylinder(0.012, MICROPHONE_HEIGHT_M - ROBOT_HEIGHT_M)
     middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
     meshcat.SetObject("robot/mast", mast, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform("robot/mast", _at(x, 0.0, middle))
+    meshcat.SetTransform("robot/mast", upright(x, 0.0, middle))
     for number, (x_M, y_M) in enumerate(microphone_places(scenario), start=1):
         path = f"robot/microphone_{number}"
         meshcat.SetObject(path, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
-        meshcat.SetTransform(path, _at(x_M, y_M, MICROPHONE_HEIGHT_M))
+        meshcat.SetTransform(path, upright(x_M, y_M, MICROPHONE_HEIGHT_M))
 
 
 def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
@@ -163,8 +188,8 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
     x, y, axis = sensor_pose(scenario, sensor)
     path = f"robot/cone_{sensor + 1}"
     # The cone's axis is z: tilt it forward, then turn it to the sensor's axis.
-    tilt = RollPitchYaw(0.0, 0.5 * math.pi, axis)
-    meshcat.SetTransform(path, RigidTransform(tilt, [x, y, SENSOR_HEIGHT_M]))
+    tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
+    meshcat.SetTransform(path, tilted)
     length = 0.8
     radius = length * math.tan(math.radians(scenario.ultrasonic.beam_half_angle_deg))
     for look, role, alpha in (("echo", "echo", 0.55), ("empty", "empty", 0.18)):
@@ -177,14 +202,17 @@ def add_source(meshcat: Meshcat, scenario: Scenario) -> None:
     length, width = scenario.source_size
     body = Box(length, width, SOURCE_HEIGHT_M)
     meshcat.SetObject("source/body", body, _colour("source"))
-    meshcat.SetTransform("source/body", _at(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M))
+    meshcat.SetTransform("source/body", upright(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M))
     horn = Cylinder(0.07, 0.06)
     meshcat.SetObject("source/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
-    meshcat.SetTransform("source/loudspeaker", _at(0.0, 0.0, SOURCE_HEIGHT_M + 0.03))
+    meshcat.SetTransform(
+        "source/loudspeaker", upright(0.0, 0.0, SOURCE_HEIGHT_M + 0.03)
+    )
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     for number, radius in enumerate(RINGS, start=1):
         circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
-        _line(meshcat, f"source/ring_{number}", circle, "source", SOURCE_HEIGHT_M)
+        path = f"source/ring_{number}"
+        _ribbon(meshcat, path, circle, _colour("source"), SOURCE_HEIGHT_M, 0.03)
     meshcat.SetObject("estimate", Sphere(0.06), _colour("estimate"))
 
 
@@ -195,19 +223,29 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
         box = Box(*obstacle.size_m, OBSTACLE_HEIGHT_M)
         meshcat.SetObject(path, box, _colour("obstacle"))
         x, y, theta = obstacle.path().pose(0.0)
-        meshcat.SetTransform(path, _at(x, y, 0.5 * OBSTACLE_HEIGHT_M, theta))
+        meshcat.SetTransform(path, upright(x, y, 0.5 * OBSTACLE_HEIGHT_M, theta))
 
 
 def add_trail(
     meshcat: Meshcat, path: str, points: NDArray[np.float64], role: str
 ) -> None:
     """One piece of a trail on the floor, through (n, 2) points in W, m."""
-    _line(meshcat, path, points, role, 0.01)
+    _ribbon(meshcat, path, points, _colour(role), 0.008, 0.03)
 
 
-def set_camera(meshcat: Meshcat, result: RunResult) -> None:
-    """Looks at the middle of the floor from the front and above."""
-    x_low, x_high, y_low, y_high = floor_rectangle(result)
-    middle = np.array([(x_low + x_high) / 2.0, (y_low + y_high) / 2.0, 0.0])
-    extent = max(x_high - x_low, y_high - y_low)
-    meshcat.SetCameraPose(middle + extent * np.array([0.0, -0.75, 0.75]), middle)
+def set_stage(meshcat: Meshcat, result: RunResult) -> None:
+    """Even light, a plain background, and the whole run in view."""
+    for path in ("/Grid", "/Axes", "/Lights/SpotLight"):
+        meshcat.SetProperty(path, "visible", value=False)
+    for side in ("Negative", "Positive"):
+        lamp = f"/Lights/PointLight{side}X"
+        meshcat.SetProperty(lamp, "visible", value=False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.6)
+    meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
+    for end in ("top_color", "bottom_color"):
+        meshcat.SetProperty("/Background", end, [0.86, 0.89, 0.92])
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.5)
+    middle = np.array([(x_low + x_high) / 2.0, (y_low + y_high) / 2.0 - 0.2, 0.0])
+    extent = max((x_high - x_low) / 1.3, y_high - y_low)
+    camera = middle + extent * np.array([0.0, -0.45, 0.6])
+    meshcat.SetCameraPose(_plain(camera), _plain(middle))

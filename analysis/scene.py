@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagrams import RunResult, Scenario
 from diagrams.scenario import robot_rectangle
 from systems.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+from systems.obstacles import ObstacleParameters
 
 __all__ = [
     "COLOURS",
@@ -91,14 +92,19 @@ def compose(
     return pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]
 
 
-def moving_and_static(scenario: Scenario) -> tuple[list, list]:
+def moving_and_static(
+    scenario: Scenario,
+) -> tuple[list[ObstacleParameters], list[ObstacleParameters]]:
     """The obstacles that move, and those that never do."""
     moving = [o for o in scenario.obstacles if o.path().moves]
     return moving, [o for o in scenario.obstacles if not o.path().moves]
 
 
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
-    """Smallest x, largest x, smallest y, largest y of all bodies ever, m."""
+    """Smallest x, largest x, smallest y, largest y of all bodies ever, m.
+
+    Estimates do not count: a wild one would shrink all else.
+    """
     scenario, times = result.scenario, picture_times(result, most=60)
     centres = [poses(result, "WB")[:, :2], poses(result, "WS")[:, :2]]
     for obstacle in scenario.obstacles:

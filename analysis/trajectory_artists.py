@@ -155,7 +155,7 @@ def draw_estimates(axes: Axes, result: RunResult) -> None:
     if not heard.any():
         return
     colour = COLOURS["estimate"]
-    part = result.time[heard] / result.simulated_s
+    part = result.time[heard] / max(result.simulated_s, 1e-9)
     colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
     axes.scatter(
         columns["p_WS_estimated_x"][heard],

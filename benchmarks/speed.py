@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from time import perf_counter
 
-from benchmarks.plain_loop import run_plain_loop
-from diagrams import Scenario, build_sound_follower, load_scenario, simulate
+from benchmarks.plain_loop import PlainLoop
+from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
 
 __all__ = ["diagram_overhead", "real_time_factor"]
 
@@ -22,24 +22,23 @@ def real_time_factor(overrides: tuple[str, ...]) -> float:
 
 
 def diagram_overhead() -> float:
-    """Time of the run over that of the same functions in a plain loop.
+    """Time of the simulation over that of the same functions in a plain loop.
 
     The loop calls the pure functions of every block in the same order, with
-    the same integrator, on plain variables. Both end at the same place.
+    the same integrator, on plain variables, and ends at the same place
+    (``tests/evals/test_plain_loop.py``). Neither side logs or judges the run.
     """
     scenario = load_scenario("default")
-    return min(_simulation(scenario)) / min(_loop(scenario))
-
-
-def _simulation(scenario: Scenario) -> list[float]:
-    follower = build_sound_follower(scenario, log=True)
-    return [simulate(scenario, follower=follower).wall_s for _ in range(REPEATS + 1)]
-
-
-def _loop(scenario: Scenario) -> list[float]:
-    times = []
+    follower = build_sound_follower(scenario)
+    loop = PlainLoop(scenario)
+    simulated, plain = [], []
     for _ in range(REPEATS + 1):
+        simulator = make_simulator(follower)
+        simulator.Initialize()
         start = perf_counter()
-        run_plain_loop(scenario)
-        times.append(perf_counter() - start)
-    return times
+        simulator.AdvanceTo(scenario.duration_s)
+        simulated.append(perf_counter() - start)
+        start = perf_counter()
+        loop.run()
+        plain.append(perf_counter() - start)
+    return min(simulated) / min(plain)

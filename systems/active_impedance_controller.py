@@ -49,8 +49,7 @@ def ActiveImpedanceController_(T):
             - p_WS_estimated [m]
             - target_valid [0 or 1]
             - collision_vectors_B [m, three slots of x and y]
-            - mask [0 or 1 a slot]
-            - features [number of what the vector stands on]
+            - features [number of what the vector stands on, 0 an empty slot]
             - pose_WB_estimated [m, m, rad]
             - v_WP [m/s, of the virtual mass]
             output_ports:

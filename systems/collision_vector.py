@@ -21,6 +21,7 @@ __all__ = [
     "CollisionVector_",
     "collision_vectors",
     "echo_point",
+    "echo_points",
     "foot_on_segment",
 ]
 
@@ -57,6 +58,16 @@ def echo_point(range_, axis, position):
         position[0] + range_ * math.cos(axis),
         position[1] + range_ * math.sin(axis),
     )
+
+
+def echo_points(ranges, echo, sensors: UltrasonicParameters):
+    """The three points that the sensors see, None where there is no echo."""
+    return [
+        echo_point(range_, math.radians(axis_deg), position) if heard > 0.5 else None
+        for range_, heard, axis_deg, position in zip(
+            ranges, echo, sensors.axes_deg, sensors.positions_m, strict=True
+        )
+    ]
 
 
 def foot_on_segment(a, b):
@@ -209,7 +220,6 @@ def CollisionVector_(T):
             super().__init__(converter=converter)
             self._parameters = parameters or CollisionVectorParameters()
             self._sensors = sensors or UltrasonicParameters()
-            self._axes = [math.radians(axis) for axis in self._sensors.axes_deg]
             self.set_name("collision_vector")
             self._ranges = self.DeclareVectorInputPort(name="ranges", size=SENSORS)
             self._echo = self.DeclareVectorInputPort(name="echo", size=SENSORS)
@@ -228,12 +238,7 @@ def CollisionVector_(T):
         def _slots(self, context):
             ranges = self._ranges.Eval(context).tolist()
             echo = self._echo.Eval(context).tolist()
-            points = [
-                echo_point(ranges[k], self._axes[k], self._sensors.positions_m[k])
-                if echo[k] > 0.5
-                else None
-                for k in range(SENSORS)
-            ]
+            points = echo_points(ranges, echo, self._sensors)
             return fill_slots(collision_vectors(points, self._parameters), T)
 
     return Impl

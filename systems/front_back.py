@@ -39,6 +39,11 @@ class Candidates:
         return [0.0] * 4 + [-1.0, 0.0, BACK_PENALTY, 0.0]
 
     @staticmethod
+    def behind(memory: list[Any]) -> bool:
+        """Whether the source was found behind the microphones at the last check."""
+        return bool(memory[7] > 0.5)
+
+    @staticmethod
     def older(memory: list[Any], seconds: float) -> list[Any]:
         """The same memory a while later."""
         if memory[4] < 0.0:

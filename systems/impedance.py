@@ -189,7 +189,6 @@ class ImpedanceLoop:
                 ("p_WS_estimated", 2),
                 ("target_valid", 1),
                 ("collision_vectors_B", 2 * SLOTS),
-                ("mask", SLOTS),
                 ("features", SLOTS),
                 ("pose_WB_estimated", 3),
                 ("v_WP", 2),
@@ -200,7 +199,7 @@ class ImpedanceLoop:
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
         sources = {port.ticket() for port in self._inputs}
-        obstacles = {port.ticket() for port in self._inputs[2:6]}
+        obstacles = {port.ticket() for port in self._inputs[2:5]}
         self._vectors = declare_cache(self, "C_W", self._vectors_W, obstacles)
         sources.add(self.xd_ticket())
         self._forces = declare_cache(self, "forces", self._sum_forces, sources)
@@ -218,19 +217,19 @@ class ImpedanceLoop:
 
     def _vectors_W(self, context):
         """[(feature, C_x, C_y)] in W axes."""
-        vectors, mask, features, pose = (
-            port.Eval(context).tolist() for port in self._inputs[2:6]
+        vectors, features, pose = (
+            port.Eval(context).tolist() for port in self._inputs[2:5]
         )
         return [
             (features[k], *rotate(pose[2], *vectors[2 * k : 2 * k + 2]))
             for k in range(SLOTS)
-            if mask[k] > 0.5
+            if features[k] > 0.5
         ]
 
     def _sum_forces(self, context):
         """(F_m, F_b, s of each slot)."""
         target, valid = self._inputs[0].Eval(context), self._inputs[1].Eval(context)
-        pose, v_WP = self._inputs[5].Eval(context), self._inputs[6].Eval(context)
+        pose, v_WP = self._inputs[4].Eval(context), self._inputs[5].Eval(context)
         F_m = attraction_force(
             control_point(pose.tolist(), self._robot.control_point_m),
             v_WP.tolist(),

@@ -13,7 +13,14 @@ from systems.propagation import microphone_paths, propagate
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame, Emission
 
-__all__ = ["FRAME_SAMPLES", "MicArray", "MicArrayParameters", "microphones_B"]
+__all__ = [
+    "FRAME_SAMPLES",
+    "MicArray",
+    "MicArrayParameters",
+    "frame_instants",
+    "microphones_B",
+    "record_frame",
+]
 
 #: Samples a channel in a frame.
 FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
@@ -30,6 +37,55 @@ def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
     """(3, 2) microphones M1 (left), M2, M3 (right) in B, m."""
     x, spacing = robot.control_point_m, robot.microphone_spacing_m
     return np.array([[x, spacing], [x, 0.0], [x, -spacing]])
+
+
+def frame_instants(parameters: MicArrayParameters) -> NDArray[np.float64]:
+    """(3, knots) instants of each channel's knots from the frame's start, s."""
+    skew = np.reshape(parameters.channel_skew_s, (3, 1))
+    return np.linspace(0.0, FRAME_PERIOD_S, _KNOTS) + skew
+
+
+def record_frame(
+    emission: Emission,
+    time: float,
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    now: tuple[NDArray[np.float64], NDArray[np.float64]],
+    instants: NDArray[np.float64],
+    p_BM: NDArray[np.float64],
+    c: float,
+    *,
+    parameters: MicArrayParameters,
+    seed: int,
+) -> AudioFrame:
+    """The frame that ends now.
+
+    Args:
+        emission: What has left the source.
+        time: Now, s.
+        before: Pose and velocity of the robot a frame ago, (3,) each.
+        now: Pose and velocity of the robot now.
+        instants: From ``frame_instants``.
+        p_BM: (3, 2) microphones in B, m.
+        c: Speed of sound, m/s.
+        parameters: Microphones, amplifier and converter.
+        seed: Seed of the noise.
+
+    Raises:
+        ValueError: The source is out of the emission's reach.
+    """
+    begin = time - FRAME_PERIOD_S
+    times = begin + instants
+    p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, p_BM)
+    pressure = propagate(emission, times, p_WM, v_WM, FRAME_SAMPLES, c)
+    tick = round(time / FRAME_PERIOD_S)
+    noise = frame_noise((len(p_WM), FRAME_SAMPLES), seed, tick)
+    noise_pa = emission.level_pa * 10.0 ** (-parameters.snr_db_at_1m / 20.0)
+    return AudioFrame(
+        counts=convert(pressure, noise, noise_pa, parameters),
+        full_scale=parameters.full_scale,
+        sample_rate_hz=SAMPLE_RATE_HZ,
+        time=time,
+    )
 
 
 class MicArray(LeafSystem):
@@ -74,19 +130,14 @@ class MicArray(LeafSystem):
         self._p_BM = microphones_B(robot or RobotParameters())
         self._c = (acoustics or AcousticParameters()).c
         self._seed = seed
-        self._noise_ratio = 10.0 ** (-self._parameters.snr_db_at_1m / 20.0)
-        # Instants of the knots from the start of the frame, (3, knots).
-        self._instants = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS) + np.reshape(
-            self._parameters.channel_skew_s, (3, 1)
-        )
-
+        self._instants = frame_instants(self._parameters)
         self.set_name("mic_array")
         self._emission = self.DeclareAbstractInputPort(
             name="emission", model_value=Value(object())
         )
         self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
         self._velocity_WB = self.DeclareVectorInputPort(name="velocity_WB", size=3)
-        self.DeclareDiscreteState(np.array([-np.inf, *np.zeros(6)]))
+        self.DeclareDiscreteState(np.r_[-np.inf, np.zeros(6)])
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
@@ -104,7 +155,8 @@ class MicArray(LeafSystem):
         )
 
     def _remember(self, context, discrete_state) -> None:
-        pose, velocity = self._pose_WB.Eval(context), self._velocity_WB.Eval(context)
+        pose = np.asarray(self._pose_WB.Eval(context))
+        velocity = np.asarray(self._velocity_WB.Eval(context))
         discrete_state.set_value(np.concatenate(([context.get_time()], pose, velocity)))
 
     def _record(self, context, output) -> None:
@@ -115,26 +167,22 @@ class MicArray(LeafSystem):
                 "connect the emission of a SoundEmitter"
             )
         time = context.get_time()
-        begin = time - FRAME_PERIOD_S
-        pose, velocity = self._pose_WB.Eval(context), self._velocity_WB.Eval(context)
+        pose = np.asarray(self._pose_WB.Eval(context))
+        velocity = np.asarray(self._velocity_WB.Eval(context))
         last = context.get_discrete_state_vector().value()
-        if abs(last[0] - begin) < _SAME_INSTANT_S:
-            pose_0, velocity_0 = last[1:4], last[4:7]
-        else:
-            pose_0, velocity_0 = pose - FRAME_PERIOD_S * velocity, velocity
-        instants = begin + self._instants
-        p_WM, v_WM = microphone_paths(
-            instants, begin, pose_0, velocity_0, time, pose, velocity, self._p_BM
-        )
-        pressure = propagate(emission, instants, p_WM, v_WM, FRAME_SAMPLES, self._c)
-        tick = round(time / FRAME_PERIOD_S)
-        noise = frame_noise((len(p_WM), FRAME_SAMPLES), self._seed, tick)
-        noise_pa = emission.level_pa * self._noise_ratio
+        before = last[1:4], last[4:7]
+        if abs(last[0] - (time - FRAME_PERIOD_S)) > _SAME_INSTANT_S:
+            before = pose - FRAME_PERIOD_S * velocity, velocity
         output.set_value(
-            AudioFrame(
-                counts=convert(pressure, noise, noise_pa, self._parameters),
-                full_scale=self._parameters.full_scale,
-                sample_rate_hz=SAMPLE_RATE_HZ,
-                time=time,
+            record_frame(
+                emission,
+                time,
+                before,
+                (pose, velocity),
+                self._instants,
+                self._p_BM,
+                self._c,
+                parameters=self._parameters,
+                seed=self._seed,
             )
         )

@@ -17,6 +17,9 @@ from numpy.typing import NDArray
 
 __all__ = ["NearFieldFix", "locate_source", "source_from_delays"]
 
+# Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
+_LEAST_GAP_M = 1e-9
+
 # Keeps the covariance finite for a source on the line of the microphones.
 _LEAST_COSINE = 1e-3
 
@@ -60,7 +63,7 @@ def _bearing_only(bearing: float, bearing_std: float) -> NearFieldFix:
 
 def _ranges(a: float, b: float, spacing: float) -> tuple[float, float, float] | None:
     """R1, R2, R3 in m, or None where the delays have no finite range."""
-    if b - 2.0 * a <= 0.0:
+    if b - 2.0 * a <= _LEAST_GAP_M:
         return None
     r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
     r2, r3 = r1 + a, r1 + b

@@ -10,10 +10,11 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
+from systems.cache import declare_cache
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
 from systems.waveforms import SoundParameters, make_waveform
 
-__all__ = ["SoundEmitter", "emitted_samples"]
+__all__ = ["SoundEmitter", "emitted_samples", "history_ticks", "make_emission"]
 
 #: Samples before and after what the delays need, for the interpolation.
 MARGIN = 64
@@ -51,6 +52,42 @@ def emitted_samples(
             out[low - first : high - first] = waveform[low + offset : high + offset]
         number += 1
     return out
+
+
+def make_emission(
+    time: float,
+    waveform: NDArray[np.float32],
+    sound: SoundParameters,
+    path: NDArray[np.float64],
+) -> Emission:
+    """What has left the loudspeaker up to a time.
+
+    Args:
+        time: Now, a multiple of 10 us, s.
+        waveform: Bursts end to end, from ``make_waveform``.
+        sound: The gate.
+        path: (k, 4) x, y, vx, vy of the source in W at the last k ticks, the
+            last one now; m and m/s.
+    """
+    ages = FRAME_PERIOD_S * np.arange(len(path) - 1.0, -1.0, -1.0)
+    count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
+    first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
+    samples = emitted_samples(waveform, sound, first, count)
+    return Emission(
+        samples=np.zeros(count, dtype=np.float32) if samples is None else samples,
+        start_time=first / SAMPLE_RATE_HZ,
+        sample_rate_hz=float(SAMPLE_RATE_HZ),
+        knot_times=time - ages,
+        p_WS=np.ascontiguousarray(path[:, :2]),
+        v_WS=np.ascontiguousarray(path[:, 2:]),
+        level_pa=sound.level_pa,
+        sounding=samples is not None,
+    )
+
+
+def history_ticks(maximum_range_m: float, c: float) -> int:
+    """Ticks back to when sound left that arrives now from the maximum range."""
+    return math.ceil((FRAME_PERIOD_S + maximum_range_m / c) / FRAME_PERIOD_S) + 1
 
 
 class SoundEmitter(LeafSystem):
@@ -93,10 +130,8 @@ class SoundEmitter(LeafSystem):
         super().__init__()
         self._sound = sound or SoundParameters()
         self._waveform = make_waveform(self._sound, seed)
-        travel = maximum_range_m / (acoustics or AcousticParameters()).c
-        self._ticks = math.ceil((FRAME_PERIOD_S + travel) / FRAME_PERIOD_S) + 1
-        self._knot_ages = FRAME_PERIOD_S * np.arange(self._ticks, -1.0, -1.0)
-        self._silence = np.zeros(self._count, dtype=np.float32)
+        c = (acoustics or AcousticParameters()).c
+        self._ticks = history_ticks(maximum_range_m, c)
         self.set_name("sound_emitter")
         self._pose_WS = self.DeclareVectorInputPort(name="pose_WS", size=3)
         self._v_WS = self.DeclareVectorInputPort(name="v_WS", size=3)
@@ -105,58 +140,32 @@ class SoundEmitter(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
+        sources = {self._pose_WS.ticket(), self._v_WS.ticket(), self.xd_ticket()}
+        self._path = declare_cache(self, "path now", self._path_now, sources)
         self.DeclareAbstractOutputPort(
             name="emission",
             alloc=lambda: Value(object()),
             calc=self._emit,
-            prerequisites_of_calc={
-                self._pose_WS.ticket(),
-                self._v_WS.ticket(),
-                self.xd_ticket(),
-                self.time_ticket(),
-            },
+            prerequisites_of_calc={self._path.ticket(), self.time_ticket()},
         )
 
-    @property
-    def _count(self) -> int:
-        """Samples of an emission."""
-        return round(self._ticks * FRAME_PERIOD_S * SAMPLE_RATE_HZ) + MARGIN
-
-    def _history(self, context) -> NDArray[np.float64]:
-        """(ticks, 4) past x, y, vx, vy, oldest first."""
-        return context.get_discrete_state(0).CopyToVector().reshape(-1, 4)
-
-    def _present(self, context) -> NDArray[np.float64]:
-        pose, velocity = self._pose_WS.Eval(context), self._v_WS.Eval(context)
-        return np.array([pose[0], pose[1], velocity[0], velocity[1]])
+    def _path_now(self, context) -> NDArray[np.float64]:
+        """(ticks + 1, 4) x, y, vx, vy, oldest first, the last one now."""
+        path = np.empty((self._ticks + 1, 4))
+        held = context.get_discrete_state(0).CopyToVector()
+        path[:-1] = held.reshape(self._ticks, 4)
+        path[-1, :2] = np.asarray(self._pose_WS.Eval(context))[:2]
+        path[-1, 2:] = np.asarray(self._v_WS.Eval(context))[:2]
+        return path
 
     def _start(self, context, discrete_state) -> None:
-        at_rest = [*self._pose_WS.Eval(context)[:2], 0.0, 0.0]
+        at_rest = [*np.asarray(self._pose_WS.Eval(context))[:2], 0.0, 0.0]
         discrete_state.set_value(np.tile(at_rest, self._ticks))
 
     def _remember(self, context, discrete_state) -> None:
-        history = self._history(context)
-        history[:-1] = history[1:]
-        history[-1] = self._present(context)
-        discrete_state.set_value(history.reshape(-1))
+        path = np.asarray(self._path.Eval(context))
+        discrete_state.set_value(path[1:].ravel())
 
     def _emit(self, context, output) -> None:
-        time = context.get_time()
-        end = round(time * SAMPLE_RATE_HZ)
-        first = end + MARGIN - self._count
-        samples = emitted_samples(self._waveform, self._sound, first, self._count)
-        path = np.empty((self._ticks + 1, 4))
-        path[:-1] = self._history(context)
-        path[-1] = self._present(context)
-        output.set_value(
-            Emission(
-                samples=self._silence if samples is None else samples,
-                start_time=first / SAMPLE_RATE_HZ,
-                sample_rate_hz=float(SAMPLE_RATE_HZ),
-                knot_times=time - self._knot_ages,
-                p_WS=path[:, :2].copy(),
-                v_WS=path[:, 2:].copy(),
-                level_pa=self._sound.level_pa,
-                sounding=samples is not None,
-            )
-        )
+        path, time = np.asarray(self._path.Eval(context)), context.get_time()
+        output.set_value(make_emission(time, self._waveform, self._sound, path))

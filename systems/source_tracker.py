@@ -143,15 +143,23 @@ def fold_estimate(
         x, y = x * kept, y * kept
     dx, dy = rotate(pose[2], x, y)
     target = [x_P + dx, y_P + dy]
-    candidates = track.candidates
-    if tracker.resolve_front_back and estimate.ranged:
+    candidates, covariance = track.candidates, estimate.covariance
+    if tracker.resolve_front_back:
         dx, dy = rotate(pose[2], -x, y)
         mirrored = [x_P + dx, y_P + dy]
-        candidates, target = resolve(candidates, target, mirrored, tracker)
+        if estimate.ranged:
+            candidates, target = resolve(candidates, target, mirrored, tracker)
+        elif Candidates.behind(candidates):
+            target = mirrored
+        if target is mirrored:
+            covariance = [covariance[0], -covariance[1], -covariance[2], covariance[3]]
     if tracker.hold == "robot":
         target = list(rotate(-pose[2], target[0] - x_P, target[1] - y_P))
-    covariance = _covariance_in_world(estimate.covariance, pose[2])
-    return track._replace(held=target, covariance=covariance, candidates=candidates)
+    return track._replace(
+        held=target,
+        covariance=_covariance_in_world(covariance, pose[2]),
+        candidates=candidates,
+    )
 
 
 def _kept_range(track: Track, x_P, y_P, tracker: TrackerParameters):

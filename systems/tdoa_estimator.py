@@ -12,7 +12,8 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.delays import DelayEstimate, DelayPlan, estimate_delays
+from systems.delay_plan import DelayPlan
+from systems.delays import DelayEstimate, estimate_delays
 from systems.near_field import NearFieldFix, locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.robot import RobotParameters

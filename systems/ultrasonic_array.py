@@ -200,9 +200,10 @@ class UltrasonicArray(LeafSystem):
         ]
         held = np.r_[np.full(SENSORS, self._parameters.maximum_range_m), np.zeros(3)]
         self.DeclareDiscreteState(held)
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._hold
-        )
+        if self._parameters.firing == "sequential":
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._hold
+            )
         sources = {port.ticket() for port in self._inputs}
         sources |= {self.time_ticket(), self.xd_ticket()}
         self._readings = declare_cache(self, "readings", self._read, sources)
@@ -233,8 +234,7 @@ class UltrasonicArray(LeafSystem):
         return held
 
     def _hold(self, context, discrete_state) -> None:
-        if self._parameters.firing == "sequential":
-            discrete_state.set_value(self._readings.Eval(context))
+        discrete_state.set_value(self._readings.Eval(context))
 
     def _calc_ranges(self, context, output):
         output.SetFromVector(self._readings.Eval(context)[:SENSORS])

@@ -97,17 +97,25 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
         ValueError: The file cannot be played; names it and the remedy.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
-    endless = _SYNTHESES[sound.kind](sound, seed)
+    raw = _SYNTHESES[sound.kind](sound, seed)
+    endless = _band_limited(raw, *MICROPHONE_BAND_HZ)
+    if np.std(endless) <= 1e-6 * max(np.abs(raw).max(), 1e-3):
+        field = f"sound.file: {sound.file}" if sound.kind == "wav" else "sound.tone_hz"
+        low, high = MICROPHONE_BAND_HZ
+        raise ValueError(
+            f"{field} has nothing between {low:g} and {high:g} Hz, which the "
+            "microphones pass; choose another"
+        )
     bursts = max(1, -(-len(endless) // burst))
     samples = np.resize(endless, bursts * burst)
     peak, rms = np.max(np.abs(samples)), np.sqrt(np.mean(samples**2))
     samples *= sound.level_pa * min(1.0 / rms, LARGEST_CREST / peak)
-    samples = samples.reshape(bursts, burst)
+    each = samples.reshape(bursts, burst)
     edge = round(EDGE_S * SAMPLE_RATE_HZ)
     ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
-    samples[:, :edge] *= ramp
-    samples[:, -edge:] *= ramp[::-1]
-    return samples.reshape(-1).astype(np.float32)
+    each[:, :edge] *= ramp
+    each[:, -edge:] *= ramp[::-1]
+    return samples.astype(np.float32)
 
 
 def _time(seconds: float) -> NDArray[np.float64]:
@@ -156,8 +164,8 @@ def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
             f"sound.file: {sound.file} has a rate of {rate} Hz, below twice low_hz "
             f"({sound.low_hz:g} Hz); use a recording of a higher rate"
         )
-    mono = soxr.resample(channels[0], rate, SAMPLE_RATE_HZ, quality="VHQ")
-    mono = _band_limited(mono, *MICROPHONE_BAND_HZ)
+    centred = channels[0] - channels[0].mean()
+    mono = soxr.resample(centred, rate, SAMPLE_RATE_HZ, quality="VHQ")
     threshold = np.max(np.abs(mono)) * 10.0 ** (SILENCE_DB / 20.0)
     return mono[np.argmax(np.abs(mono) > threshold) :]
 

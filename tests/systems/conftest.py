@@ -69,13 +69,15 @@ def _check_gradient(
 
     ``respond(block, x)`` gives a vector for a block of either scalar type.
     """
-    x = np.asarray(point, dtype=float)
+    x: Any = np.asarray(point, dtype=float)
     converted = block.ToAutoDiffXd()
-    dual = np.asarray(respond(converted, InitializeAutoDiff(x).ravel()), dtype=object)
-    dual = dual.reshape(-1, 1)
+    variables = InitializeAutoDiff(x).ravel()
+    # An element that depends on nothing has no derivatives: give it zeros.
+    nothing = 0.0 * AutoDiffXd(0.0, x.size, 0)
+    dual = np.array([[y + nothing] for y in respond(converted, variables)])
     value = np.asarray(respond(block, x), dtype=float)
     np.testing.assert_allclose(ExtractValue(dual).ravel(), value, rtol=1e-12)
-    gradient = ExtractGradient(dual, x.size)
+    gradient = ExtractGradient(dual)
     differences = np.empty_like(gradient)
     for k in range(x.size):
         shift: NDArray[np.float64] = np.zeros(x.size)
@@ -96,3 +98,29 @@ def bench() -> type[Bench]:
 def check_gradient() -> Callable[..., None]:
     """Compares a block's AutoDiffXd gradient with central differences."""
     return _check_gradient
+
+
+def _controller_bench(
+    block: Any, x: Any, *, feature: float = 2.0, valid: float = 1.0
+) -> Bench:
+    """A controller's inputs from 8 numbers.
+
+    Target, collision vector, heading, v_WP, and the x of B; the last tick saw
+    feature 2 at (0.81, 0.02).
+    """
+    return Bench(
+        block,
+        state=[2.0, 0.81, 0.02, 0, 0, 0, 0, 0, 0],
+        p_WS_estimated=x[0:2],
+        target_valid=[valid],
+        collision_vectors_B=[x[2], x[3], 0, 0, 0, 0],
+        features=[feature, 0, 0],
+        pose_WB_estimated=[x[7], 0.1, x[4]],
+        v_WP=x[5:7],
+    )
+
+
+@pytest.fixture
+def controller_bench() -> Callable[..., Bench]:
+    """A controller that follows a target beside one obstacle."""
+    return _controller_bench

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ CORNER = ((0.0, 0.0), (2.0, 0.0), (2.0, 3.0))
 coordinate = st.integers(-30, 30).map(lambda n: n / 10.0)
 waypoint_lists = st.lists(
     st.tuples(coordinate, coordinate), min_size=2, max_size=6
-).filter(lambda points: all(math.dist(*pair) > 0.2 for pair in zip(points, points[1:])))
+).filter(lambda points: all(math.dist(*pair) > 0.2 for pair in pairwise(points)))
 
 
 def make_path(points, **settings) -> WaypointPath:
@@ -57,9 +58,7 @@ def test_pose_on_the_legs():
 
 def test_yaw_rate_on_the_arc_is_speed_over_radius():
     left = WaypointPath(CORNER, speed=0.3, corner_radius=0.5)
-    right = WaypointPath(
-        [(x, -y) for x, y in CORNER], speed=0.3, corner_radius=0.5
-    )
+    right = WaypointPath([(x, -y) for x, y in CORNER], speed=0.3, corner_radius=0.5)
     middle = (1.5 + 0.5 * math.pi / 4) / 0.3
     assert left.velocity(middle)[2] == pytest.approx(0.6)
     assert right.velocity(middle)[2] == pytest.approx(-0.6)
@@ -90,7 +89,7 @@ def test_speed_is_exact_and_the_path_has_no_gap(points, radius):
 @given(waypoint_lists)
 def test_sharp_path_is_as_long_as_its_legs(points):
     path = make_path(points, corner_radius=0.0)
-    legs = sum(math.dist(*pair) for pair in zip(points, points[1:]))
+    legs = sum(math.dist(*pair) for pair in pairwise(points))
     assert path.length == pytest.approx(legs)
 
 

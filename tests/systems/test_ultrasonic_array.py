@@ -63,7 +63,13 @@ def test_master_robot_is_seen(bench):
 
 @pytest.mark.parametrize(
     ("distance", "reading", "echo"),
-    [(2.99, 2.99, 1), (3.01, 3.0, 0), (0.03, 0.03, 1), (0.01, 0.03, 1), (-0.2, 0.03, 1)],
+    [
+        (2.99, 2.99, 1),
+        (3.01, 3.0, 0),
+        (0.03, 0.03, 1),
+        (0.01, 0.03, 1),
+        (-0.2, 0.03, 1),
+    ],
 )
 def test_limits(bench, distance, reading, echo):
     """Nothing near enough is no echo; too near, inside even, reads 3 cm."""

@@ -1,0 +1,359 @@
+"""The block diagram as a picture: every port named, every wire traceable.
+
+Drawn here and not by Graphviz, whose builds for Python need system libraries
+that a bare machine lacks; the project asks for no more than Drake does.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from pydrake.systems.framework import Diagram
+from pydrake.systems.primitives import VectorLogSink
+
+__all__ = ["Wire", "block_svg", "wires", "write_block_diagram"]
+
+#: What a block is for, its fill, and the classes; in the order of the signal.
+ROLES = (
+    ("world", "#E8EEF4", ("SourceRobot", "Obstacles")),
+    (
+        "hearing",
+        "#FBE3D6",
+        ("SoundEmitter", "MicArray", "TDOAEstimator", "IdealSourceSensor"),
+    ),
+    (
+        "obstacle sensing",
+        "#FCEFC9",
+        ("UltrasonicArray", "CollisionVector", "IdealObstacleSensor"),
+    ),
+    ("control", "#DDF1E7", ("SourceTracker", "WheelSpeedCommand")),
+    ("robot", "#DCEAF7", ("DiffDrivePlant", "WheelOdometry")),
+)
+#: Blocks of no other role are laws, ours or a user's.
+OTHER_ROLE = "control"
+#: These stand in a row of their own, below the others.
+LOWER = ("Obstacles", "UltrasonicArray", "CollisionVector", "IdealObstacleSensor")
+#: Wires of one block have one colour; dark enough for a white page.
+WIRE_COLOURS = (
+    "#0072B2",
+    "#D55E00",
+    "#009E73",
+    "#AA4499",
+    "#B07D00",
+    "#332288",
+    "#000000",
+    "#117733",
+    "#CC3311",
+    "#2B8CBE",
+    "#7A5195",
+    "#6B6B6B",
+)
+#: Sizes, px.
+MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A connection between two blocks, by the names of blocks and ports."""
+
+    source: str
+    output: str
+    target: str
+    input: str
+
+
+@dataclass
+class _Box:
+    """A block with its place in the picture."""
+
+    name: str
+    kind: str
+    role: str
+    inputs: list[str]
+    outputs: list[str]
+    column: int = 0
+    x: float = 0.0
+    y: float = 0.0
+
+    @property
+    def width(self) -> float:
+        sides = max(map(len, self.inputs), default=0), max(map(len, self.outputs))
+        longest = max(sum(sides) + 5, 1.2 * len(self.name) + 2, len(self.kind) + 2)
+        return CHARACTER * longest
+
+    @property
+    def height(self) -> float:
+        return HEADER + ROW * max(len(self.inputs), len(self.outputs)) + 6.0
+
+    def port(self, name: str, *, output: bool) -> tuple[float, float]:
+        """Where a port's wire ends."""
+        index = (self.outputs if output else self.inputs).index(name)
+        x = self.x + (self.width if output else 0.0)
+        return x, self.y + HEADER + ROW * (index + 0.5)
+
+
+@dataclass
+class _Layout:
+    """Boxes, wires between neighbouring columns, and wires along the bus."""
+
+    boxes: dict[str, _Box]
+    direct: list[Wire]
+    bus: dict[tuple[str, str], list[Wire]]
+    width: float = 0.0
+    height: float = 0.0
+    bus_y: dict[tuple[str, str], float] = field(default_factory=dict)
+    track_x: dict[tuple[int, tuple[str, str]], float] = field(default_factory=dict)
+
+
+def wires(diagram: Diagram) -> list[Wire]:
+    """All connections between the blocks that are no logs, in a fixed order."""
+    names = [block.get_name() for block in _blocks(diagram)]
+    found = [wire for wire in _all_wires(diagram) if wire.target in names]
+    return sorted(found, key=lambda w: (names.index(w.target), w.input, w.source))
+
+
+def block_svg(diagram: Diagram) -> str:
+    """The diagram as SVG text.
+
+    The signal runs from left to right. Wires that skip a column, or run back,
+    go along the bus between the upper row and the row of obstacle sensing. An
+    output that nothing reads is grey. Logs are left out.
+    """
+    layout = _arrange(diagram)
+    names = list(layout.boxes)
+    size = f"{layout.width:.0f} {layout.height:.0f}"
+    width, height = size.split()
+    head = (
+        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+        f'viewBox="0 0 {size}" font-family="Helvetica, Arial, sans-serif">'
+    )
+    parts = [head, '<rect width="100%" height="100%" fill="white"/>']
+    colours = {
+        name: WIRE_COLOURS[k % len(WIRE_COLOURS)] for k, name in enumerate(names)
+    }
+    parts += [_direct(layout, w, colours[w.source]) for w in layout.direct]
+    for key, along in layout.bus.items():
+        parts += [_along_bus(layout, key, wire, colours[key[0]]) for wire in along]
+    read = {(w.source, w.output) for w in wires(diagram)}
+    parts += [_drawn(box, read) for box in layout.boxes.values()]
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def write_block_diagram(diagram: Diagram, path: str | Path) -> None:
+    """Writes the diagram of named blocks as SVG.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    Path(path).write_text(block_svg(diagram), encoding="utf-8")
+
+
+def _all_wires(diagram: Diagram) -> list[Wire]:
+    found = []
+    for target, source in diagram.connection_map().items():
+        (reader, input_index), (writer, output_index) = target, source
+        found.append(
+            Wire(
+                writer.get_name(),
+                writer.get_output_port(output_index).get_name(),
+                reader.get_name(),
+                reader.get_input_port(input_index).get_name(),
+            )
+        )
+    return found
+
+
+def _blocks(diagram: Diagram) -> list[Any]:
+    """The systems but for logs, and but for what is read by logs alone."""
+    systems = diagram.GetSystems()
+    logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
+    readers: dict[str, set[str]] = {}
+    for wire in _all_wires(diagram):
+        readers.setdefault(wire.source, set()).add(wire.target)
+    while more := {name for name, by in readers.items() if by <= logs} - logs:
+        logs |= more
+    return [s for s in systems if s.get_name() not in logs]
+
+
+def _class_name(block: Any) -> str:
+    """Name of the class, without the scalar type of a templated one."""
+    return type(block).__name__.split("_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}")[0]
+
+
+def _box(block: Any) -> _Box:
+    kind = _class_name(block)
+    role = next((role for role, _, kinds in ROLES if kind in kinds), OTHER_ROLE)
+    return _Box(
+        block.get_name(),
+        kind,
+        role,
+        [block.get_input_port(k).get_name() for k in range(block.num_input_ports())],
+        [block.get_output_port(k).get_name() for k in range(block.num_output_ports())],
+    )
+
+
+def _arrange(diagram: Diagram) -> _Layout:
+    boxes = {block.get_name(): _box(block) for block in _blocks(diagram)}
+    connections = wires(diagram)
+    _set_columns(boxes, connections)
+    direct: list[Wire] = []
+    bus: dict[tuple[str, str], list[Wire]] = {}
+    for wire in connections:
+        step = boxes[wire.target].column - boxes[wire.source].column
+        lower = [boxes[n].kind in LOWER for n in (wire.source, wire.target)]
+        if step == 1 and (lower[0] == lower[1] or lower[0]):
+            direct.append(wire)
+        else:
+            bus.setdefault((wire.source, wire.output), []).append(wire)
+    layout = _Layout(boxes, direct, bus)
+    _set_places(layout)
+    return layout
+
+
+def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
+    """Longest path from the left, then as far to the right as readers allow."""
+    order = [role for role, _, _ in ROLES]
+    names = list(boxes)
+    forward: dict[str, set[str]] = {name: set() for name in boxes}
+    # Of the wires that close a loop, those against the order of building go back.
+    against = sorted(
+        connections, key=lambda w: names.index(w.source) > names.index(w.target)
+    )
+    for wire in against:
+        ranks = [order.index(boxes[n].role) for n in (wire.source, wire.target)]
+        back = ranks[0] > ranks[1] or _reaches(forward, wire.target, wire.source)
+        if not back:
+            forward[wire.source].add(wire.target)
+    for _ in boxes:
+        for name, readers in forward.items():
+            for reader in readers:
+                box = boxes[reader]
+                box.column = max(box.column, boxes[name].column + 1)
+    for _ in boxes:
+        for name, readers in forward.items():
+            if readers and boxes[name].inputs:
+                boxes[name].column = min(boxes[r].column for r in readers) - 1
+
+
+def _reaches(forward: dict[str, set[str]], start: str, goal: str) -> bool:
+    if start == goal:
+        return True
+    return any(_reaches(forward, after, goal) for after in forward[start])
+
+
+def _set_places(layout: _Layout) -> None:
+    boxes = layout.boxes.values()
+    upper = [box for box in boxes if box.kind not in LOWER]
+    lower = [box for box in boxes if box.kind in LOWER]
+    _set_tracks(layout)
+    top = MARGIN + 30.0
+    below = _stack(upper, top)
+    for index, key in enumerate(layout.bus):
+        layout.bus_y[key] = below + GAP / 2.0 + TRACK * index
+    floor = below + GAP + TRACK * len(layout.bus)
+    layout.height = _stack(lower, floor) + MARGIN
+
+
+def _stack(boxes: list[_Box], top: float) -> float:
+    """Places boxes below each other in their columns; the lowest edge."""
+    edges: dict[int, float] = {}
+    for box in boxes:
+        box.y = edges.get(box.column, top)
+        edges[box.column] = box.y + box.height + GAP
+    return max((edge - GAP for edge in edges.values()), default=top)
+
+
+def _set_tracks(layout: _Layout) -> None:
+    """Columns' x, with room between them for the bus wires' vertical parts."""
+    gaps: dict[int, list[tuple[str, str]]] = {}
+    for key, along in layout.bus.items():
+        columns = {layout.boxes[key[0]].column + 1}
+        columns |= {layout.boxes[wire.target].column for wire in along}
+        for column in columns:
+            gaps.setdefault(column, []).append(key)
+    x = float(MARGIN)
+    last = max(box.column for box in layout.boxes.values())
+    for column in range(last + 2):
+        keys = gaps.get(column, [])
+        for index, key in enumerate(keys):
+            layout.track_x[column, key] = x + GAP / 2.0 + TRACK * index
+        x += (GAP if column else 0.0) + TRACK * len(keys)
+        members = [b for b in layout.boxes.values() if b.column == column]
+        for box in members:
+            box.x = x
+        x += max((box.width for box in members), default=0.0)
+    layout.width = x + MARGIN
+
+
+def _direct(layout: _Layout, wire: Wire, colour: str) -> str:
+    x0, y0 = layout.boxes[wire.source].port(wire.output, output=True)
+    x1, y1 = layout.boxes[wire.target].port(wire.input, output=False)
+    bend = max(20.0, 0.5 * (x1 - x0))
+    path = (
+        f"M{x0:.1f},{y0:.1f} C{x0 + bend:.1f},{y0:.1f} "
+        f"{x1 - bend:.1f},{y1:.1f} {x1:.1f},{y1:.1f}"
+    )
+    return _wire(wire, path, (x1, y1), colour)
+
+
+def _along_bus(layout: _Layout, key: tuple[str, str], wire: Wire, colour: str) -> str:
+    source, target = layout.boxes[wire.source], layout.boxes[wire.target]
+    x0, y0 = source.port(wire.output, output=True)
+    x1, y1 = target.port(wire.input, output=False)
+    leave = layout.track_x[source.column + 1, key]
+    arrive = layout.track_x[target.column, key]
+    y = layout.bus_y[key]
+    path = f"M{x0:.1f},{y0:.1f} H{leave:.1f} V{y:.1f} H{arrive:.1f} V{y1:.1f} H{x1:.1f}"
+    return _wire(wire, path, (x1, y1), colour)
+
+
+def _wire(wire: Wire, path: str, end: tuple[float, float], colour: str) -> str:
+    name = f"{wire.source}.{wire.output} to {wire.target}.{wire.input}"
+    return (
+        f'<g class="wire"><title>{escape(name)}</title>'
+        f'<path d="{path}" fill="none" stroke="{colour}" stroke-width="1.5" '
+        'stroke-linejoin="round"/>'
+        f'<path d="M{end[0]:.1f},{end[1]:.1f} l-8,-4 v8 z" fill="{colour}"/></g>'
+    )
+
+
+def _drawn(box: _Box, read: set[tuple[str, str]]) -> str:
+    fill = {role: colour for role, colour, _ in ROLES}[box.role]
+    middle = box.x + box.width / 2.0
+    title = escape(box.name.replace("_", " "))
+    frame = f'x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" stroke="#777777"'
+    parts = [
+        f'<g class="block"><rect {frame} height="{box.height:.1f}" fill="white"/>',
+        f'<rect {frame} height="{HEADER - 4}" fill="{fill}"/>',
+        _text(middle, box.y + 16, title, 13, "middle", "black", bold=True),
+        _text(middle, box.y + 31, escape(box.kind), 11, "middle", "#444444"),
+    ]
+    for name in box.inputs:
+        x, y = box.port(name, output=False)
+        parts.append(_text(x + 6, y + 4, escape(name), 12, "start", "black"))
+    for name in box.outputs:
+        x, y = box.port(name, output=True)
+        colour = "black" if (box.name, name) in read else "#999999"
+        parts.append(_text(x - 6, y + 4, escape(name), 12, "end", colour))
+    return "".join([*parts, "</g>"])
+
+
+def _text(
+    x: float,
+    y: float,
+    text: str,
+    size: int,
+    anchor: str,
+    colour: str,
+    *,
+    bold: bool = False,
+) -> str:
+    weight = ' font-weight="bold"' if bold else ""
+    return (
+        f'<text x="{x:.1f}" y="{y:.1f}" font-size="{size}" text-anchor="{anchor}" '
+        f'fill="{colour}"{weight}>{text}</text>'
+    )

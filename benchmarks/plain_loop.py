@@ -1,0 +1,214 @@
+"""The default chain as a plain loop over the blocks' pure functions.
+
+What a user would write without a block diagram: same functions, same order,
+same integrator, no ports, no caching, no contexts. It serves as the yardstick
+of the diagram's overhead and, in ``tests/evals``, as its double.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import Scenario
+from diagrams.builder import block_seed
+from systems.active_impedance_controller import active_force
+from systems.collision_vector import collision_vectors, echo_points
+from systems.delays import DelayPlan
+from systems.diff_drive_plant import body_twist, plant_derivatives
+from systems.front_back import Candidates
+from systems.geometry import control_point, rotate
+from systems.impedance import attraction_force, repulsion_force
+from systems.mic_array import frame_instants, microphones_B, record_frame
+from systems.near_field import NearFieldFix
+from systems.noise import tick_generator
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.sound_emitter import history_ticks, make_emission
+from systems.source_tracker import (
+    NEVER_HEARD_S,
+    Estimate,
+    Track,
+    fold_estimate,
+    held_target,
+    past_pose,
+)
+from systems.tdoa_estimator import localise
+from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
+from systems.waveforms import make_waveform
+from systems.wheel_odometry import advance_pose, encoder_angle
+from systems.wheel_speed_command import (
+    hand_position_twist,
+    integrate_velocity,
+    limited_wheel_speeds,
+)
+
+__all__ = ["PlainLoop"]
+
+T = FRAME_PERIOD_S
+#: Reach of the loudspeaker, the default of ``SoundEmitter``.
+MAXIMUM_RANGE_M = 30.0
+
+
+class PlainLoop:
+    """The default scenario's chain; ``run`` returns the plant's states."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        self.scenario = scenario
+        c = scenario.acoustics.c
+        spacing = scenario.robot.microphone_spacing_m
+        self.path = scenario.source.path()
+        self.obstacles = [o.path() for o in scenario.obstacles]
+        self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
+        seed = block_seed(scenario.seed, "sound_emitter")
+        self.waveform = make_waveform(scenario.sound, seed)
+        self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
+        self.instants = frame_instants(scenario.microphones)
+        self.p_BM = microphones_B(scenario.robot)
+        self.mic_seed = block_seed(scenario.seed, "mic_array")
+        self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
+        self.plan = DelayPlan(
+            sample_rate_hz=SAMPLE_RATE_HZ,
+            frame_samples=round(T * SAMPLE_RATE_HZ),
+            max_delay_s=spacing / c,
+            low_hz=scenario.tdoa.low_hz,
+            high_hz=scenario.tdoa.high_hz,
+        )
+
+    def run(self) -> NDArray[np.float64]:
+        """(ticks + 1, 7) states of the plant at every tick."""
+        scenario = self.scenario
+        state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
+        odometry, angles = list(scenario.start.pose), [0.0, 0.0]
+        blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, Candidates.none()
+        track = Track(odometry, odometry, *blank)
+        v_WP: tuple[float, float] = (0.0, 0.0)
+        fix: NearFieldFix | None = None
+        before: dict[int, list[float]] = {}
+        x, y, _ = self.path.pose(0.0)
+        history = np.tile([x, y, 0.0, 0.0], (self.ticks + 1, 1))
+        last = (np.array(state[:3]), np.zeros(3))
+        states = [state]
+        for tick in range(round(scenario.duration_s / T)):
+            time = tick * T
+            odometry, angles = self._odometry(odometry, angles, state[3:5])
+            track, target = self._track(track, fix, odometry)
+            vectors = self._obstacles(time, tick, state, odometry[2])
+            acceleration = self._law(odometry, v_WP, track, target, vectors, before)
+            before = {round(row[0]): row[1:] for row in vectors}
+            v_WP = integrate_velocity(
+                v_WP, acceleration, T, scenario.robot.top_speed_m_s
+            )
+            v, omega = hand_position_twist(
+                v_WP, odometry[2], scenario.robot.control_point_m
+            )
+            fix, last = self._listen(time, state, history, last)
+            wheels = limited_wheel_speeds(v, omega, scenario.robot)
+            state = self._drive(state, wheels)
+            states.append(state)
+        return np.array(states)
+
+    def _odometry(self, pose: Any, angles: Any, true_angles: Any) -> Any:
+        pulses = self.scenario.odometry.pulses_per_revolution
+        now = [encoder_angle(angle, pulses) for angle in true_angles]
+        steps = (now[0] - angles[0], now[1] - angles[1])
+        return list(advance_pose(pose, steps, self.scenario.robot)), now
+
+    def _track(self, track: Any, fix: Any, pose: Any) -> Any:
+        tracker = self.scenario.tracker
+        epsilon = self.scenario.robot.control_point_m
+        now = track
+        if fix is not None:
+            estimate = Estimate(
+                list(fix.p_MS), fix.covariance.ravel().tolist(), fix.range_valid
+            )
+            then = past_pose(pose, track.pose_1, track.pose_2, 1.5 * T)
+            now = fold_estimate(track, estimate, then, tracker, epsilon)
+            now = now._replace(age=1.5 * T)
+        target = held_target(now, pose, tracker, epsilon)
+        return (
+            now._replace(
+                pose_1=pose,
+                pose_2=track.pose_1,
+                age=now.age + T if now.age < NEVER_HEARD_S else now.age,
+                candidates=Candidates.older(now.candidates, T),
+            ),
+            target,
+        )
+
+    def _obstacles(self, time: Any, tick: Any, state: Any, theta: Any) -> Any:
+        scenario = self.scenario
+        poses = np.array([v for path in self.obstacles for v in path.pose(time)])
+        rectangles = world_rectangles(
+            poses, self.sizes, self.path.pose(time), scenario.source_size
+        )
+        true = cone_ranges(
+            state[:3], rectangles, scenario.ultrasonic, scenario.robot.control_point_m
+        )
+        ranges, echo = measured_ranges(
+            true,
+            scenario.ultrasonic,
+            scenario.acoustics.c,
+            tick_generator(self.ultrasonic_seed, tick),
+        )
+        points = echo_points(ranges.tolist(), echo.tolist(), scenario.ultrasonic)
+        vectors = collision_vectors(points, scenario.collision_vector)
+        return [[feature, *rotate(theta, x, y)] for feature, x, y in vectors]
+
+    def _law(
+        self, pose: Any, v_WP: Any, track: Any, target: Any, vectors: Any, before: Any
+    ) -> Any:
+        scenario = self.scenario
+        p_WP = control_point(pose, scenario.robot.control_point_m)
+        valid = track.age - T <= scenario.tracker.maximum_age_s
+        mass = scenario.robot.mass_kg
+        F_m = attraction_force(p_WP, v_WP, target, valid, scenario.attraction, mass)
+        F_b, _ = repulsion_force(
+            vectors,
+            before,
+            lambda c, s: active_force(c, s, scenario.repulsion),
+            scenario.repulsion.velocity_term,
+            T,
+        )
+        return (F_m[0] + F_b[0]) / mass, (F_m[1] + F_b[1]) / mass
+
+    def _listen(self, time: Any, state: Any, history: Any, last: Any) -> Any:
+        scenario = self.scenario
+        x, y, _ = self.path.pose(time)
+        vx, vy, _ = self.path.velocity(time)
+        history[-1] = x, y, vx, vy
+        v, omega = body_twist(state[5:], scenario.robot)
+        theta = state[2]
+        velocity = np.array([v * np.cos(theta), v * np.sin(theta), omega])
+        now = (np.array(state[:3]), velocity)
+        emission = make_emission(time, self.waveform, scenario.sound, history.copy())
+        audio = record_frame(
+            emission,
+            time,
+            last,
+            now,
+            self.instants,
+            self.p_BM,
+            scenario.acoustics.c,
+            parameters=scenario.microphones,
+            seed=self.mic_seed,
+        )
+        history[:-1] = history[1:]
+        frame = audio.counts.astype(np.float32)
+        spacing = scenario.robot.microphone_spacing_m
+        c = scenario.acoustics.c
+        return localise(frame, self.plan, scenario.tdoa, spacing, c), now
+
+    def _drive(self, state: Any, wheels: Any) -> Any:
+        """One third-order Runge-Kutta step, the one that Drake takes."""
+        robot, plant = self.scenario.robot, self.scenario.plant
+
+        def slope(at: NDArray[np.float64]) -> NDArray[np.float64]:
+            return np.array(plant_derivatives(at.tolist(), wheels, robot, plant))
+
+        start = np.array(state)
+        k1 = slope(start)
+        k2 = slope(start + 0.5 * T * k1)
+        k3 = slope(start + T * (2.0 * k2 - k1))
+        return (start + T * (k1 + 4.0 * k2 + k3) / 6.0).tolist()

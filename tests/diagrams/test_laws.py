@@ -1,0 +1,104 @@
+"""From the name of a law to its block."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams import build_sound_follower
+from diagrams.laws import LAWS, make_controller
+from diagrams.loading import ScenarioError
+from diagrams.scenario import Scenario
+
+OWN_LAWS = """
+from systems import ConventionalImpedanceController
+from systems.impedance import RepulsionParameters
+
+number = 5
+
+
+def inverse(c, s, repulsion: RepulsionParameters):
+    return 1.5 / c
+
+
+class Doubled(ConventionalImpedanceController):
+    pass
+"""
+
+
+@pytest.fixture
+def own_laws(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A module in the working directory, which is no entry of sys.path."""
+    (tmp_path / "own_laws_for_test.py").write_text(OWN_LAWS, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "own_laws_for_test", raising=False)
+    return "own_laws_for_test"
+
+
+def repulsion_of(controller) -> float:
+    """Force along x by a new obstacle 0.4 m ahead, N."""
+    context = controller.CreateDefaultContext()
+    inputs = {
+        "p_WS_estimated": [5.0, 0.0],
+        "target_valid": [1.0],
+        "collision_vectors_B": [0.4, 0, 0, 0, 0, 0],
+        "features": [2, 0, 0],
+        "pose_WB_estimated": [0, 0, 0],
+        "v_WP": [0, 0],
+    }
+    for name, value in inputs.items():
+        controller.GetInputPort(name).FixValue(context, np.array(value, float))
+    return float(controller.GetOutputPort("forces_W").Eval(context)[2])
+
+
+@pytest.mark.parametrize(
+    ("law", "force"),
+    [("none", 0.0), ("conventional", -6.4), ("active", -6.4 - 0.2 * 0.72)],
+)
+def test_laws_of_the_package(law, force):
+    """Half the reach: K_0 rho_0 / 2 = 6.4 N with K_0 = 16 N/m, and d_ref mu_0."""
+    data = {
+        "law": law,
+        "repulsion": {
+            "stiffness_n_m": 16.0,
+            "reference_stiffness_n_m": 64.0,
+            "reference_damping_n_s_m": 0.2,
+            "speed_limit_m_s": 0.72,
+        },
+    }
+    controller = make_controller(Scenario.model_validate(data))
+    assert repulsion_of(controller) == pytest.approx(force)
+    assert law in LAWS
+
+
+def test_own_function_in_the_working_directory(own_laws):
+    controller = make_controller(Scenario(law=f"{own_laws}:inverse"))
+    assert repulsion_of(controller) == pytest.approx(-1.5 / 0.4)
+
+
+def test_own_law_is_built_into_the_diagram(own_laws):
+    scenario = Scenario(law=f"{own_laws}:inverse", hearing="ideal")
+    controller = build_sound_follower(scenario).blocks["controller"]
+    assert controller.get_name() == "radial_law_controller"
+
+
+@pytest.mark.parametrize(
+    ("law", "message"),
+    [
+        ("activ", "'activ' is not known; use none, conventional, active, or package"),
+        (":inverse", "is not known"),
+        ("own_laws_for_test:", "is not known"),
+        ("no_such_module_anywhere:law", "cannot be imported: No module named"),
+        ("own_laws_for_test:missing", "has no function or class 'missing'"),
+        ("own_laws_for_test:number", "has no function or class 'number'"),
+    ],
+)
+def test_unknown_laws(own_laws, law, message):
+    assert own_laws
+    with pytest.raises(ScenarioError, match=message) as error:
+        make_controller(Scenario(law=law))
+    assert error.value.field == "law"

@@ -1,0 +1,156 @@
+"""The active law: where it meets the conventional one, its peak and barrier."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.integrate import quad
+from scipy.optimize import minimize_scalar
+
+from systems.active_impedance_controller import (
+    ActiveImpedanceController,
+    active_force,
+)
+from systems.conventional_impedance_controller import conventional_force
+from systems.impedance import AttractionParameters, RepulsionParameters
+from systems.robot import RobotParameters
+
+POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
+
+
+def law(K_0=10.0, ratio=4.0, D_0=3.0, damping_ratio=3.0, **settings):
+    """A set of gains with k_ref / K_0 and D_0 / d_ref given."""
+    return RepulsionParameters(
+        stiffness_n_m=K_0,
+        reference_stiffness_n_m=K_0 * ratio,
+        damping_n_s_m=D_0,
+        reference_damping_n_s_m=D_0 / damping_ratio,
+        **settings,
+    )
+
+
+gains = st.builds(
+    law, st.floats(1.0, 50.0), st.floats(1.5, 20.0), st.floats(0.2, 5.0),
+    st.floats(1.5, 20.0), reach_m=st.floats(0.3, 2.0),
+    speed_limit_m_s=st.floats(0.3, 1.0),
+)  # fmt: skip
+
+
+def spring(c, repulsion):
+    """The law from mu_0 on, where its velocity term is switched off."""
+    return active_force(c, 1e3, repulsion)
+
+
+def damper(s, repulsion):
+    """At contact the spring is zero."""
+    return active_force(0.0, s, repulsion)
+
+
+@given(gains)
+def test_alpha_matches_both_springs_at_half_reach(repulsion):
+    half = repulsion.reach_m / 2
+    conventional = conventional_force(half, 0.0, repulsion)
+    assert spring(half, repulsion) == pytest.approx(conventional)
+    assert conventional == pytest.approx(repulsion.stiffness_n_m * half)
+
+
+@given(gains)
+def test_beta_matches_both_dampers_at_half_the_speed_limit(repulsion):
+    half = repulsion.speed_limit_m_s / 2
+    near, speed = conventional_force(0.0, half, repulsion), repulsion.damping_n_s_m
+    assert near - conventional_force(0.0, 0.0, repulsion) == pytest.approx(speed * half)
+    assert damper(half, repulsion) == pytest.approx(speed * half)
+
+
+@given(gains)
+def test_spring_is_bounded_with_its_peak_at_alpha(repulsion):
+    """k_ref alpha / e; the paper calls the force unbounded."""
+    found = minimize_scalar(
+        lambda c: -spring(c, repulsion), (0.0, repulsion.alpha_m), tol=1e-9
+    )
+    peak = repulsion.reference_stiffness_n_m * repulsion.alpha_m / math.e
+    assert found.x == pytest.approx(repulsion.alpha_m, rel=1e-4)
+    assert -found.fun == pytest.approx(peak)
+
+
+def test_peak_in_terms_of_the_ratio():
+    """K_0 rho_0 r / (2 e ln r) with r = k_ref / K_0."""
+    repulsion = law(K_0=10.0, ratio=4.0)
+    expected = 10.0 * 0.8 * 4.0 / (2 * math.e * math.log(4.0))
+    assert spring(repulsion.alpha_m, repulsion) == pytest.approx(expected)
+
+
+def test_spring_vanishes_at_contact_and_far_away():
+    assert spring(0.0, law()) == 0.0
+    assert spring(30.0, law()) < 1e-30
+
+
+@pytest.mark.parametrize(("ratio", "factor"), [(4.0, 1.0406), (math.e**2, 0.9236)])
+def test_barrier(ratio, factor):
+    """K_0 rho_0^2 / 2 times r / (2 ln^2 r), least at r = e^2."""
+    repulsion = law(K_0=10.0, ratio=ratio)
+    energy, _ = quad(lambda c: spring(c, repulsion), 0.0, 40.0, limit=200)
+    assert energy == pytest.approx(factor * 10.0 * 0.8**2 / 2, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("s", "force"),
+    [(0.0, 1.0 * 0.6), (0.3, 3.0 * 0.3), (0.6, 0.0), (0.7, 0.0), (50.0, 0.0)],
+)
+def test_velocity_term(s, force):
+    """d_ref mu_0 at rest, D_0 mu_0 / 2 at mu_0 / 2, nothing from mu_0 on."""
+    repulsion = law(D_0=3.0, damping_ratio=3.0, speed_limit_m_s=0.6)
+    assert damper(s, repulsion) == pytest.approx(force)
+
+
+def test_velocity_term_peaks_one_beta_below_its_limit():
+    repulsion = law(damping_ratio=8.0, speed_limit_m_s=0.6)
+    found = minimize_scalar(
+        lambda s: -damper(s, repulsion), bounds=(0, 0.6), method="bounded"
+    )
+    assert found.x == pytest.approx(0.6 - repulsion.beta_m_s, abs=1e-4)
+
+
+def test_at_rest_a_far_obstacle_still_pushes():
+    """d_ref mu_0 at 2.9 m: the law's own, not ours."""
+    repulsion = law(D_0=3.0, damping_ratio=3.0)
+    assert active_force(2.9, 0.0, repulsion) == pytest.approx(0.72, rel=0.01)
+
+
+def test_block_adds_attraction_and_repulsion(bench):
+    repulsion = law()
+    at = bench(
+        ActiveImpedanceController(repulsion=repulsion),
+        p_WS_estimated=[3.175, 0.0],
+        target_valid=[1.0],
+        collision_vectors_B=[0.0, 0.4, 0, 0, 0, 0],
+        features=[2, 0, 0],
+        pose_WB_estimated=[0, 0, 0],
+        v_WP=[0.0, 0.0],
+    )
+    push = 4.0 + 1.0 * 0.72  # half reach, and d_ref mu_0 at rest
+    np.testing.assert_allclose(
+        at.output("forces_W"), [2.0 * 1.8, 0.0, 0.0, -push], atol=1e-9
+    )
+
+
+@pytest.mark.parametrize("velocity_term", ["printed", "closing"])
+@pytest.mark.parametrize("limit", [0.72, 20.0])
+def test_gradient(controller_bench, check_gradient, velocity_term, limit):
+    """The obstacle moved at about 9 m/s: beyond the limit, and within."""
+
+    def respond(block, x):
+        at = controller_bench(block, x)
+        outputs = [*at.output("acceleration_W"), *at.output("forces_W")]
+        return [*outputs, *at.output("obstacle_speeds"), *at.updated()]
+
+    block = ActiveImpedanceController(
+        robot=RobotParameters(control_point_m=0.2, mass_kg=5.0),
+        attraction=AttractionParameters(follow_distance_m=0.6, damping_n_s_m=4.0),
+        repulsion=law(speed_limit_m_s=limit, velocity_term=velocity_term),
+    )
+    check_gradient(block, respond, POINT)

@@ -1,0 +1,102 @@
+"""The replay draws and moves in a browser that has no network."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from analysis.replay import write_replay
+from diagrams import load_scenario, simulate
+
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+#: No call home, and no way out: every name is unknown, and the proxy is nowhere.
+FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--proxy-server=127.0.0.1:9",
+    "--window-size=900,600",
+    "--virtual-time-budget=8000",
+)
+#: Animation times of the two pictures, s; the source is silent in both.
+EARLY_S, LATE_S = 0.8, 5.8
+TIMEOUT_S = 180.0
+
+
+def _without_network() -> list[str]:
+    """A prefix that takes a program's network away, where that is permitted."""
+    prefix = ["unshare", "--map-root-user", "--net"]
+    tried = subprocess.run([*prefix, "true"], capture_output=True, check=False)
+    return prefix if tried.returncode == 0 else []
+
+
+def _picture(page: Path, time: float, folder: Path) -> np.ndarray:
+    """(rows, columns, 3) screenshot of the page's animation at a time, in 0..1."""
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.fail("chromium is not on PATH; install the package chromium")
+    seek = f"viewer.animator.pause(); viewer.animator.seek({time})"
+    script = f"<script>setTimeout(() => {{ {seek} }}, 2500)</script></body>"
+    sought = folder / f"at_{time}.html"
+    sought.write_text(page.read_text().replace("</body>", script))
+    shot = folder / f"at_{time}.png"
+    command = [
+        *_without_network(),
+        browser,
+        *FLAGS,
+        f"--user-data-dir={folder / f'profile_{time}'}",
+        f"--screenshot={shot}",
+        sought.as_uri(),
+    ]
+    done = subprocess.run(
+        command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
+    )
+    assert shot.is_file(), f"chromium took no picture: {done.stderr[-2000:]}"
+    return np.asarray(imread(shot))[:, :, :3]
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory: pytest.TempPathFactory) -> list[np.ndarray]:
+    folder = tmp_path_factory.mktemp("replay")
+    result = simulate(load_scenario("default", ["hearing=ideal", "duration_s=6"]))
+    write_replay(result, folder / "replay.html")
+    return [_picture(folder / "replay.html", t, folder) for t in (EARLY_S, LATE_S)]
+
+
+def _place(picture: np.ndarray, channel: int) -> np.ndarray:
+    """Mean column and row of the pixels in which one colour rules."""
+    others = np.delete(picture, channel, axis=2).max(axis=2)
+    rows, columns = np.nonzero(picture[:, :, channel] > others + 0.25)
+    assert len(rows) > 100, "the body of this colour is not in the picture"
+    return np.array([columns.mean(), rows.mean()])
+
+
+def test_both_pictures_show_a_scene(pictures):
+    for picture in pictures:
+        levels = np.unique((picture * 255.0).astype(int).reshape(-1, 3), axis=0)
+        assert len(levels) > 50
+        assert picture.std() > 0.02
+
+
+def test_the_picture_moves(pictures):
+    early, late = pictures
+    changed = np.abs(late - early).max(axis=2) > 0.1
+    assert changed.mean() > 0.002
+
+
+def test_the_source_drives_to_the_right_and_the_robot_after_it(pictures):
+    # x of W is to the right; the source is orange, the robot blue.
+    early, late = pictures
+    assert _place(late, 0)[0] > _place(early, 0)[0] + 30.0
+    assert _place(late, 2)[0] > _place(early, 2)[0] + 30.0
