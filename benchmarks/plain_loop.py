@@ -81,7 +81,7 @@ class PlainLoop:
         scenario = self.scenario
         state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
         odometry, angles = list(scenario.start.pose), [0.0, 0.0]
-        blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, Candidates.none()
+        blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, 0.0, Candidates.none()
         track = Track(odometry, odometry, *blank)
         v_WP: tuple[float, float] = (0.0, 0.0)
         fix: NearFieldFix | None = None
@@ -124,8 +124,11 @@ class PlainLoop:
                 list(fix.p_MS), fix.covariance.ravel().tolist(), fix.range_valid
             )
             then = past_pose(pose, track.pose_1, track.pose_2, 1.5 * T)
-            now = fold_estimate(track, estimate, then, tracker, epsilon)
-            now = now._replace(age=1.5 * T)
+            folded = fold_estimate(track, estimate, then, tracker, epsilon)
+            if folded is None:
+                now = track._replace(outliers=track.outliers + 1.0)
+            else:
+                now = folded._replace(age=1.5 * T)
         target = held_target(now, pose, tracker, epsilon)
         return (
             now._replace(

@@ -130,7 +130,7 @@ def _resolve_sound(data: dict[str, Any], folder: Path) -> None:
 
 def _override(data: dict[str, Any], text: str) -> None:
     key, equals, value_text = text.partition("=")
-    if not equals or not key:
+    if not equals or not all(key.split(".")):
         raise ScenarioError(text or "--set", "is not of the form key=value, as seed=2")
     try:
         value = YAML(typ="safe").load(value_text)
@@ -180,6 +180,9 @@ def _explain(error: ValidationError) -> ScenarioError:
             field = f"{field}.{named[1]}" if field else named[1]
             message = message[named.start(2) :]
         return ScenarioError(field, message)
+    # Words of YAML for words of Python.
+    message = re.sub(r"dictionary or instance of \w+", "mapping", message)
+    message = message.replace("valid tuple", "valid list")
     value = first["input"]
     return ScenarioError(field, f"is {value!r}; {message[0].lower()}{message[1:]}")
 

@@ -77,9 +77,9 @@ class IntegratorParameters(Parameters):
 class Scenario(Parameters):
     """One run. Every field has a default: the default scenario is complete."""
 
-    name: str = Field(default="default", min_length=1)
+    name: str = Field(default="default", min_length=1, pattern=r"\A[^\n]*\z")
     """Name in results."""
-    description: str = ""
+    description: str = Field(default="", pattern=r"\A[^\n]*\z")
     """One line for ``phonotaxis scenarios``."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""

@@ -19,8 +19,9 @@ __all__ = ["Candidates", "resolve"]
 CHECK_AFTER_S = 0.45
 #: Part of the old scores that survives a check.
 MEMORY = 0.7
-#: A source behind the microphones is the less likely at first sight.
-BACK_PENALTY = 1.0
+#: Difference of the scores, two standard deviations squared, at which the
+#: verdict turns over; the first one is front.
+SWITCH_MARGIN = 4.0
 #: Scores at which one more bad check says nothing new.
 LARGEST_SCORE = 50.0
 
@@ -36,7 +37,7 @@ class Candidates:
     @staticmethod
     def none() -> list[float]:
         """Nothing heard yet."""
-        return [0.0] * 4 + [-1.0, 0.0, BACK_PENALTY, 0.0]
+        return [0.0] * 4 + [-1.0, 0.0, 0.0, 0.0]
 
     @staticmethod
     def behind(memory: list[Any]) -> bool:
@@ -81,7 +82,8 @@ def resolve(memory: list[Any], front: list[Any], back: list[Any], tracker):
         new_scores.append(min(paths))
     least = min(new_scores)
     new_scores = [min(score - least, LARGEST_SCORE) for score in new_scores]
-    behind = new_scores[1] < new_scores[0]
+    margin = -SWITCH_MARGIN if Candidates.behind(memory) else SWITCH_MARGIN
+    behind = new_scores[0] - new_scores[1] > margin
     chosen = back if behind else front
     if elapsed < CHECK_AFTER_S:
         return memory, chosen

@@ -54,7 +54,8 @@ class WaypointPath:
         start_time: The body rests at the first waypoint until then, s.
         at_end: ``stop`` rests at the last waypoint, ``shuttle`` goes back
             and forth without turning round.
-        heading: Heading of a body at rest, rad; else the path's tangent.
+        heading: Heading where there is one waypoint, rad; else the path's
+            tangent.
 
     Raises:
         ValueError: There is no waypoint, two neighbours coincide, or the

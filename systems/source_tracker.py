@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Literal, NamedTuple
 
+from pydantic import Field
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
@@ -44,6 +45,11 @@ class TrackerParameters(Parameters):
     microphones; off: every source is in front."""
     source_top_speed_m_s: Positive = 0.5
     """Fastest that a source is believed to move, m/s."""
+    jump_m: Positive = 0.3
+    """An estimate that is farther from the target than a source can have moved,
+    plus this, is an outlier, m."""
+    believed_outliers: int = Field(default=3, ge=1)
+    """The outlier of this number in a row is believed after all."""
     mirror_tolerance_m: Positive = 0.15
     """Error of a position that says nothing against a candidate, m."""
 
@@ -61,6 +67,8 @@ class Track(NamedTuple):
     """Of the target in W, row by row, m^2."""
     age: float
     """Since the measurement behind the target, s."""
+    outliers: float
+    """How many outliers came in a row."""
     candidates: list[Any]
     """State of the front/back resolver."""
 
@@ -73,7 +81,8 @@ class Track(NamedTuple):
             values[6:8],
             values[8:12],
             values[12],
-            values[13:],
+            values[13],
+            values[14:],
         )
 
     def pack(self) -> list[Any]:
@@ -84,6 +93,7 @@ class Track(NamedTuple):
             *self.held,
             *self.covariance,
             self.age,
+            self.outliers,
             *self.candidates,
         ]
 
@@ -123,7 +133,7 @@ def fold_estimate(
     pose: list[Any],
     tracker: TrackerParameters,
     control_point_m: float,
-) -> Track:
+) -> Track | None:
     """The track with a new estimate folded in.
 
     Args:
@@ -134,7 +144,8 @@ def fold_estimate(
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        The new memory; its age is still the old one.
+        The new memory, whose age is still the old one; or, where the estimate
+        is an outlier, None.
     """
     x_P, y_P = control_point(pose, control_point_m)
     x, y = estimate.p_PS_B
@@ -144,9 +155,12 @@ def fold_estimate(
     dx, dy = rotate(pose[2], x, y)
     target = [x_P + dx, y_P + dy]
     candidates, covariance = track.candidates, estimate.covariance
+    dx, dy = rotate(pose[2], -x, y)
+    mirrored = [x_P + dx, y_P + dy]
+    places = [target, mirrored] if tracker.resolve_front_back else [target]
+    if _is_outlier(track, places, (x_P, y_P, pose[2]), tracker):
+        return None
     if tracker.resolve_front_back:
-        dx, dy = rotate(pose[2], -x, y)
-        mirrored = [x_P + dx, y_P + dy]
         if estimate.ranged:
             candidates, target = resolve(candidates, target, mirrored, tracker)
         elif Candidates.behind(candidates):
@@ -156,10 +170,27 @@ def fold_estimate(
     if tracker.hold == "robot":
         target = list(rotate(-pose[2], target[0] - x_P, target[1] - y_P))
     return track._replace(
-        held=target,
+        held=list(target),
+        outliers=0.0,
         covariance=_covariance_in_world(covariance, pose[2]),
         candidates=candidates,
     )
+
+
+def _is_outlier(track: Track, places, p_WP, tracker: TrackerParameters) -> bool:
+    """Whether none of the places can be where the target has moved to.
+
+    Single frames of speech or of a cut burst can be metres off with a small
+    stated error; a target that really jumps is believed after a few frames.
+    """
+    if track.age >= NEVER_HEARD_S or track.outliers + 1 >= tracker.believed_outliers:
+        return False
+    x, y = track.held
+    if tracker.hold == "robot":
+        dx, dy = rotate(p_WP[2], x, y)
+        x, y = p_WP[0] + dx, p_WP[1] + dy
+    reach = tracker.jump_m + tracker.source_top_speed_m_s * track.age
+    return all(safe_norm(a - x, b - y) > reach for a, b in places)
 
 
 def _kept_range(track: Track, x_P, y_P, tracker: TrackerParameters):
@@ -202,9 +233,10 @@ def SourceTracker_(T):
 
         A new estimate is placed by the odometry pose of the moment it was
         measured, ``measurement_age_s`` ago. Where only the bearing is known,
-        the last range is kept. Between bursts the target rests in W (or, with
-        ``hold: robot``, moves with the robot). Nothing heard yet, or a target
-        older than ``maximum_age_s``: ``target_valid`` is 0, and the
+        the last range is kept. An estimate that no source can have reached is
+        dropped, unless several in a row say so. Between bursts the target rests
+        in W (or, with ``hold: robot``, moves with the robot). Nothing heard yet,
+        or a target older than ``maximum_age_s``: ``target_valid`` is 0, and the
         controllers stop the robot.
 
         Discrete state, 25 ms: ``Track``. The outputs continue it by the
@@ -252,6 +284,7 @@ def SourceTracker_(T):
                 [0.0] * 2,
                 [0.0] * 4,
                 NEVER_HEARD_S,
+                0.0,
                 Candidates.none(),
             )
             self.DeclareDiscreteState([T(value) for value in blank.pack()])
@@ -317,8 +350,11 @@ def SourceTracker_(T):
                 then = past_pose(
                     pose, track.pose_1, track.pose_2, self._measurement_age
                 )
-                track = fold_estimate(track, estimate, then, self._tracker, epsilon)
-                track = track._replace(age=T(self._measurement_age))
+                folded = fold_estimate(track, estimate, then, self._tracker, epsilon)
+                if folded is None:
+                    track = track._replace(outliers=track.outliers + 1.0)
+                else:
+                    track = folded._replace(age=T(self._measurement_age))
             return track, held_target(track, pose, self._tracker, epsilon)
 
         def _update(self, context, discrete_state):

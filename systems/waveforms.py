@@ -50,7 +50,7 @@ class SoundParameters(Parameters):
     on_s: float = Field(default=0.5, ge=2 * EDGE_S)
     """Length of a burst, s."""
     period_s: Positive = 2.0
-    """From burst to burst, s; equal to ``on_s`` it never pauses."""
+    """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
     start_s: NonNegative = 0.0
     """First burst, s."""
 

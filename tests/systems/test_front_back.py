@@ -9,10 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from systems.front_back import (
-    BACK_PENALTY,
     CHECK_AFTER_S,
     LARGEST_SCORE,
     MEMORY,
+    SWITCH_MARGIN,
     Candidates,
     resolve,
 )
@@ -38,21 +38,33 @@ def test_nothing_heard_does_not_age():
 def test_scores_by_hand():
     """Front ran 0.85 m in 0.5 s, 0.6 m more than believable; back rests.
 
-    Front costs (0.6 / 0.15)^2 = 16, and back only its own penalty, so the
-    difference is 15; both then fade.
+    Front costs (0.6 / 0.15)^2 = 16, and back nothing; both then fade.
     """
     memory, chosen = checked([2.0, 0.85], [-2.0, 0.0])
     assert chosen == [-2.0, 0.0]
     assert memory[:5] == [2.0, 0.85, -2.0, 0.0, 0.0]
-    assert memory[5] == pytest.approx(MEMORY * (16.0 - BACK_PENALTY))
+    assert memory[5] == pytest.approx(MEMORY * 16.0)
     assert memory[6] == 0.0
     assert memory[7] == 1.0
+
+
+@pytest.mark.parametrize("behind", [False, True])
+@pytest.mark.parametrize("lead", [SWITCH_MARGIN - 0.1, SWITCH_MARGIN + 0.1])
+def test_verdict_turns_over_only_beyond_the_margin(behind, lead):
+    """The candidate of the verdict pays ``lead`` more than the other one."""
+    far = 0.5 * 0.5 + 0.15 * math.sqrt(lead)
+    front, back = [2.0, 0.0 if behind else far], [-2.0, far if behind else 0.0]
+    memory = [2.0, 0.0, -2.0, 0.0, 0.5, 0.0, 0.0, float(behind)]
+    memory, chosen = resolve(memory, front, back, TRACKER)
+    stays = lead < SWITCH_MARGIN
+    assert chosen == (back if behind == stays else front)
+    assert Candidates.behind(memory) == (behind == stays)
 
 
 def test_a_believable_motion_costs_nothing():
     memory, chosen = checked([2.2, 0.1], [-2.2, 0.1])
     assert chosen == [2.2, 0.1]
-    assert memory[5:] == [0.0, pytest.approx(MEMORY * BACK_PENALTY), 0.0]
+    assert memory[5:] == [0.0, 0.0, 0.0]
 
 
 def test_anchors_stay_until_the_check_is_due():
@@ -80,7 +92,7 @@ def test_scores_are_bounded_and_one_candidate_is_free(pairs):
         memory = Candidates.older(memory, 0.5)
     scores = memory[5:7]
     assert min(scores) == 0.0
-    assert max(scores) <= max(MEMORY * LARGEST_SCORE, BACK_PENALTY)
+    assert max(scores) <= MEMORY * LARGEST_SCORE
 
 
 @given(st.floats(165.0, 255.0))

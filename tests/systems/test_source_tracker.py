@@ -37,7 +37,8 @@ NORTH = [1.0, 1.0, math.pi / 2]
 def track_state(pose_1, pose_2=None, *, held=(0.0, 0.0), age=NEVER_HEARD_S):
     """The tracker's state with both past poses."""
     poses = (list(pose_1), list(pose_2 or pose_1))
-    return Track(*poses, list(held), [0.0] * 4, age, Candidates.none()).pack()
+    track = Track(*poses, list(held), [0.0] * 4, age, 0.0, Candidates.none())
+    return track.pack()
 
 
 def make_bench(bench, tracker=PLAIN, *, pose=NORTH, heard=True, state=None, age=0.025):
@@ -129,18 +130,40 @@ def test_first_bearing_alone_uses_the_assumed_range(bench):
 
 @pytest.mark.parametrize("hold", ["world", "robot"])
 def test_later_bearings_keep_the_last_range(bench, hold):
-    tracker = TrackerParameters(hold=hold, resolve_front_back=False)
+    tracker = TrackerParameters(hold=hold, resolve_front_back=False, jump_m=1.0)
     at = make_bench(bench, tracker).tick()
-    hear(at, p_PS_B=[0.6, 0.8], range_valid=[0.0])
+    hear(at, p_PS_B=[0.8, 0.6], range_valid=[0.0])
     r = math.sqrt(5)
-    expected = [1.0 - 0.8 * r, 1.175 + 0.6 * r]
+    expected = [1.0 - 0.6 * r, 1.175 + 0.8 * r]
     np.testing.assert_allclose(at.output("p_WS_estimated"), expected, atol=1e-9)
 
 
 def test_a_new_estimate_replaces_the_target_at_once(bench):
     at = make_bench(bench).tick()
-    hear(at, p_PS_B=[1.0, 0.0])
-    np.testing.assert_allclose(at.output("p_WS_estimated"), [1.0, 2.175], atol=1e-12)
+    hear(at, p_PS_B=[2.2, 1.2])
+    np.testing.assert_allclose(at.output("p_WS_estimated"), [-0.2, 3.375], atol=1e-12)
+
+
+def test_an_outlier_is_dropped_and_the_third_in_a_row_is_believed(bench):
+    """The target is at (0, 3.175); 9 m ahead is (0, 10.175)."""
+    at = make_bench(bench).tick()
+    hear(at, p_PS_B=[9.0, 1.0])
+    for _ in range(2):
+        np.testing.assert_allclose(
+            at.output("p_WS_estimated"), [0.0, 3.175], atol=1e-12
+        )
+        at.tick()
+    np.testing.assert_allclose(at.output("p_WS_estimated"), [0.0, 10.175], atol=1e-12)
+
+
+def test_an_old_target_may_have_moved_far(bench):
+    """1.5 s at 0.5 m/s and 0.3 m: 1.05 m, not 1.1 m."""
+    for distance, believed in ((1.0, True), (1.1, False)):
+        state = track_state(NORTH, held=(0.0, 3.175), age=1.5)
+        at = make_bench(bench, state=state)
+        hear(at, p_PS_B=[2.0 + distance, 1.0])
+        y = 3.175 + (distance if believed else 0.0)
+        np.testing.assert_allclose(at.output("p_WS_estimated"), [0.0, y], atol=1e-12)
 
 
 def mirror_run(bench, p_WS, tracker, *, turn_rate: float):
@@ -196,7 +219,7 @@ def test_gradient(bench, check_gradient, hold, heard):
 def test_gradient_through_the_resolver(bench, check_gradient):
     def respond(block, x):
         signals = HEARD | {"p_PS_B": x[:2]}
-        state = [*memory[:13], 1.2, 0.9, -1.3, 0.8, 0.5, 0.3, 1.1, 0.0]
+        state = [*memory[:14], 1.2, 0.9, -1.3, 0.8, 0.5, 0.3, 1.1, 0.0]
         at = bench(block, state=state, pose_WB_estimated=x[2:5], **signals)
         return [*at.output("p_WS_estimated"), *at.updated()]
 
