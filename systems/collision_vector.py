@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
@@ -164,16 +163,12 @@ def _all_vectors(points, separation):
 
 def fill_slots(vectors, scalar):
     """(vectors, mask, features) for the ports: 6, 3 and 3 elements."""
-    zero = scalar(0.0)
-    out = np.array([zero] * (2 * SLOTS))
-    mask = np.array([zero] * SLOTS)
-    features = np.array([zero] * SLOTS)
-    for slot, (feature, x, y) in enumerate(vectors):
-        out[2 * slot] = x
-        out[2 * slot + 1] = y
-        mask[slot] = scalar(1.0)
-        features[slot] = scalar(feature)
-    return out, mask, features
+    zero, one, empty = scalar(0.0), scalar(1.0), SLOTS - len(vectors)
+    out = [component for _, x, y in vectors for component in (x, y)]
+    mask = [one] * len(vectors)
+    features = [zero + feature for feature, _, _ in vectors]
+    blank = [zero] * empty
+    return out + blank + blank, mask + blank, features + blank
 
 
 def declare_collision_ports(system, slots):

@@ -199,8 +199,6 @@ class ImpedanceLoop:
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
         sources = {port.ticket() for port in self._inputs}
-        obstacles = {port.ticket() for port in self._inputs[2:5]}
-        self._vectors = declare_cache(self, "C_W", self._vectors_W, obstacles)
         sources.add(self.xd_ticket())
         self._forces = declare_cache(self, "forces", self._sum_forces, sources)
         for port_name, size, calc in (
@@ -215,31 +213,26 @@ class ImpedanceLoop:
                 prerequisites_of_calc={self._forces.ticket()},
             )
 
-    def _vectors_W(self, context):
-        """[(feature, C_x, C_y)] in W axes."""
-        vectors, features, pose = (
-            port.Eval(context).tolist() for port in self._inputs[2:5]
-        )
-        return [
-            (features[k], *rotate(pose[2], *vectors[2 * k : 2 * k + 2]))
-            for k in range(SLOTS)
-            if features[k] > 0.5
-        ]
-
     def _sum_forces(self, context):
-        """(F_m, F_b, s of each slot)."""
-        target, valid = self._inputs[0].Eval(context), self._inputs[1].Eval(context)
-        pose, v_WP = self._inputs[4].Eval(context), self._inputs[5].Eval(context)
+        """(F_m, F_b, s of each slot, [(feature, C_x, C_y)] in W)."""
+        target, valid, vectors, features, pose, v_WP = (
+            port.Eval(context).tolist() for port in self._inputs
+        )
         F_m = attraction_force(
-            control_point(pose.tolist(), self._robot.control_point_m),
-            v_WP.tolist(),
-            target.tolist(),
+            control_point(pose, self._robot.control_point_m),
+            v_WP,
+            target,
             valid[0] > 0.5,
             self._attraction,
             self._robot.mass_kg,
         )
+        vectors_W = [
+            (features[k], *rotate(pose[2], *vectors[2 * k : 2 * k + 2]))
+            for k in range(SLOTS)
+            if features[k] > 0.5
+        ]
         F_b, speeds = repulsion_force(
-            self._vectors.Eval(context),
+            vectors_W,
             self._before(context),
             self._radial_force,
             self._repulsion.velocity_term,
@@ -247,7 +240,7 @@ class ImpedanceLoop:
         )
         speeds += [0.0] * (SLOTS - len(speeds))
         zero = self._scalar(0.0)
-        return F_m, [zero + F for F in F_b], [zero + s for s in speeds]
+        return F_m, [zero + F for F in F_b], [zero + s for s in speeds], vectors_W
 
     def _before(self, context):
         """{feature: C_W} of the last tick."""
@@ -256,17 +249,18 @@ class ImpedanceLoop:
         return {_key(row[0]): row[1:] for row in rows if row[0] > 0.5}
 
     def _remember(self, context, discrete_state):
-        rows = [value for row in self._vectors.Eval(context) for value in row]
+        *_, vectors_W = self._forces.Eval(context)
+        rows = [value for row in vectors_W for value in row]
         rows += [self._scalar(0.0)] * (3 * SLOTS - len(rows))
         discrete_state.get_mutable_vector().SetFromVector(rows)
 
     def _acceleration(self, context, output):
-        F_m, F_b, _ = self._forces.Eval(context)
+        F_m, F_b, *_ = self._forces.Eval(context)
         mass = self._robot.mass_kg
         output.SetFromVector([(F_m[0] + F_b[0]) / mass, (F_m[1] + F_b[1]) / mass])
 
     def _forces_W(self, context, output):
-        F_m, F_b, _ = self._forces.Eval(context)
+        F_m, F_b, *_ = self._forces.Eval(context)
         output.SetFromVector([*F_m, *F_b])
 
     def _speeds(self, context, output):

@@ -10,7 +10,6 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.cache import declare_cache
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
 from systems.waveforms import SoundParameters, make_waveform
 
@@ -140,32 +139,32 @@ class SoundEmitter(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
-        sources = {self._pose_WS.ticket(), self._v_WS.ticket(), self.xd_ticket()}
-        self._path = declare_cache(self, "path now", self._path_now, sources)
-        self.DeclareAbstractOutputPort(
+        self._emission = self.DeclareAbstractOutputPort(
             name="emission",
             alloc=lambda: Value(object()),
             calc=self._emit,
-            prerequisites_of_calc={self._path.ticket(), self.time_ticket()},
+            prerequisites_of_calc={
+                self._pose_WS.ticket(),
+                self._v_WS.ticket(),
+                self.xd_ticket(),
+                self.time_ticket(),
+            },
         )
-
-    def _path_now(self, context) -> NDArray[np.float64]:
-        """(ticks + 1, 4) x, y, vx, vy, oldest first, the last one now."""
-        path = np.empty((self._ticks + 1, 4))
-        held = context.get_discrete_state(0).CopyToVector()
-        path[:-1] = held.reshape(self._ticks, 4)
-        path[-1, :2] = np.asarray(self._pose_WS.Eval(context))[:2]
-        path[-1, 2:] = np.asarray(self._v_WS.Eval(context))[:2]
-        return path
 
     def _start(self, context, discrete_state) -> None:
         at_rest = [*np.asarray(self._pose_WS.Eval(context))[:2], 0.0, 0.0]
         discrete_state.set_value(np.tile(at_rest, self._ticks))
 
-    def _remember(self, context, discrete_state) -> None:
-        path = np.asarray(self._path.Eval(context))
-        discrete_state.set_value(path[1:].ravel())
+    def _remember(self, context, discrete_state):
+        emission = self._emission.Eval(context)
+        path = np.hstack((emission.p_WS[1:], emission.v_WS[1:]))
+        discrete_state.set_value(path.ravel())
 
-    def _emit(self, context, output) -> None:
-        path, time = np.asarray(self._path.Eval(context)), context.get_time()
+    def _emit(self, context, output):
+        path = np.empty((self._ticks + 1, 4))
+        held = context.get_discrete_state(0).CopyToVector()
+        path[:-1] = held.reshape(self._ticks, 4)
+        path[-1, :2] = self._pose_WS.Eval(context)[:2]
+        path[-1, 2:] = self._v_WS.Eval(context)[:2]
+        time = context.get_time()
         output.set_value(make_emission(time, self._waveform, self._sound, path))

@@ -337,7 +337,7 @@ def SourceTracker_(T):
             return context.get_discrete_state(0).CopyToVector().tolist()
 
         def _track(self, context):
-            """(Track with the present estimate folded in, target in W)."""
+            """(Track with the present estimate folded in, target in W, pose)."""
             track = Track.unpack(self._state(context))
             pose = self._pose.Eval(context).tolist()
             epsilon = self._robot.control_point_m
@@ -355,14 +355,14 @@ def SourceTracker_(T):
                     track = track._replace(outliers=track.outliers + 1.0)
                 else:
                     track = folded._replace(age=T(self._measurement_age))
-            return track, held_target(track, pose, self._tracker, epsilon)
+            return track, held_target(track, pose, self._tracker, epsilon), pose
 
         def _update(self, context, discrete_state):
-            track, _ = self._now.Eval(context)
+            track, _, pose = self._now.Eval(context)
             older = track.age < NEVER_HEARD_S
             discrete_state.get_mutable_vector().SetFromVector(
                 track._replace(
-                    pose_1=self._pose.Eval(context).tolist(),
+                    pose_1=pose,
                     pose_2=track.pose_1,
                     age=track.age + FRAME_PERIOD_S if older else track.age,
                     candidates=Candidates.older(track.candidates, FRAME_PERIOD_S),

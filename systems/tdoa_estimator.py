@@ -181,19 +181,28 @@ class TDOAEstimator(LeafSystem):
             )
         frame = audio.counts.astype(np.float32)
         fix = localise(frame, self._plan, self._parameters, self._spacing, self._c)
+        if fix is None and not context.get_discrete_state(_DETECTED).value()[0]:
+            return  # silence goes on, and the state is zero already
         for group, values in enumerate(_port_values(fix)):
             discrete_state.set_value(group, values)
 
 
-def _port_values(fix: NearFieldFix | None) -> list[NDArray[np.float64]]:
+#: Index of the state group behind the port ``detected``.
+_DETECTED = 4
+
+#: Values of the output ports where nothing is heard.
+_NOTHING = tuple(np.zeros(size) for size in (1, 1, 2, 4, 1, 1))
+
+
+def _port_values(fix: NearFieldFix | None) -> tuple[NDArray[np.float64], ...]:
     """Values of the output ports, in order."""
     if fix is None:
-        return [np.zeros(size) for size in (1, 1, 2, 4, 1, 1)]
-    return [
+        return _NOTHING
+    return (
         np.array([fix.bearing]),
         np.array([fix.range]),
         np.array(fix.p_MS),
         fix.covariance.ravel(),
         np.ones(1),
         np.array([float(fix.range_valid)]),
-    ]
+    )

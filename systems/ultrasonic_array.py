@@ -215,8 +215,8 @@ class UltrasonicArray(LeafSystem):
                 prerequisites_of_calc={self._readings.ticket()},
             )
 
-    def _read(self, context) -> NDArray[np.float64]:
-        """(6,) ranges and echoes as they stand now."""
+    def _read(self, context) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(3,) ranges and (3,) echoes as they stand now."""
         pose_WB, poses_WO, sizes, pose_WS = (
             port.Eval(context) for port in self._inputs
         )
@@ -225,19 +225,18 @@ class UltrasonicArray(LeafSystem):
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
         true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
         ranges, echo = measured_ranges(true, self._parameters, self._sound_speed, rng)
-        now = np.concatenate([ranges, echo])
         if self._parameters.firing == "simultaneous":
-            return now
-        held = context.get_discrete_state(0).CopyToVector()
+            return ranges, echo
+        held = context.get_discrete_state(0).CopyToVector().reshape(2, SENSORS)
         fires = tick % SENSORS
-        held[[fires, SENSORS + fires]] = now[[fires, SENSORS + fires]]
-        return held
+        held[:, fires] = ranges[fires], echo[fires]
+        return held[0], held[1]
 
-    def _hold(self, context, discrete_state) -> None:
-        discrete_state.set_value(self._readings.Eval(context))
+    def _hold(self, context, discrete_state):
+        discrete_state.set_value(np.concatenate(self._readings.Eval(context)))
 
     def _calc_ranges(self, context, output):
-        output.SetFromVector(self._readings.Eval(context)[:SENSORS])
+        output.SetFromVector(self._readings.Eval(context)[0])
 
     def _calc_echo(self, context, output):
-        output.SetFromVector(self._readings.Eval(context)[SENSORS:])
+        output.SetFromVector(self._readings.Eval(context)[1])
