@@ -185,6 +185,11 @@ def _check_recording(
             f"{max(needed, max(geometry.columns) + 1)}; record every microphone on a "
             "channel of its own"
         )
+    if geometry.channels is None and count > needed:
+        raise ValueError(
+            f"{where} has {count} channels, but the array {needed} microphones; name "
+            "the channels to use in the geometry file, as 'channels: [0, 1, 2]'"
+        )
     if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
         raise ValueError(
             f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "

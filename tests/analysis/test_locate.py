@@ -205,6 +205,9 @@ def test_recordings_that_cannot_be_used(tmp_path):
         tmp_path / "missing.wav": "not a file",
         write(tmp_path / "mono.wav", tone): "is mono.*needs 3",
         write(tmp_path / "two.wav", three[:, :2]): "has 2 channels.*needs 3",
+        write(tmp_path / "four.wav", np.stack([tone] * 4, axis=1)): (
+            "has 4 channels.*name the channels"
+        ),
         write(tmp_path / "short.wav", three[:100]): "100 samples.*longer",
         write(tmp_path / "slow.wav", three, 4_000): "4000 Hz.*8000",
     }
