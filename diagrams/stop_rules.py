@@ -74,7 +74,7 @@ class StopRules:
         self.cause = self._judge(time, pose, valid=valid)
         self._pose, self._time = pose, time
         if self.cause:
-            return EventStatus.ReachedTermination(None, self.cause)
+            return EventStatus.ReachedTermination(self.follower.diagram, self.cause)
         return EventStatus.DidNothing()
 
     def final_cause(self) -> str:

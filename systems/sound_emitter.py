@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +74,7 @@ def make_emission(
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
     return Emission(
-        samples=np.zeros(count, dtype=np.float32) if samples is None else samples,
+        samples=_silence(count) if samples is None else samples,
         start_time=first / SAMPLE_RATE_HZ,
         sample_rate_hz=float(SAMPLE_RATE_HZ),
         knot_times=time - ages,
@@ -82,6 +83,11 @@ def make_emission(
         level_pa=sound.level_pa,
         sounding=samples is not None,
     )
+
+
+@cache
+def _silence(count: int) -> NDArray[np.float32]:
+    return np.zeros(count, dtype=np.float32)
 
 
 def history_ticks(maximum_range_m: float, c: float) -> int:
@@ -157,7 +163,9 @@ class SoundEmitter(LeafSystem):
 
     def _remember(self, context, discrete_state):
         emission = self._emission.Eval(context)
-        path = np.hstack((emission.p_WS[1:], emission.v_WS[1:]))
+        path = np.empty((self._ticks, 4))
+        path[:, :2] = emission.p_WS[1:]
+        path[:, 2:] = emission.v_WS[1:]
         discrete_state.set_value(path.ravel())
 
     def _emit(self, context, output):

@@ -359,15 +359,19 @@ def SourceTracker_(T):
 
         def _update(self, context, discrete_state):
             track, _, pose = self._now.Eval(context)
-            older = track.age < NEVER_HEARD_S
-            discrete_state.get_mutable_vector().SetFromVector(
-                track._replace(
-                    pose_1=pose,
-                    pose_2=track.pose_1,
-                    age=track.age + FRAME_PERIOD_S if older else track.age,
-                    candidates=Candidates.older(track.candidates, FRAME_PERIOD_S),
-                ).pack()
+            age = track.age
+            if age < NEVER_HEARD_S:
+                age = age + FRAME_PERIOD_S
+            older = Track(
+                pose,
+                track.pose_1,
+                track.held,
+                track.covariance,
+                age,
+                track.outliers,
+                Candidates.older(track.candidates, FRAME_PERIOD_S),
             )
+            discrete_state.get_mutable_vector().SetFromVector(older.pack())
 
         def _target(self, context, output):
             output.SetFromVector(self._now.Eval(context)[1])
