@@ -7,6 +7,7 @@ import json
 import signal
 import sys
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -32,6 +33,10 @@ class InputError(ValueError):
         return cls(field, message) if colon else cls("", str(error))
 
 
+class RunError(Exception):
+    """A run that began and could not go on, in one line."""
+
+
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise InputError("command line", f"{message}; see {self.prog} --help")
@@ -47,12 +52,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0 done, 2 bad input, 1 anything else.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     try:
         options = _parser().parse_args(words)
         options.run(options)
     except InputError as error:
-        _complain(error, as_json="--json" in words)
+        _complain(error.field, error.message, as_json="--json" in words)
         return BAD_INPUT
+    except RunError as error:
+        _complain("", str(error), as_json="--json" in words)
+        return FAILED
     except KeyboardInterrupt:
         print("phonotaxis: interrupted; nothing was written", file=sys.stderr)
         return FAILED
@@ -63,12 +72,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return DONE
 
 
-def _complain(error: InputError, *, as_json: bool) -> None:
+def _complain(field: str, message: str, *, as_json: bool) -> None:
     if as_json:
-        document = {"error": {"field": error.field, "message": error.message}}
-        print(json.dumps(document))
-    else:
-        print(f"phonotaxis: {' '.join(str(error).split())}", file=sys.stderr)
+        print(json.dumps({"error": {"field": field, "message": message}}))
+        return
+    text = f"{field}: {message}" if field else message
+    print(f"phonotaxis: {' '.join(text.split())}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -139,31 +148,40 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 def _simulate(options: argparse.Namespace) -> None:
     from analysis.result_directory import choose_directory, whole_directory
     from analysis.run_report import run_summary, summary_text, write_run
-    from diagrams import (
-        build_sound_follower,
-        load_scenario,
-        make_simulator,
-        simulate,
-    )
+    from diagrams import build_sound_follower, load_scenario
 
-    try:
-        out = choose_directory(options.out)
-        scenario = load_scenario(options.scenario, _overrides(options))
-        follower = build_sound_follower(scenario, log=True)
-    except ValueError as error:
-        raise InputError.from_error(error) from None
-    with _Progress(scenario.duration_s) as progress:
-        # Compiled functions load, or at first compile, before the clock starts.
-        make_simulator(follower).AdvanceTo(0.1)
-        result = simulate(scenario, follower=follower, progress=progress)
-    summary = run_summary(result, out)
-    with whole_directory(out) as directory:
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            follower = build_sound_follower(scenario, log=True)
+            # Made before the run: one that cannot be made must not cost a run.
+            directory = stack.enter_context(whole_directory(out))
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        result = _run(scenario, follower)
+        summary = run_summary(result, out)
         write_run(result, summary, directory)
     if options.json:
         print(json.dumps(summary))
     else:
         print(summary_text(result, summary))
         print(f"{'results':<21} {out}")
+
+
+def _run(scenario: Any, follower: Any) -> Any:
+    """Simulates; what stops the run midway becomes one line."""
+    from diagrams import make_simulator, simulate
+
+    try:
+        with _Progress(scenario.duration_s) as progress:
+            # Compiled functions load, or at first compile, before the clock starts.
+            make_simulator(follower).AdvanceTo(0.1)
+            return simulate(scenario, follower=follower, progress=progress)
+    except ValueError as error:
+        raise RunError(str(error)) from error
+    except SystemExit as error:
+        raise RunError("Drake ended the run; its message is above") from error
 
 
 class _Progress:
@@ -186,7 +204,8 @@ class _Progress:
         self._interrupted = False
 
     def __enter__(self) -> _Progress:
-        self._handler = signal.signal(signal.SIGINT, self._interrupt)
+        signals = (signal.SIGINT, signal.SIGTERM)
+        self._handlers = {s: signal.signal(s, self._interrupt) for s in signals}
         return self
 
     def _interrupt(self, *_: Any) -> None:
@@ -198,7 +217,8 @@ class _Progress:
             raise KeyboardInterrupt
 
     def __exit__(self, *exception: Any) -> None:
-        signal.signal(signal.SIGINT, self._handler)
+        for number, handler in self._handlers.items():
+            signal.signal(number, handler)
         self._bar.close()
 
 

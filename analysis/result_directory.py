@@ -52,8 +52,13 @@ def whole_directory(path: Path) -> Iterator[Path]:
     even parents that were made for it.
     """
     made = [p for p in path.absolute().parents if not p.exists()]
-    path.parent.mkdir(parents=True, exist_ok=True)
-    partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
+    except OSError as error:
+        raise ValueError(
+            f"out: {path} cannot be made ({error.strerror}); name another directory"
+        ) from None
     try:
         yield partial
         partial.chmod(0o777 & ~_umask())

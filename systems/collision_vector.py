@@ -176,12 +176,14 @@ def declare_collision_ports(system, slots):
     for index, (name, size) in enumerate(
         (("collision_vectors_B", 2 * SLOTS), ("mask", SLOTS), ("features", SLOTS))
     ):
+
+        def calc(context, output, index=index):
+            output.SetFromVector(slots.Eval(context)[index])
+
         system.DeclareVectorOutputPort(
             name=name,
             size=size,
-            calc=lambda context, output, index=index: output.SetFromVector(
-                slots.Eval(context)[index]
-            ),
+            calc=calc,
             prerequisites_of_calc={slots.ticket()},
         )
 

@@ -215,9 +215,9 @@ class ImpedanceLoop:
 
     def _sum_forces(self, context):
         """(F_m, F_b, s of each slot, [(feature, C_x, C_y)] in W)."""
-        target, valid, vectors, features, pose, v_WP = (
+        target, valid, vectors, features, pose, v_WP = [
             port.Eval(context).tolist() for port in self._inputs
-        )
+        ]
         F_m = attraction_force(
             control_point(pose, self._robot.control_point_m),
             v_WP,

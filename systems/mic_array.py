@@ -154,10 +154,12 @@ class MicArray(LeafSystem):
             },
         )
 
-    def _remember(self, context, discrete_state) -> None:
-        pose = np.asarray(self._pose_WB.Eval(context))
-        velocity = np.asarray(self._velocity_WB.Eval(context))
-        discrete_state.set_value(np.concatenate(([context.get_time()], pose, velocity)))
+    def _remember(self, context, discrete_state):
+        state = np.empty(7)
+        state[0] = context.get_time()
+        state[1:4] = self._pose_WB.Eval(context)
+        state[4:] = self._velocity_WB.Eval(context)
+        discrete_state.set_value(state)
 
     def _record(self, context, output) -> None:
         emission = self._emission.Eval(context)

@@ -118,7 +118,7 @@ def WheelSpeedCommand_(T):
 
         def _update(self, context, discrete_state):
             v_WP = integrate_velocity(
-                self._state(context).tolist()[:2],
+                self._state(context)[:2].tolist(),
                 self._acceleration.Eval(context).tolist(),
                 FRAME_PERIOD_S,
                 self._robot.top_speed_m_s,

@@ -188,7 +188,32 @@ def test_json_document_and_result_directory(capsys, tmp_path):
     assert (again / table).read_bytes() == (out / table).read_bytes()
 
 
-def test_interrupt_leaves_nothing_behind(tmp_path):
+def test_directory_that_cannot_be_made_is_refused_before_the_run(capsys):
+    long = ["--set", "duration_s=100000"]
+    status, _, complaint = call(capsys, "simulate", *long, "--out", "/proc/out")
+    assert status == 2
+    assert len(complaint.splitlines()) == 1
+    assert "phonotaxis: out: /proc/out" in complaint
+
+
+def test_a_law_that_gives_nan_stops_the_run_with_one_line(
+    capsys, tmp_path, monkeypatch
+):
+    (tmp_path / "nan_laws.py").write_text(
+        "def nowhere(c, s, repulsion):\n    return c * float('nan')\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    out = tmp_path / "out"
+    words = ["simulate", "--law", "nan_laws:nowhere", "--out", str(out)]
+    status, printed, complaint = call(capsys, *words)
+    assert (status, printed) == (1, "")
+    assert len(complaint.splitlines()) == 1
+    assert "not finite" in complaint
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
+def test_interrupt_leaves_nothing_behind(tmp_path, kind):
     out = tmp_path / "results" / "run"
     root = Path(phonotaxis.__file__).parent
     process = subprocess.Popen(
@@ -208,7 +233,7 @@ def test_interrupt_leaves_nothing_behind(tmp_path):
         text=True,
     )
     time.sleep(6.0)
-    process.send_signal(signal.SIGINT)
+    process.send_signal(kind)
     _, complaint = process.communicate(timeout=30)
     assert process.returncode == 1
     assert "interrupted" in complaint
