@@ -149,12 +149,14 @@ def fold_estimate(
     """
     x_P, y_P = control_point(pose, control_point_m)
     x, y = estimate.p_PS_B
+    candidates, covariance = track.candidates, estimate.covariance
     if not estimate.ranged:
         kept = _kept_range(track, x_P, y_P, tracker)
         x, y = x * kept, y * kept
+        # Across the bearing only: nothing is known of the error of a kept range.
+        covariance = [kept * kept * value for value in covariance]
     dx, dy = rotate(pose[2], x, y)
     target = [x_P + dx, y_P + dy]
-    candidates, covariance = track.candidates, estimate.covariance
     dx, dy = rotate(pose[2], -x, y)
     mirrored = [x_P + dx, y_P + dy]
     places = [target, mirrored] if tracker.resolve_front_back else [target]

@@ -128,6 +128,15 @@ def test_first_bearing_alone_uses_the_assumed_range(bench):
     np.testing.assert_allclose(at.output("p_WS_estimated"), expected, atol=1e-12)
 
 
+def test_covariance_of_a_bearing_grows_with_the_range_it_is_given(bench):
+    """0.01 rad across, at 3 m: 0.03 m; facing north, across is along x of W."""
+    at = make_bench(bench)
+    covariance = [0.0, 0.0, 0.0, 1e-4]
+    hear(at, p_PS_B=[1.0, 0.0], covariance=covariance, range_valid=[0.0])
+    expected = [9e-4, 0.0, 0.0, 0.0]
+    np.testing.assert_allclose(at.output("covariance_W"), expected, atol=1e-15)
+
+
 @pytest.mark.parametrize("hold", ["world", "robot"])
 def test_later_bearings_keep_the_last_range(bench, hold):
     tracker = TrackerParameters(hold=hold, resolve_front_back=False, jump_m=1.0)
