@@ -202,11 +202,17 @@ def test_clearance_against_sampled_edges(a, b):
         assert sampled <= exact + 0.02
 
 
-@given(rectangles, rectangles)
-def test_overlap_is_undone_by_its_depth(a, b):
-    """The shortest push along an edge's normal, found by trying all of them."""
+@given(rectangles, angle, extent, extent, st.floats(-0.4, 0.4), st.floats(-0.4, 0.4))
+def test_overlap_is_undone_by_its_depth(a, heading, length, width, u, v):
+    """The shortest push along an edge's normal, found by trying all of them.
+
+    The second centre lies inside the first rectangle, so that they overlap.
+    """
+    c, s = math.cos(a[2]), math.sin(a[2])
+    x, y = a[0] + c * u * a[3] - s * v * a[4], a[1] + s * u * a[3] + c * v * a[4]
+    b = (x, y, heading, length, width)
     depth = -clearance(a, b)
-    assume(depth > 1e-6)
+    assert depth > 0.0
     normals = [body[2] + k * math.pi / 2 for body in (a, b) for k in range(4)]
     after = []
     for normal in normals:
