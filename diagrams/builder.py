@@ -151,9 +151,7 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
             "hearing": IdealSourceSensor(
                 robot=scenario.robot,
                 hearing=scenario.ideal_hearing,
-                on_s=scenario.sound.on_s,
-                period_s=scenario.sound.period_s,
-                start_s=scenario.sound.start_s,
+                sound=scenario.sound,
                 seed=block_seed(scenario.seed, "ideal_source_sensor"),
             )
         }

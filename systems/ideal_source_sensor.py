@@ -14,6 +14,7 @@ from systems.noise import tick_generator
 from systems.parameters import NonNegative, Parameters, Positive
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
+from systems.waveforms import SoundParameters
 
 __all__ = [
     "IdealHearingParameters",
@@ -69,7 +70,7 @@ def IdealSourceSensor_(T):
         Args:
             robot: Place of P.
             hearing: ``IdealHearingParameters``.
-            on_s, period_s, start_s: The gate of the sound, s.
+            sound: ``SoundParameters``; its gate says when there is sound.
             seed: Seed of the noise.
 
         Raises:
@@ -81,9 +82,7 @@ def IdealSourceSensor_(T):
             *,
             robot=None,
             hearing=None,
-            on_s=0.5,
-            period_s=2.0,
-            start_s=0.0,
+            sound=None,
             seed=0,
             converter=None,
         ):
@@ -91,9 +90,7 @@ def IdealSourceSensor_(T):
             self._config = {
                 "robot": robot or RobotParameters(),
                 "hearing": hearing or IdealHearingParameters(),
-                "on_s": on_s,
-                "period_s": period_s,
-                "start_s": start_s,
+                "sound": sound or SoundParameters(),
                 "seed": seed,
             }
             self._hearing = self._config["hearing"]
@@ -135,12 +132,7 @@ def IdealSourceSensor_(T):
             return context.get_discrete_state(0).CopyToVector().tolist()
 
         def _sounds(self, time: float) -> bool:
-            if not self._hearing.burst_gaps:
-                return True
-            phase = time - self._config["start_s"]
-            return (
-                phase >= 0.0 and phase % self._config["period_s"] < self._config["on_s"]
-            )
+            return not self._hearing.burst_gaps or self._config["sound"].sounds(time)
 
         def _measure(self, context, discrete_state):
             x, y = relative_position(

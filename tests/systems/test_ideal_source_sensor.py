@@ -15,6 +15,7 @@ from systems.ideal_source_sensor import (
     relative_position,
 )
 from systems.robot import RobotParameters
+from systems.waveforms import SoundParameters
 
 ALWAYS = IdealHearingParameters(burst_gaps=False)
 place = st.floats(-5.0, 5.0)
@@ -80,7 +81,9 @@ def test_hears_the_frames_that_end_within_the_burst(bench):
 
 
 def test_gate_is_set_by_its_parameters(bench):
-    heard = heard_ticks(bench, 90, on_s=0.1, period_s=1.0, start_s=0.5)
+    heard = heard_ticks(
+        bench, 90, sound=SoundParameters(on_s=0.1, period_s=1.0, start_s=0.5)
+    )
     assert heard == [*range(21, 25), *range(61, 65)]
 
 
@@ -142,7 +145,9 @@ def test_gradient_of_the_measurement(bench, check_gradient):
         return at.updated()
 
     robot = RobotParameters(control_point_m=0.2)
-    block = IdealSourceSensor(robot=robot, on_s=0.2, period_s=1.0)
+    block = IdealSourceSensor(
+        robot=robot, sound=SoundParameters(on_s=0.2, period_s=1.0)
+    )
     check_gradient(block, respond, [0.3, -0.2, 0.8, 2.0, 1.1])
 
 
