@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.scenario import robot_rectangle
+from diagrams.scenario import Body, robot_rectangle
 from diagrams.simulation import RunResult
 from systems.geometry import rectangle_clearance
 
@@ -29,10 +29,9 @@ def clearance(result: RunResult) -> NDArray[np.float64]:
     Returns:
         (n,) m; negative depth where they overlap.
     """
-    times, poses = result.time, _poses(result)
-    return np.array(
-        [_clearance_at(result, t, pose) for t, pose in zip(times, poses, strict=True)]
-    )
+    bodies, poses = _bodies(result), result.poses("WB")
+    ticks = zip(result.time, poses, strict=True)
+    return np.array([_clearance_at(result, bodies, t, pose) for t, pose in ticks])
 
 
 def minimum_clearance(result: RunResult, at_ticks: NDArray[np.float64]) -> float:
@@ -41,14 +40,14 @@ def minimum_clearance(result: RunResult, at_ticks: NDArray[np.float64]) -> float
     A tick's clearance says little about a box that passes in 25 ms; where it
     is below ``NEAR_M`` the poses are interpolated to a tenth of a tick.
     """
-    times, poses = result.time, _poses(result)
+    bodies, times, poses = _bodies(result), result.time, result.poses("WB")
     least = float(np.min(at_ticks))
     near = np.flatnonzero(np.minimum(at_ticks[:-1], at_ticks[1:]) < NEAR_M)
     for k in near:
         for part in np.arange(1, BETWEEN_TICKS) / BETWEEN_TICKS:
             time = times[k] + part * (times[k + 1] - times[k])
             pose = poses[k] + part * (poses[k + 1] - poses[k])
-            least = min(least, _clearance_at(result, time, pose))
+            least = min(least, _clearance_at(result, bodies, time, pose))
     return least
 
 
@@ -109,25 +108,15 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
     }
 
 
-def _poses(result: RunResult) -> NDArray[np.float64]:
-    columns = result.columns
-    return np.stack([columns["p_WB_x"], columns["p_WB_y"], columns["theta_WB"]], axis=1)
+def _bodies(result: RunResult) -> list[Body]:
+    return list(result.scenario.bodies().values())
 
 
-def _clearance_at(result: RunResult, time: float, pose: NDArray[np.float64]) -> float:
-    scenario = result.scenario
-    footprint = robot_rectangle(pose, scenario.robot)
-    return min(
-        rectangle_clearance(footprint, np.array([*path.pose(time), *size]))
-        for path, size in bodies_of(result)
-    )
-
-
-def bodies_of(result: RunResult) -> list[tuple[Any, tuple[float, float]]]:
-    """(path, size) of every body that the robot can hit."""
-    scenario = result.scenario
-    bodies = [(o.path(), o.size_m) for o in scenario.obstacles]
-    return [*bodies, (scenario.source.path(), scenario.source_size)]
+def _clearance_at(
+    result: RunResult, bodies: list[Body], time: float, pose: NDArray[np.float64]
+) -> float:
+    footprint = robot_rectangle(pose, result.scenario.robot)
+    return min(rectangle_clearance(footprint, body.rectangle(time)) for body in bodies)
 
 
 def _mean(flags: NDArray[np.bool_]) -> float | None:

@@ -16,7 +16,7 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from analysis import replay_scene
 from analysis.replay_scene import upright
-from analysis.scene import moving_and_static, poses, sound_bursts
+from analysis.scene import moving_and_static, sound_bursts
 from diagrams import RunResult
 from systems.signals import FRAME_PERIOD_S
 
@@ -140,7 +140,7 @@ def _record_switch(
 def _record_robot(
     meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
 ) -> None:
-    path = _at_frames(result, poses(result, "WB"), frames)
+    path = _at_frames(result, result.poses("WB"), frames)
     _record_path(meshcat, "robot", frames, path)
     for side, angles in wheel_angles(result).items():
         turned = np.interp(frames, result.time, angles)
@@ -157,7 +157,7 @@ def _record_robot(
 
 def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
     """Angles of wheels that roll without slip on the robot's path, (n,) rad."""
-    robot, path = result.scenario.robot, poses(result, "WB")
+    robot, path = result.scenario.robot, result.poses("WB")
     theta = np.unwrap(path[:, 2])
     between = 0.5 * (theta[1:] + theta[:-1])
     steps = np.diff(path[:, :2], axis=0)
@@ -172,7 +172,7 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
 def _record_source(
     meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
 ) -> None:
-    path = _at_frames(result, poses(result, "WS"), frames)
+    path = _at_frames(result, result.poses("WS"), frames)
     if not result.scenario.source.path().moves:
         frames, path = frames[:1], path[:1]
     _record_path(meshcat, "source", frames, path)

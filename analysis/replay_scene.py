@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from analysis.scene import COLOURS, bounds, microphone_places, sensor_pose
+from analysis.scene import COLOURS, bounds, sensor_pose
 from diagrams import RunResult, Scenario
+from systems.mic_array import microphones_B
 
 __all__ = [
     "RINGS",
@@ -174,7 +175,7 @@ def _add_microphones(meshcat: Meshcat, scenario: Scenario) -> None:
     middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
     meshcat.SetObject("robot/mast", mast, Rgba(0.35, 0.35, 0.38))
     meshcat.SetTransform("robot/mast", upright(x, 0.0, middle))
-    for number, (x_M, y_M) in enumerate(microphone_places(scenario), start=1):
+    for number, (x_M, y_M) in enumerate(microphones_B(scenario.robot), start=1):
         path = f"robot/microphone_{number}"
         meshcat.SetObject(path, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
         meshcat.SetTransform(path, upright(x_M, y_M, MICROPHONE_HEIGHT_M))

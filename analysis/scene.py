@@ -17,10 +17,8 @@ __all__ = [
     "bounds",
     "compose",
     "contact_point",
-    "microphone_places",
     "moving_and_static",
     "picture_times",
-    "poses",
     "sensor_pose",
     "sound_bursts",
     "tick_at",
@@ -45,12 +43,6 @@ COLOURS = {
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
 
 
-def poses(result: RunResult, body: str) -> NDArray[np.float64]:
-    """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
-    names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
-    return np.stack([result.columns[name] for name in names], axis=1)
-
-
 def tick_at(result: RunResult, time: float) -> int:
     """Index of the tick nearest to a time in s."""
     return int(np.argmin(np.abs(result.time - time)))
@@ -68,13 +60,6 @@ def sound_bursts(scenario: Scenario, end: float) -> list[tuple[float, float]]:
     sound = scenario.sound
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
-
-
-def microphone_places(scenario: Scenario) -> NDArray[np.float64]:
-    """p_BM: (3, 2) microphones from left to right, m."""
-    robot = scenario.robot
-    spread = np.array([1.0, 0.0, -1.0]) * robot.microphone_spacing_m
-    return np.column_stack([np.full(3, robot.control_point_m), spread])
 
 
 def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
@@ -106,7 +91,7 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
     Estimates do not count: a wild one would shrink all else.
     """
     scenario, times = result.scenario, picture_times(result, most=60)
-    centres = [poses(result, "WB")[:, :2], poses(result, "WS")[:, :2]]
+    centres = [result.poses("WB")[:, :2], result.poses("WS")[:, :2]]
     for obstacle in scenario.obstacles:
         path = obstacle.path()
         centres.append(np.array([path.pose(t)[:2] for t in times]))
@@ -127,11 +112,8 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     hit, scenario = result.collision, result.scenario
     if hit is None:
         raise ValueError(f"contact_point: the run ended by {result.cause!r}")
-    boxes = {o.name: (o.path(), o.size_m) for o in scenario.obstacles}
-    boxes["source"] = (scenario.source.path(), scenario.source_size)
-    path, size = boxes[hit.object]
-    body = np.array([*path.pose(hit.time), *size])
-    pose = poses(result, "WB")[tick_at(result, hit.time)]
+    body = scenario.bodies()[hit.object].rectangle(hit.time)
+    pose = result.poses("WB")[tick_at(result, hit.time)]
     footprint = robot_rectangle(pose, scenario.robot)
     corners = np.concatenate([rectangle_corners(footprint), rectangle_corners(body)])
     others = [body] * 4 + [footprint] * 4

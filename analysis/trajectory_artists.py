@@ -15,16 +15,15 @@ from analysis.scene import (
     COLOURS,
     compose,
     contact_point,
-    microphone_places,
     moving_and_static,
     picture_times,
-    poses,
     sensor_pose,
     tick_at,
 )
 from diagrams import RunResult
 from diagrams.scenario import robot_rectangle
 from systems.geometry import rectangle_corners, rotate
+from systems.mic_array import microphones_B
 
 __all__ = [
     "draw_collision",
@@ -47,7 +46,7 @@ def times_apart(result: RunResult) -> list[float]:
 
     The end of the run is always one of them.
     """
-    path, end = poses(result, "WB"), result.simulated_s
+    path, end = result.poses("WB"), result.simulated_s
     kept: list[float] = []
     for time in picture_times(result):
         if not kept or _apart(result, path, kept[-1], time):
@@ -79,9 +78,9 @@ def draw_robot(axes: Axes, result: RunResult, times: list[float]) -> None:
         label="path of the control point P",
         zorder=4,
     )
-    microphones = microphone_places(scenario)
+    microphones = microphones_B(scenario.robot)
     for index, time in enumerate(times):
-        pose = poses(result, "WB")[tick_at(result, time)]
+        pose = result.poses("WB")[tick_at(result, time)]
         corners = rectangle_corners(robot_rectangle(pose, scenario.robot))
         label = "robot with its microphones" if index == 0 else None
         patch = Polygon(
@@ -122,7 +121,7 @@ def _write_time(
 
 def draw_source(axes: Axes, result: RunResult, times: list[float]) -> None:
     """The path of the source, its body at both ends, dots at some times, s."""
-    colour, path = COLOURS["source"], poses(result, "WS")
+    colour, path = COLOURS["source"], result.poses("WS")
     axes.plot(
         path[:, 0], path[:, 1], "--", color=colour, label="path of the source", zorder=3
     )
@@ -212,7 +211,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
         tick = tick_at(result, time)
         for sensor in range(3):
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
-            pose = poses(result, "WB")[tick]
+            pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
             axis = math.degrees(theta)
             wedge = Wedge(

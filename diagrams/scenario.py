@@ -7,7 +7,7 @@ one name, one default and one legal range. See ``load_scenario`` for YAML.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,6 +22,7 @@ from systems.impedance import AttractionParameters, RepulsionParameters
 from systems.mic_array import MicArrayParameters
 from systems.obstacles import ObstacleParameters
 from systems.parameters import NonNegative, Parameters, Point, Positive
+from systems.paths import WaypointPath
 from systems.robot import RobotParameters
 from systems.source_robot import SourceRobotParameters
 from systems.source_tracker import TrackerParameters
@@ -30,7 +31,7 @@ from systems.ultrasonic_array import UltrasonicParameters
 from systems.waveforms import SoundParameters
 from systems.wheel_odometry import OdometryParameters
 
-__all__ = ["Scenario", "StartParameters", "StopParameters"]
+__all__ = ["Body", "Scenario", "StartParameters", "StopParameters"]
 
 
 class StartParameters(Parameters):
@@ -72,6 +73,19 @@ class IntegratorParameters(Parameters):
     step a tick stays within 20 um of the true path over 20 s."""
     step_s: float = Field(default=0.025, gt=0.0, le=0.025)
     """Largest step, s."""
+
+
+class Body(NamedTuple):
+    """A rectangle that moves along a path."""
+
+    path: WaypointPath
+    """Pose of its centre over time."""
+    size: tuple[float, float]
+    """Length and width, m."""
+
+    def rectangle(self, time: float) -> NDArray[np.float64]:
+        """(5,) x, y, theta, length, width in W at a time in s."""
+        return np.array([*self.path.pose(time), *self.size])
 
 
 class Scenario(Parameters):
@@ -119,6 +133,12 @@ class Scenario(Parameters):
         """Length and width of the master robot, m."""
         return self.source.length_m, self.source.width_m
 
+    def bodies(self) -> dict[str, Body]:
+        """All that the robot can hit, by name: the obstacles, then ``source``."""
+        bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
+        bodies["source"] = Body(self.source.path(), self.source_size)
+        return bodies
+
     @property
     def goal_radius_m(self) -> NonNegative:
         """A resting source is reached within this distance of P, m."""
@@ -150,13 +170,11 @@ class Scenario(Parameters):
     @model_validator(mode="after")
     def _check_start(self) -> Scenario:
         footprint = robot_rectangle(self.start.pose, self.robot)
-        bodies = [
-            (f"obstacles.{k} ({o.name!r})", (*o.path().pose(0.0), *o.size_m))
-            for k, o in enumerate(self.obstacles)
-        ]
-        bodies.append(("source", (*self.source.path().pose(0.0), *self.source_size)))
-        for field, body in bodies:
-            if rectangle_clearance(footprint, np.array(body)) < 0.0:
+        fields = [f"obstacles.{k} ({o.name!r})" for k, o in enumerate(self.obstacles)]
+        for field, body in zip(
+            [*fields, "source"], self.bodies().values(), strict=True
+        ):
+            if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
                 raise ValueError(
                     f"{field}: stands on the robot's start at {self.start.position_m}; "
                     "move its first waypoint or start.position_m"

@@ -81,6 +81,11 @@ class RunResult:
         """(n,) s."""
         return self.columns["t"]
 
+    def poses(self, body: str) -> NDArray[np.float64]:
+        """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
+        names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
+        return np.stack([self.columns[name] for name in names], axis=1)
+
     @property
     def simulated_s(self) -> float:
         """Simulated time, s."""

@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
-from diagrams.scenario import robot_rectangle
+from diagrams.scenario import Body, robot_rectangle
 from systems.geometry import control_point, rectangle_clearance
 from systems.signals import FRAME_PERIOD_S
 
@@ -42,7 +42,7 @@ class StopRules:
     follower: SoundFollower
     cause: str = ""
     collision: Collision | None = None
-    _bodies: list[tuple[str, Any, tuple[float, float]]] = field(default_factory=list)
+    _bodies: dict[str, Body] = field(default_factory=dict)
     _pose: list[float] | None = None
     _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
     _valid_time: float = 0.0
@@ -50,9 +50,8 @@ class StopRules:
 
     def __post_init__(self) -> None:
         scenario = self.follower.scenario
-        self._bodies = [(o.name, o.path(), o.size_m) for o in scenario.obstacles]
-        self._bodies.append(("source", scenario.source.path(), scenario.source_size))
-        self._source_rests = not scenario.source.path().moves
+        self._bodies = scenario.bodies()
+        self._source_rests = not self._bodies["source"].path.moves
         self._plant = self.follower.blocks["plant"]
         self._tracker = self.follower.blocks["tracker"]
         self._pose_port = self.follower.port("plant", "pose_WB")
@@ -90,7 +89,7 @@ class StopRules:
             return "collision"
         offset = self.follower.scenario.robot.control_point_m
         x_P, y_P = control_point(pose, offset)
-        x_S, y_S, _ = self._bodies[-1][1].pose(time)
+        x_S, y_S, _ = self._bodies["source"].path.pose(time)
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
@@ -115,18 +114,18 @@ class StopRules:
     def _find_collision(self, time: float, pose: list[float]) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first = None
-        for name, path, size in self._bodies:
-            x, y, _ = path.pose(time)
-            reach = self._reach + 0.5 * math.hypot(*size)
+        for name, body in self._bodies.items():
+            x, y, _ = body.path.pose(time)
+            reach = self._reach + 0.5 * math.hypot(*body.size)
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue
-            instant = self._first_contact(time, pose, path, size)
+            instant = self._first_contact(time, pose, body)
             if instant is not None and (first is None or instant < first.time):
-                first = Collision(name, self._fault(time, pose, path), instant)
+                first = Collision(name, self._fault(time, pose, body.path), instant)
         return first
 
     def _first_contact(
-        self, time: float, pose: list[float], path: Any, size: tuple[float, float]
+        self, time: float, pose: list[float], body: Body
     ) -> float | None:
         now = np.array(pose)
         before = now if self._pose is None else np.array(self._pose)
@@ -134,8 +133,7 @@ class StopRules:
         for part in np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS:
             instant = self._time + part * (time - self._time)
             footprint = robot_rectangle(before + part * (now - before), robot)
-            body = np.array([*path.pose(instant), *size])
-            if rectangle_clearance(footprint, body) < 0.0:
+            if rectangle_clearance(footprint, body.rectangle(instant)) < 0.0:
                 return float(instant)
         return None
 
