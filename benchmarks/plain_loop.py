@@ -34,7 +34,7 @@ from systems.source_tracker import (
     held_target,
     past_pose,
 )
-from systems.tdoa_estimator import localise
+from systems.tdoa_estimator import localise, row_spacing
 from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
 from systems.waveforms import make_waveform
 from systems.wheel_odometry import advance_pose, encoder_angle
@@ -57,21 +57,21 @@ class PlainLoop:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         c = scenario.acoustics.c
-        spacing = scenario.robot.microphone_spacing_m
+        self.spacing = row_spacing(scenario.robot)
         self.path = scenario.source.path()
         self.obstacles = [o.path() for o in scenario.obstacles]
         self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
         seed = block_seed(scenario.seed, "sound_emitter")
         self.waveform = make_waveform(scenario.sound, seed)
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
-        self.instants = frame_instants(scenario.microphones)
         self.p_BM = microphones_B(scenario.robot)
+        self.instants = frame_instants(scenario.microphones, len(self.p_BM))
         self.mic_seed = block_seed(scenario.seed, "mic_array")
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,
             frame_samples=round(T * SAMPLE_RATE_HZ),
-            max_delay_s=spacing / c,
+            max_delay_s=self.spacing / c,
             low_hz=scenario.tdoa.low_hz,
             high_hz=scenario.tdoa.high_hz,
         )
@@ -199,9 +199,8 @@ class PlainLoop:
         )
         history[:-1] = history[1:]
         frame = audio.counts.astype(np.float32)
-        spacing = scenario.robot.microphone_spacing_m
         c = scenario.acoustics.c
-        return localise(frame, self.plan, scenario.tdoa, spacing, c), now
+        return localise(frame, self.plan, scenario.tdoa, self.spacing, c), now
 
     def _drive(self, state: Any, wheels: Any) -> Any:
         """One third-order Runge-Kutta step, the one that Drake takes."""

@@ -13,9 +13,7 @@ from systems.noise import tick_generator
 from systems.parameters import Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
-__all__ = ["MicArrayParameters", "convert", "frame_noise"]
-
-_Triple = Annotated[tuple[float, float, float], Strict(False)]
+__all__ = ["MicArrayParameters", "channel_skew", "convert", "frame_noise"]
 
 
 class MicArrayParameters(Parameters):
@@ -35,8 +33,11 @@ class MicArrayParameters(Parameters):
     """Voltage at which the converter clips, V, of either sign."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
-    channel_skew_s: _Triple = (0.0, 0.0, 0.0)
-    """Time by which each channel is sampled later, s; below one sample."""
+    channel_skew_s: Annotated[tuple[float, ...], Strict(False)] = ()
+    """Time by which each channel is sampled later, s; below one sample.
+
+    One time for each microphone, or none where all are sampled at once.
+    """
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -57,6 +58,21 @@ class MicArrayParameters(Parameters):
         """Counts for one pascal."""
         gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
         return gain * self.full_scale / self.adc_full_scale_v
+
+
+def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
+    """(count,) s by which each channel is sampled later.
+
+    Raises:
+        ValueError: The skew is given for another number of channels.
+    """
+    skew = parameters.channel_skew_s
+    if len(skew) not in (0, count):
+        raise ValueError(
+            f"microphones.channel_skew_s: {skew} has {len(skew)} times for {count} "
+            "microphones; give one for each, or []"
+        )
+    return np.array(skew) if skew else np.zeros(count)
 
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:

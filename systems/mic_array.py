@@ -1,4 +1,4 @@
-"""Three microphones in a row, with their converter."""
+"""The robot's microphones, with their converter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.adc import MicArrayParameters, channel_skew, convert, frame_noise
 from systems.propagation import microphone_paths, propagate
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame, Emission
@@ -34,15 +34,25 @@ _SAME_INSTANT_S = 1e-6
 
 
 def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
-    """(3, 2) microphones M1 (left), M2, M3 (right) in B, m."""
-    x, spacing = robot.control_point_m, robot.microphone_spacing_m
-    return np.array([[x, spacing], [x, 0.0], [x, -spacing]])
+    """(n, 2) microphones in B, m, in the order of the channels."""
+    return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
 
 
-def frame_instants(parameters: MicArrayParameters) -> NDArray[np.float64]:
-    """(3, knots) instants of each channel's knots from the frame's start, s."""
-    skew = np.reshape(parameters.channel_skew_s, (3, 1))
-    return np.linspace(0.0, FRAME_PERIOD_S, _KNOTS) + skew
+def frame_instants(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
+    """Instants of each channel's knots from the frame's start.
+
+    Args:
+        parameters: Skew of the channels.
+        count: Number of channels n.
+
+    Returns:
+        (n, knots) s.
+
+    Raises:
+        ValueError: The skew is given for another number of channels.
+    """
+    skew = channel_skew(parameters, count)
+    return np.linspace(0.0, FRAME_PERIOD_S, _KNOTS) + skew[:, None]
 
 
 def record_frame(
@@ -65,7 +75,7 @@ def record_frame(
         before: Pose and velocity of the robot a frame ago, (3,) each.
         now: Pose and velocity of the robot now.
         instants: From ``frame_instants``.
-        p_BM: (3, 2) microphones in B, m.
+        p_BM: (n, 2) microphones in B, m.
         c: Speed of sound, m/s.
         parameters: Microphones, amplifier and converter.
         seed: Seed of the noise.
@@ -89,7 +99,7 @@ def record_frame(
 
 
 class MicArray(LeafSystem):
-    """Records the sound at three microphones.
+    """Records the sound at the robot's microphones.
 
     .. pydrake_system::
 
@@ -130,7 +140,7 @@ class MicArray(LeafSystem):
         self._p_BM = microphones_B(robot or RobotParameters())
         self._c = (acoustics or AcousticParameters()).c
         self._seed = seed
-        self._instants = frame_instants(self._parameters)
+        self._instants = frame_instants(self._parameters, len(self._p_BM))
         self.set_name("mic_array")
         self._emission = self.DeclareAbstractInputPort(
             name="emission", model_value=Value(object())

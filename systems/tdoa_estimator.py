@@ -19,7 +19,7 @@ from systems.parameters import Fraction, Parameters, Positive
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
 
-__all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise"]
+__all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise", "row_spacing"]
 
 
 class TDOAParameters(Parameters):
@@ -49,6 +49,23 @@ class TDOAParameters(Parameters):
                 f"low_hz: {self.low_hz:g} must be below high_hz = {self.high_hz:g}"
             )
         return self
+
+
+def row_spacing(robot: RobotParameters) -> float:
+    """Distance between neighbours of three microphones across the robot, m.
+
+    Raises:
+        ValueError: The microphones are no such row from left to right.
+    """
+    places = robot.microphones_m
+    spacing = (places[0][1] - places[-1][1]) / 2.0
+    row = ((0.0, spacing), (0.0, 0.0), (0.0, -spacing))
+    if len(places) != 3 or spacing <= 0.0 or not np.allclose(places, row, 0.0, 1e-9):
+        raise ValueError(
+            f"robot.microphones_m: {places} is not a row of three from "
+            "left to right with P in its middle; TDOAEstimator needs one"
+        )
+    return spacing
 
 
 def is_heard(delays: DelayEstimate | None, parameters: TDOAParameters) -> bool:
@@ -141,7 +158,7 @@ class TDOAEstimator(LeafSystem):
     ) -> None:
         super().__init__()
         self._parameters = parameters or TDOAParameters()
-        self._spacing = (robot or RobotParameters()).microphone_spacing_m
+        self._spacing = row_spacing(robot or RobotParameters())
         self._c = (acoustics or AcousticParameters()).c
         self._plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,

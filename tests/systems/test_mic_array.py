@@ -65,6 +65,18 @@ def test_microphones_from_left_to_right():
     np.testing.assert_allclose(microphones_B(RobotParameters()), expected)
 
 
+def test_any_number_of_microphones_stands_where_it_is_put():
+    """Five at random places: each hears the tone by its own distance from S."""
+    places = np.random.default_rng(2).uniform(-0.3, 0.3, (5, 2))
+    robot = RobotParameters(microphones_m=tuple(map(tuple, places.tolist())))
+    audio = recorded(emission((1.5, 1.2)), parameters=quiet(), robot=robot)
+    ranges = np.linalg.norm([1.5 - 0.175, 1.2] - places, axis=1)
+    phases, _ = phase_and_amplitude(audio.counts)
+    np.testing.assert_allclose(
+        np.exp(1j * phases), np.exp(-2j * np.pi * TONE * ranges / 340.0), atol=1e-3
+    )
+
+
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (1.0, -0.5, 2.2)])
 def test_phases_and_levels_of_a_resting_source(pose):
     """The source is ahead and to the left of the robot: M1 is nearest."""
@@ -180,6 +192,11 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
     expected *= 0.1 * math.sqrt(2) * quiet().counts_per_pa
     # 3 mm are 5 % of the tone's phase; 0.2 % of the amplitude is noise.
     np.testing.assert_allclose(counts, expected, atol=2e-3 * expected.max())
+
+
+def test_skew_of_another_number_of_channels_is_refused():
+    with pytest.raises(ValueError, match=r"microphones\.channel_skew_s.*3 microph"):
+        MicArray(parameters=MicArrayParameters(channel_skew_s=(0.0, 1e-6)))
 
 
 def test_wrong_emission_is_refused():

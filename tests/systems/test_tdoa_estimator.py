@@ -12,6 +12,7 @@ from pydrake.common.value import Value
 
 from systems.adc import MicArrayParameters, convert, frame_noise
 from systems.delay_plan import DelayPlan
+from systems.robot import RobotParameters
 from systems.signals import AudioFrame
 from systems.tdoa_estimator import TDOAEstimator, TDOAParameters, localise
 
@@ -194,6 +195,19 @@ def test_plane_wave_has_a_bearing_and_no_range():
     assert fix.range == 0.0
     assert math.degrees(fix.bearing) == pytest.approx(20.0, abs=0.1)
     assert math.hypot(*fix.p_MS) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        ((0.0, -0.4), (0.0, 0.0), (0.0, 0.4)),
+        ((0.0, 0.4), (0.1, 0.0), (0.0, -0.4)),
+        ((0.0, 0.4), (0.0, 0.1), (0.0, -0.1), (0.0, -0.4)),
+    ],
+)
+def test_microphones_in_no_row_are_refused(places):
+    with pytest.raises(ValueError, match=r"robot\.microphones_m.*row of three"):
+        TDOAEstimator(robot=RobotParameters(microphones_m=places))
 
 
 def test_wrong_audio_is_refused():
