@@ -15,15 +15,16 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.builder import block_seed
 from systems.active_impedance_controller import active_force
+from systems.array_tolerances import draw_tolerances
 from systems.collision_vector import collision_vectors, echo_points
 from systems.delays import DelayPlan
 from systems.diff_drive_plant import body_twist, plant_derivatives
 from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
-from systems.mic_array import frame_instants, microphones_B, record_frame
+from systems.mic_array import real_array, record_frame
 from systems.near_field import NearFieldFix
-from systems.noise import tick_generator
+from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.sound_emitter import history_ticks, make_emission
 from systems.source_tracker import (
@@ -64,9 +65,14 @@ class PlainLoop:
         seed = block_seed(scenario.seed, "sound_emitter")
         self.waveform = make_waveform(scenario.sound, seed)
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
-        self.p_BM = microphones_B(scenario.robot)
-        self.instants = frame_instants(scenario.microphones, len(self.p_BM))
         self.mic_seed = block_seed(scenario.seed, "mic_array")
+        microphones = scenario.microphones
+        errors = draw_tolerances(
+            microphones,
+            len(scenario.robot.microphones_m),
+            tick_generator(self.mic_seed, BEFORE_THE_RUN),
+        )
+        self.array = real_array(scenario.robot, microphones, errors, c)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,
@@ -191,9 +197,7 @@ class PlainLoop:
             time,
             last,
             now,
-            self.instants,
-            self.p_BM,
-            scenario.acoustics.c,
+            self.array,
             parameters=scenario.microphones,
             seed=self.mic_seed,
         )

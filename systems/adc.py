@@ -6,7 +6,7 @@ from typing import Annotated
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.noise import tick_generator
@@ -38,6 +38,16 @@ class MicArrayParameters(Parameters):
 
     One time for each microphone, or none where all are sampled at once.
     """
+
+    position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
+    """Each microphone stands off its place by up to this in x and in y, m.
+
+    This error and the next two are uniform, and drawn once from the seed.
+    """
+    delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
+    """Each channel is sampled up to this earlier or later, s."""
+    gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
+    """The gain of each channel, noise included, is off by up to this, dB."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -81,8 +91,9 @@ def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.floa
 
 
 @njit(cache=True)
-def _silent_counts(noise, sigma, full_scale, out):  # pragma: no cover  (compiled)
+def _silent_counts(noise, sigmas, full_scale, out):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
+        sigma = sigmas[m]
         for k in range(noise.shape[1]):
             x = np.rint(sigma * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
@@ -90,9 +101,10 @@ def _silent_counts(noise, sigma, full_scale, out):  # pragma: no cover  (compile
 
 @njit(cache=True)
 def _counts(
-    pressure, gain, noise, sigma, full_scale, out
+    pressure, gains, noise, sigmas, full_scale, out
 ):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
+        gain, sigma = gains[m], sigmas[m]
         for k in range(noise.shape[1]):
             x = np.rint(gain * pressure[m, k] + sigma * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
@@ -103,6 +115,7 @@ def convert(
     noise: NDArray[np.float32],
     noise_pa: float,
     parameters: MicArrayParameters,
+    gains: ArrayLike = 1.0,
 ) -> NDArray[np.int16]:
     """Counts of the converter, rounded to nearest and clipped.
 
@@ -111,16 +124,19 @@ def convert(
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
         parameters: Sensitivity, gain and resolution.
+        gains: True over stated gain of all channels, or (m,) of each.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
     """
-    gain = np.float32(parameters.counts_per_pa)
-    sigma = np.float32(parameters.counts_per_pa * noise_pa)
+    counts_per_pa = np.full(len(noise), parameters.counts_per_pa) * gains
+    sigmas = (counts_per_pa * noise_pa).astype(np.float32)
     full_scale = np.float32(parameters.full_scale)
     out = np.empty(noise.shape, dtype=np.int16)
     if pressure is None:
-        _silent_counts(noise, sigma, full_scale, out)
+        _silent_counts(noise, sigmas, full_scale, out)
     else:
-        _counts(pressure, gain, noise, sigma, full_scale, out)
+        _counts(
+            pressure, counts_per_pa.astype(np.float32), noise, sigmas, full_scale, out
+        )
     return out

@@ -31,6 +31,8 @@ class TDOAParameters(Parameters):
     """Lower end of the band, Hz."""
     high_hz: float = Field(default=15_000.0, gt=0.0, le=SAMPLE_RATE_HZ / 2)
     """Upper end of the band, Hz."""
+    sound_speed_m_s: Positive | None = None
+    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
     minimum_correlation: Fraction = 0.75
     """Least correlation coefficient, within the band, of every pair."""
     maximum_closure_s: Positive = 1.5e-5
@@ -144,7 +146,7 @@ class TDOAEstimator(LeafSystem):
     Args:
         parameters: Method, band and thresholds.
         robot: Spacing of the microphones.
-        acoustics: Speed of sound.
+        acoustics: Speed of sound, where the parameters set none.
 
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
@@ -159,7 +161,8 @@ class TDOAEstimator(LeafSystem):
         super().__init__()
         self._parameters = parameters or TDOAParameters()
         self._spacing = row_spacing(robot or RobotParameters())
-        self._c = (acoustics or AcousticParameters()).c
+        air = acoustics or AcousticParameters()
+        self._c = self._parameters.sound_speed_m_s or air.c
         self._plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,
             frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),

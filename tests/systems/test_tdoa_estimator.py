@@ -179,6 +179,15 @@ def test_ports_show_the_frame_after_one_tick():
     assert np.linalg.eigvalsh(covariance).min() > 0.0
 
 
+def test_speed_of_sound_that_the_estimator_believes_in():
+    """Far away sin(bearing) = c tau_13 / 2l: 3 % too fast reads 3 % too much."""
+    block = TDOAEstimator(parameters=TDOAParameters(sound_speed_m_s=1.03 * C))
+    context, updates = listen(block, audio(heard(chirp, 30.0, 1e4, 30.0)))
+    context.SetDiscreteState(updates)
+    bearing = read(block, context)["source_bearing"][0]
+    assert math.sin(bearing) == pytest.approx(1.03 * 0.5, abs=2e-3)
+
+
 def test_nothing_heard_reads_zero():
     block = TDOAEstimator()
     noise = Generator(Philox(key=1)).standard_normal((3, N))
