@@ -74,9 +74,8 @@ def locate_source(
 
 def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """L^-1 of a covariance L L^T, which may be singular to rounding."""
-    size = len(covariance)
-    floor = 1e-12 * np.trace(covariance) / size + 1e-30
-    return np.linalg.inv(np.linalg.cholesky(covariance + floor * np.eye(size)))
+    floor = 1e-12 * np.diag(covariance) + 1e-30
+    return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
 
 
 def _angles(
