@@ -59,7 +59,7 @@ def test_ahead_of_a_row_is_towards_x_whatever_the_order(angle, order):
 
 
 def test_row_along_x_looks_towards_y():
-    shape = ArrayShape.of([[0, 0], [0.1, 0], [0.3, 0]])
+    shape = ArrayShape.of([[0.0, 0.0], [0.1, 0.0], [0.3, 0.0]])
     assert shape.ahead == pytest.approx([0.0, 1.0])
 
 
