@@ -32,10 +32,12 @@ __all__ = ["arrival_delays", "refine_source"]
 _STEPS = 8
 _SETTLED = 1e-4
 
-# The channels are cut again when a delay is off the cut by more than this.
-_RECUT = 0.75
+# The channels are cut again when a delay is off the cut by more than this, samples.
+_RECUT = 0.02
 
-# Edges of the cut channels, samples. Sharp ones pull delays to whole samples.
+# Raised-cosine edges of the cut channels, samples. They follow the delays below
+# the sample, so that all channels hold the same stretch of the sound: edges at
+# whole samples would pull the delays towards these.
 _EDGE = 16
 
 # Left of a frame after the cut, as a share.
@@ -75,17 +77,16 @@ def refine_source(
         The fix, its errors from the signal and noise that the frame shows, or
         None where the likelihood has no maximum nearby.
     """
-    fix, spectra = start, None
-    whole = np.zeros(shape.count, dtype=np.int64)
+    fix, cut_at = start, np.full(shape.count - 1, np.inf)
     for _ in range(_STEPS):
         delays = arrival_delays(fix, shape, c) * sample_rate_hz
-        if spectra is None or np.abs(delays - whole[1:]).max() > _RECUT:
-            whole[1:] = np.rint(delays)
-            cut = _cut(frame, whole)
+        if np.abs(delays - cut_at).max() > _RECUT:
+            cut = _cut(frame, delays)
             if cut is None:
                 return None
+            cut_at, whole = delays, np.rint(delays)
             spectra, first, step, padding = _spectra(cut, sample_rate_hz, band_hz)
-        found = _newton_step(spectra, first, step, delays - whole[1:])
+        found = _newton_step(spectra, first, step, delays - whole)
         if found is None:
             return None
         move, covariance = found
@@ -101,14 +102,32 @@ def refine_source(
 
 
 def _cut(
-    frame: NDArray[np.float32], arrivals: NDArray[np.int64]
+    frame: NDArray[np.float32], delays: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
-    """(n, m) the stretch that all channels share; None where too little is left."""
-    starts = arrivals - arrivals.min()
+    """(n, m) the stretch that all channels share; None where too little is left.
+
+    Row k begins a whole number of samples into the frame: its delay, rounded.
+    """
+    arrivals = np.concatenate((np.zeros(1), delays))
+    starts = np.rint(arrivals).astype(np.int64)
+    rests = arrivals - starts
+    starts -= starts.min()
     length = frame.shape[1] - int(starts.max())
     if length < max(_LEAST_OVERLAP * frame.shape[1], 4 * _EDGE):
         return None
-    return np.stack([frame[k, s : s + length] for k, s in enumerate(starts)])
+    cut = np.stack([frame[k, s : s + length] for k, s in enumerate(starts)])
+    # An offset would show at the edges, in all channels alike.
+    cut -= cut.mean(axis=1, keepdims=True)
+    within = np.arange(_EDGE) - rests[:, np.newaxis]
+    cut[:, :_EDGE] *= _ramp(within)
+    cut[:, -_EDGE:] *= _ramp(_EDGE - 1.0 - within)
+    return cut
+
+
+def _ramp(place: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Raised cosine from 0 at place -1/2 to 1 at the edge's length."""
+    share = np.clip((place + 0.5) / _EDGE, 0.0, 1.0)
+    return 0.5 - 0.5 * np.cos(math.pi * share)
 
 
 def _spectra(
@@ -118,18 +137,15 @@ def _spectra(
 
     The padding is the number of bins that bear the noise of one.
     """
-    ramp = 0.5 - 0.5 * np.cos(math.pi * (np.arange(_EDGE) + 0.5) / _EDGE)
-    window = np.ones(cut.shape[1], dtype=np.float32)
-    window[:_EDGE] = ramp
-    window[-_EDGE:] = ramp[::-1]
     length = int(fft.next_fast_len(cut.shape[1], real=True))
     first = max(1, math.ceil(band_hz[0] * length / sample_rate_hz))
     last = min(length // 2, math.floor(band_hz[1] * length / sample_rate_hz))
-    spectra = fft.rfft(cut * window, length)[:, first : last + 1]
-    power = window.astype(np.float64) ** 2
-    padding = length * float(np.sum(power**2) / np.sum(power) ** 2)
+    spectra = fft.rfft(cut, length)[:, first : last + 1]
+    # Sums of the window's squares and fourth powers: 3/8 and 35/128 an edge.
+    flat = cut.shape[1] - 2 * _EDGE
+    squares, fourths = flat + 0.75 * _EDGE, flat + 35.0 / 64.0 * _EDGE
     step = 2.0 * math.pi / length
-    return spectra, first * step, step, padding
+    return spectra, first * step, step, length * fourths / squares**2
 
 
 @njit(cache=True)
