@@ -17,7 +17,7 @@ from systems.array_shape import ArrayShape
 from systems.delay_fit import DelayProblem, fit_delays
 from systems.source_fix import SourceFix
 
-__all__ = ["locate_source", "whitening_matrix"]
+__all__ = ["locate_source"]
 
 # Keeps errors of the azimuth finite right above an array.
 _LEAST_COSINE = 1e-3
@@ -48,7 +48,7 @@ def locate_source(
     u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
         DelayProblem(
             c * np.asarray(tau, dtype=np.float64),
-            whitening_matrix(covariance) / c,
+            _whitening_matrix(covariance) / c,
             shape.p_AM,
             shape.span,
             np.zeros(shape.dimension) if shape.ahead is None else shape.ahead,
@@ -72,11 +72,10 @@ def locate_source(
     )
 
 
-def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def _whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """L^-1 of a covariance L L^T, which may be singular to rounding."""
-    size = len(covariance)
-    floor = 1e-12 * np.trace(covariance) / size + 1e-30
-    return np.linalg.inv(np.linalg.cholesky(covariance + floor * np.eye(size)))
+    floor = 1e-12 * np.diag(covariance) + 1e-30
+    return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
 
 
 def _angles(
