@@ -159,7 +159,7 @@ def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
     """The inverse; infinite where there is none."""
     if np.linalg.cond(information) > _LARGEST_CONDITION:
         return np.full(information.shape, math.inf)
-    return np.linalg.inv(information)
+    return np.asarray(np.linalg.inv(information))
 
 
 def _polar_gradients(p: NDArray[np.float64]) -> list[NDArray[np.float64]]:

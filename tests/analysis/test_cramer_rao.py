@@ -142,6 +142,7 @@ def test_covariance_in_polar_coordinates_agrees_with_differences():
         ],
         axis=1,
     )
+    assert bound.elevation_std is not None
     stated = [bound.bearing_std, bound.elevation_std, bound.range_std]
     np.testing.assert_allclose(stated, sampled, rtol=0.03)
 
