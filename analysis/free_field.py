@@ -1,4 +1,4 @@
-"""How near an estimator comes to the Cramer-Rao bound in the free field.
+"""How near estimators come to the Cramer-Rao bound in the free field.
 
 A resting source and resting microphones, one frame a trial, noise of a given
 level at the array. Sound travels and is converted by the blocks' own functions;
@@ -8,22 +8,38 @@ no diagram is built, so that a trial costs little more than the estimate.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
+from numpy.typing import NDArray
 
-from analysis.cramer_rao import SlopeEnergy, position_bound
+from analysis.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
+from analysis.estimation_errors import (
+    Consistency,
+    Interval,
+    consistency,
+    rms_ratio,
+    stated_ratio,
+)
 from systems.adc import MicArrayParameters, convert
-from systems.mic_array import FRAME_SAMPLES, frame_instants
-from systems.near_field import NearFieldFix
+from systems.array_shape import ArrayShape
+from systems.delay_plan import DelayPlan
+from systems.mic_array import FRAME_SAMPLES
 from systems.propagation import propagate
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.source_fix import SourceFix
+from systems.tdoa_estimator import TDOAParameters, localise
 from systems.waveforms import EDGE_S, SoundParameters, make_waveform
 
-__all__ = ["PAPER_CELLS", "FreeFieldCell", "Interval", "Loudspeaker", "run_cell"]
+__all__ = [
+    "PAPER_CELLS",
+    "FreeFieldCell",
+    "Loudspeaker",
+    "frame_estimator",
+    "run_cell",
+    "total_consistency",
+]
 
 #: Range (m) and bearing (deg) of the cells of Han 2019, tables 1 and 2.
 PAPER_CELLS = tuple((r, b) for r in (1.0, 2.0, 3.0, 4.0) for b in (0.0, 30.0, 60.0))
@@ -34,22 +50,32 @@ _HEADROOM = 1.2
 #: An error beyond so many bounds is an outlier.
 _OUTLIER = 8.0
 
-#: Of all intervals.
-_CONFIDENCE = 0.95
+#: From the loudspeaker's first sample to the first frame, at least, s; also the
+#: farthest that sound may have travelled.
+_LEAD_S = 0.1
+
+Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 
 
-@dataclass(frozen=True)
-class Interval:
-    """An estimate with its 95 % confidence interval."""
-
-    value: float
-    low: float
-    high: float
+def frame_estimator(
+    parameters: TDOAParameters, shape: ArrayShape, c: float
+) -> Estimator:
+    """What ``TDOAEstimator`` does to a (n, samples) frame."""
+    assert shape.equal_row is not None
+    spacing = shape.equal_row[1]
+    plan = DelayPlan(
+        sample_rate_hz=SAMPLE_RATE_HZ,
+        frame_samples=FRAME_SAMPLES,
+        max_delay_s=spacing / c,
+        low_hz=parameters.low_hz,
+        high_hz=parameters.high_hz,
+    )
+    return lambda frame: localise(frame, plan, parameters, spacing, c)
 
 
 @dataclass(frozen=True)
 class Loudspeaker:
-    """A sound that goes on for the whole trial, and the energy of its slope."""
+    """A sound that goes on for all trials, and the energy of its slope."""
 
     samples: NDArray[np.float32]
     """(n,) Pa at 1 m."""
@@ -68,19 +94,30 @@ class Loudspeaker:
         level = float(np.sqrt(np.mean(samples[edge:-edge] ** 2, dtype=float)))
         return cls(samples, SlopeEnergy.of(samples, SAMPLE_RATE_HZ), level)
 
-    def emission(self, p_WS: ArrayLike) -> Emission:
-        """What has left the loudspeaker, at rest in one place."""
-        end = len(self.samples) / SAMPLE_RATE_HZ
-        return Emission(
+    @property
+    def seconds(self) -> float:
+        """Its length, s."""
+        return len(self.samples) / SAMPLE_RATE_HZ
+
+    def pressure(
+        self, begin: float, p_AS: NDArray[np.float64], shape: ArrayShape, c: float
+    ) -> NDArray[np.float32]:
+        """(n, samples) of the frame that begins then, at rest at p_AS, Pa."""
+        emission = Emission(
             samples=self.samples,
             start_time=0.0,
             sample_rate_hz=float(SAMPLE_RATE_HZ),
-            knot_times=np.array([0.0, end]),
-            p_WS=np.tile(np.asarray(p_WS, dtype=float), (2, 1)),
+            knot_times=np.array([0.0, self.seconds]),
+            p_WS=np.tile(p_AS, (2, 1)),
             v_WS=np.zeros((2, 2)),
             level_pa=self.level_pa,
             sounding=True,
         )
+        times = np.tile([begin, begin + FRAME_PERIOD_S], (shape.count, 1))
+        p_WM = np.repeat(shape.p_AM[:, None, :], 2, axis=1)
+        heard = propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
+        assert heard is not None
+        return heard
 
 
 @dataclass(frozen=True)
@@ -89,7 +126,6 @@ class FreeFieldCell:
 
     range_m: float
     bearing_deg: float
-    snr_db: float
     trials: int
     unheard: int
     """Trials in which nothing was heard."""
@@ -114,7 +150,7 @@ class FreeFieldCell:
 
     @property
     def outliers(self) -> int:
-        """Trials without a fix, or in error by more than eight bounds."""
+        """Trials without a range, or in error by more than eight bounds."""
         wild = (np.abs(self.bearing_errors) > _OUTLIER * self.bearing_bounds) | (
             np.abs(self.range_errors) > _OUTLIER * self.range_bounds
         )
@@ -123,136 +159,135 @@ class FreeFieldCell:
     @property
     def bearing_ratio(self) -> Interval:
         """RMSE of the bearing over its bound."""
-        return _rms_ratio(self.bearing_errors, self.bearing_bounds)
+        return rms_ratio(self.bearing_errors, self.bearing_bounds)
 
     @property
     def range_ratio(self) -> Interval:
         """RMSE of the range over its bound."""
-        return _rms_ratio(self.range_errors, self.range_bounds)
+        return rms_ratio(self.range_errors, self.range_bounds)
 
     @property
-    def bearing_honesty(self) -> float:
+    def stated_bearing_ratio(self) -> float:
         """Stated standard deviation over RMSE."""
-        return 1.0 / _rms_ratio(self.bearing_errors, self.bearing_stds).value
+        return stated_ratio(self.bearing_stds, self.bearing_errors)
 
     @property
-    def range_honesty(self) -> float:
+    def stated_range_ratio(self) -> float:
         """Stated standard deviation over RMSE."""
-        return 1.0 / _rms_ratio(self.range_errors, self.range_stds).value
+        return stated_ratio(self.range_stds, self.range_errors)
 
     @property
-    def normalised_errors(self) -> NDArray[np.float64]:
-        """(k,) e^T C^-1 e: chi-square of two degrees where C is right."""
-        solved = np.linalg.solve(self.covariances, self.position_errors[:, :, None])
-        return np.einsum("ki,ki->k", self.position_errors, solved[:, :, 0])
+    def consistency(self) -> Consistency:
+        """Of the position with its stated covariance."""
+        return consistency(self.position_errors, self.covariances)
 
 
-def nees(cells: Iterable[FreeFieldCell]) -> tuple[float, float, float]:
-    """Mean normalised estimation error squared over cells.
-
-    Returns:
-        The mean, and the interval that holds it with 95 % where the stated
-        covariances are right.
-    """
-    errors = np.concatenate([cell.normalised_errors for cell in cells])
-    low, high = chi2.interval(_CONFIDENCE, 2 * len(errors)) / np.array(len(errors))
-    return float(errors.mean()), float(low), float(high)
-
-
-def _rms_ratio(errors: NDArray[np.float64], stds: NDArray[np.float64]) -> Interval:
-    """RMS of errors over that of their standard deviations."""
-    if len(errors) == 0:
-        return Interval(math.inf, 0.0, math.inf)
-    square = np.mean(errors**2) / np.mean(stds**2)
-    low, high = chi2.interval(_CONFIDENCE, len(errors)) / np.array(len(errors))
-    return Interval(math.sqrt(square), math.sqrt(square / high), math.sqrt(square / low))
+def total_consistency(cells: Iterable[FreeFieldCell]) -> Consistency:
+    """Over all trials of some cells."""
+    cells = list(cells)
+    return consistency(
+        np.concatenate([cell.position_errors for cell in cells]),
+        np.concatenate([cell.covariances for cell in cells]),
+    )
 
 
 def run_cell(
     loudspeaker: Loudspeaker,
-    estimate: Callable[[NDArray[np.float32]], NearFieldFix | None],
+    estimators: Mapping[str, Estimator],
     range_m: float,
     bearing_deg: float,
     *,
-    p_AM: NDArray[np.float64],
+    shape: ArrayShape,
     snr_db: float,
     c: float,
     trials: int,
     seed: int,
-) -> FreeFieldCell:
+) -> dict[str, FreeFieldCell]:
     """Runs the trials of one cell.
 
     Each trial takes a stretch of the sound at random, and fresh noise; the
-    converter has 10 bits and a full scale of 1.2 times the largest sample.
+    converter has 10 bits and a full scale of 1.2 times the largest sample. All
+    estimators get the same frames.
 
     Args:
         loudspeaker: What sounds.
-        estimate: From a (n, samples) frame in counts to a fix.
+        estimators: By name, as ``frame_estimator`` makes them.
         range_m: Of the source, from the microphones' centroid, m.
         bearing_deg: Of the source, deg.
-        p_AM: (n, 2) microphones from their centroid, m.
+        shape: The microphones, in the plane.
         snr_db: Level of the sound at the centroid over the noise from 0 to
             50 kHz, dB.
         c: Speed of sound, m/s.
         trials: Number of frames.
         seed: Of stretches and noise.
+
+    Returns:
+        A cell for each estimator.
     """
     rng = np.random.default_rng(seed)
     angle = math.radians(bearing_deg)
     p_AS = range_m * np.array([math.cos(angle), math.sin(angle)])
-    emission = loudspeaker.emission(p_AS)
     noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-snr_db / 20.0)
-    first, last = 0.1, len(loudspeaker.samples) / SAMPLE_RATE_HZ - 0.1
-    rows = []
+    fixes: dict[str, list[SourceFix | None]] = {name: [] for name in estimators}
+    bounds = []
     for _ in range(trials):
-        begin = round(rng.uniform(first, last) * SAMPLE_RATE_HZ) / SAMPLE_RATE_HZ
-        pressure = hear(emission, begin, p_AM, c)
+        begin = rng.uniform(_LEAD_S, loudspeaker.seconds - _LEAD_S)
+        pressure = loudspeaker.pressure(begin, p_AS, shape, c)
         noise = rng.standard_normal(pressure.shape, dtype=np.float32)
-        loudest = float(np.abs(pressure + np.float32(noise_pa) * noise).max())
-        converter = fitted_converter(loudest)
-        fix = estimate(
-            convert(pressure, noise, noise_pa, converter).astype(np.float32)
-        )
+        loudest = np.abs(pressure + np.float32(noise_pa) * noise).max()
+        converter = _fitted_converter(float(loudest))
+        counts = convert(pressure, noise, noise_pa, converter)
+        for name, estimate in estimators.items():
+            fixes[name].append(estimate(counts.astype(np.float32)))
         rounding_pa = 1.0 / converter.counts_per_pa / math.sqrt(12.0)
-        bound = position_bound(
-            loudspeaker.energy, begin, begin + FRAME_PERIOD_S, p_AS, p_AM,
-            math.hypot(noise_pa, rounding_pa), sample_rate_hz=SAMPLE_RATE_HZ, c=c,
-        )  # fmt: skip
-        rows.append((fix, bound))
-    found = [(fix, bound) for fix, bound in rows if fix is not None and fix.range_valid]
-    return FreeFieldCell(
-        range_m=range_m,
-        bearing_deg=bearing_deg,
-        snr_db=snr_db,
-        trials=trials,
-        unheard=sum(fix is None for fix, _ in rows),
-        rangeless=sum(fix is not None and not fix.range_valid for fix, _ in rows),
-        bearing_errors=np.array([fix.bearing - angle for fix, _ in found]),
-        range_errors=np.array([fix.range - range_m for fix, _ in found]),
-        position_errors=np.array([fix.p_MS - p_AS for fix, _ in found]),
-        bearing_stds=np.array([fix.bearing_std for fix, _ in found]),
-        range_stds=np.array([fix.range_std for fix, _ in found]),
-        covariances=np.array([fix.covariance for fix, _ in found]),
-        bearing_bounds=np.array([bound.bearing_std for _, bound in found]),
-        range_bounds=np.array([bound.range_std for _, bound in found]),
-    )
+        bounds.append(
+            position_bound(
+                loudspeaker.energy,
+                begin,
+                begin + FRAME_PERIOD_S,
+                p_AS,
+                shape.p_AM,
+                math.hypot(noise_pa, rounding_pa),
+                sample_rate_hz=SAMPLE_RATE_HZ,
+                c=c,
+            )
+        )
+    return {
+        name: _cell(found, bounds, range_m, bearing_deg)
+        for name, found in fixes.items()
+    }
 
 
-def hear(
-    emission: Emission, begin: float, p_AM: NDArray[np.float64], c: float
-) -> NDArray[np.float32]:
-    """(n, samples) sound pressure of the frame that begins then, Pa."""
-    instants = begin + frame_instants(MicArrayParameters())
-    p_WM = np.repeat(p_AM[:, None, :], instants.shape[1], axis=1)
-    pressure = propagate(
-        emission, instants, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c
-    )
-    assert pressure is not None
-    return pressure
-
-
-def fitted_converter(peak_pa: float) -> MicArrayParameters:
+def _fitted_converter(peak_pa: float) -> MicArrayParameters:
     """The default converter with a full scale of 1.2 times a peak in Pa."""
     default = MicArrayParameters()
     volt_per_pa = default.counts_per_pa * default.adc_full_scale_v / default.full_scale
     return MicArrayParameters(adc_full_scale_v=_HEADROOM * peak_pa * volt_per_pa)
+
+
+def _cell(
+    fixes: list[SourceFix | None],
+    bounds: list[LocalizationBound],
+    range_m: float,
+    bearing_deg: float,
+) -> FreeFieldCell:
+    angle = math.radians(bearing_deg)
+    p_AS = range_m * np.array([math.cos(angle), math.sin(angle)])
+    pairs = zip(fixes, bounds, strict=True)
+    ranged = [(fix, b) for fix, b in pairs if fix is not None and fix.range_valid]
+    found = [fix for fix, _ in ranged]
+    return FreeFieldCell(
+        range_m=range_m,
+        bearing_deg=bearing_deg,
+        trials=len(fixes),
+        unheard=sum(fix is None for fix in fixes),
+        rangeless=sum(fix is not None and not fix.range_valid for fix in fixes),
+        bearing_errors=np.array([fix.bearing - angle for fix in found]),
+        range_errors=np.array([fix.range - range_m for fix in found]),
+        position_errors=np.reshape([fix.p_AS - p_AS for fix in found], (-1, 2)),
+        bearing_stds=np.array([fix.bearing_std for fix in found]),
+        range_stds=np.array([fix.range_std for fix in found]),
+        covariances=np.reshape([fix.covariance for fix in found], (-1, 2, 2)),
+        bearing_bounds=np.array([bound.bearing_std for _, bound in ranged]),
+        range_bounds=np.array([bound.range_std for _, bound in ranged]),
+    )

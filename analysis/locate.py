@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from analysis.array_geometry import ArrayGeometry, load_geometry
 from systems.delay_plan import DelayPlan
-from systems.near_field import NearFieldFix
 from systems.signals import FRAME_PERIOD_S
 from systems.sound_file import read_sound
+from systems.source_fix import SourceFix
 from systems.tdoa_estimator import TDOAParameters, localise
 
 __all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
@@ -202,7 +202,7 @@ def _check_recording(
         )
 
 
-def _estimate(fix: NearFieldFix, middle: float, ahead: float) -> SourceEstimate:
+def _estimate(fix: SourceFix, middle: float, ahead: float) -> SourceEstimate:
     return SourceEstimate(
         t_s=middle,
         bearing_deg=_wrapped_deg(math.degrees(ahead + fix.bearing)),

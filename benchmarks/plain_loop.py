@@ -23,10 +23,10 @@ from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
 from systems.mic_array import real_array, record_frame
-from systems.near_field import NearFieldFix
 from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.sound_emitter import history_ticks, make_emission
+from systems.source_fix import SourceFix
 from systems.source_tracker import (
     NEVER_HEARD_S,
     Estimate,
@@ -90,7 +90,7 @@ class PlainLoop:
         blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, 0.0, Candidates.none()
         track = Track(odometry, odometry, *blank)
         v_WP: tuple[float, float] = (0.0, 0.0)
-        fix: NearFieldFix | None = None
+        fix: SourceFix | None = None
         before: dict[int, list[float]] = {}
         x, y, _ = self.path.pose(0.0)
         history = np.tile([x, y, 0.0, 0.0], (self.ticks + 1, 1))
@@ -127,7 +127,7 @@ class PlainLoop:
         now = track
         if fix is not None:
             estimate = Estimate(
-                list(fix.p_MS), fix.covariance.ravel().tolist(), fix.range_valid
+                list(fix.p_AS), fix.covariance.ravel().tolist(), fix.range_valid
             )
             then = past_pose(pose, track.pose_1, track.pose_2, 1.5 * T)
             folded = fold_estimate(track, estimate, then, tracker, epsilon)

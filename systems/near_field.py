@@ -10,12 +10,13 @@ sin(bearing) = (R3^2 - R1^2) / (4 l R2), exact at any distance.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NearFieldFix", "locate_source", "source_from_delays"]
+from systems.source_fix import SourceFix
+
+__all__ = ["locate_source", "source_from_delays"]
 
 # Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
 _LEAST_GAP_M = 1e-9
@@ -24,39 +25,18 @@ _LEAST_GAP_M = 1e-9
 _LEAST_COSINE = 1e-3
 
 
-@dataclass(frozen=True)
-class NearFieldFix:
-    """A source seen from M2, with first-order covariances."""
-
-    bearing: float
-    """rad, CCW from straight ahead, in [-pi/2, pi/2]."""
-    range: float
-    """m; 0 where it is not valid."""
-    range_valid: bool
-    """Whether the delays have a finite range."""
-    bearing_std: float
-    """rad."""
-    range_std: float
-    """m; infinity where the range is not valid."""
-    p_MS: tuple[float, float]
-    """(x, y) from M2, m; of unit length where the range is not valid."""
-    covariance: NDArray[np.float64]
-    """(2, 2) of p_MS, m^2; across the bearing only where no range is valid."""
-
-    def without_range(self) -> NearFieldFix:
-        """The same bearing alone, for a range that is too uncertain."""
-        return _bearing_only(self.bearing, self.bearing_std)
-
-
-def _bearing_only(bearing: float, bearing_std: float) -> NearFieldFix:
-    across = np.array([-math.sin(bearing), math.cos(bearing)])
-    return NearFieldFix(
+def _bearing_only(bearing: float, bearing_std: float) -> SourceFix:
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    across = np.array([-sine, cosine])
+    return SourceFix(
         bearing=bearing,
+        bearing_std=bearing_std,
+        elevation=None,
+        elevation_std=None,
         range=0.0,
         range_valid=False,
-        bearing_std=bearing_std,
         range_std=math.inf,
-        p_MS=(math.cos(bearing), math.sin(bearing)),
+        p_AS=np.array([cosine, sine]),
         covariance=bearing_std**2 * np.outer(across, across),
     )
 
@@ -102,7 +82,7 @@ def locate_source(
     covariance: NDArray[np.float64],
     spacing: float,
     c: float,
-) -> NearFieldFix:
+) -> SourceFix:
     """As ``source_from_delays``, with what the delays' errors make of it.
 
     Args:
@@ -111,6 +91,9 @@ def locate_source(
         covariance: (2, 2) of the two delays, s^2.
         spacing: Distance between neighbouring microphones, m.
         c: Speed of sound, m/s.
+
+    Returns:
+        The source in axes (ahead, left) at M2.
     """
     bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
     sine, cosine = math.sin(bearing), math.cos(bearing)
@@ -130,12 +113,14 @@ def locate_source(
             sine * to_range + r2 * cosine * to_bearing,
         )
     )
-    return NearFieldFix(
+    return SourceFix(
         bearing=bearing,
+        bearing_std=math.sqrt(to_bearing @ covariance @ to_bearing),
+        elevation=None,
+        elevation_std=None,
         range=r2,
         range_valid=True,
-        bearing_std=math.sqrt(to_bearing @ covariance @ to_bearing),
         range_std=math.sqrt(to_range @ covariance @ to_range),
-        p_MS=(r2 * cosine, r2 * sine),
+        p_AS=np.array([r2 * cosine, r2 * sine]),
         covariance=to_position @ covariance @ to_position.T,
     )

@@ -14,10 +14,11 @@ from pydrake.systems.framework import LeafSystem
 from systems.acoustics import AcousticParameters
 from systems.delay_plan import DelayPlan
 from systems.delays import DelayEstimate, estimate_delays
-from systems.near_field import NearFieldFix, locate_source
+from systems.near_field import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
+from systems.source_fix import SourceFix
 
 __all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise", "row_spacing"]
 
@@ -86,7 +87,7 @@ def localise(
     parameters: TDOAParameters,
     spacing: float,
     c: float,
-) -> NearFieldFix | None:
+) -> SourceFix | None:
     """Where the sound of a frame comes from.
 
     Args:
@@ -214,14 +215,14 @@ _DETECTED = 4
 _NOTHING = tuple(np.zeros(size) for size in (1, 1, 2, 4, 1, 1))
 
 
-def _port_values(fix: NearFieldFix | None) -> tuple[NDArray[np.float64], ...]:
+def _port_values(fix: SourceFix | None) -> tuple[NDArray[np.float64], ...]:
     """Values of the output ports, in order."""
     if fix is None:
         return _NOTHING
     return (
         np.array([fix.bearing]),
         np.array([fix.range]),
-        np.array(fix.p_MS),
+        np.array(fix.p_AS),
         fix.covariance.ravel(),
         np.ones(1),
         np.array([float(fix.range_valid)]),

@@ -70,10 +70,10 @@ def test_no_finite_range_means_bearing_only(a, b):
 def test_always_finite_and_in_front(tau_12, tau_13):
     fix = locate_source(tau_12, tau_13, np.eye(2) * 1e-14, L, C)
     assert -math.pi / 2 <= fix.bearing <= math.pi / 2
-    assert np.isfinite([*fix.p_MS, fix.range, fix.bearing_std]).all()
+    assert np.isfinite([*fix.p_AS, fix.range, fix.bearing_std]).all()
     assert np.isfinite(fix.covariance).all()
     assert fix.range >= 0.0
-    assert fix.p_MS[0] >= 0.0
+    assert fix.p_AS[0] >= 0.0
 
 
 @given(st.floats(-70.0, 70.0).map(math.radians), st.floats(0.3, 6.0))
@@ -113,8 +113,8 @@ def test_range_error_of_one_sample_at_four_metres():
 def test_bearing_alone_is_a_unit_vector():
     tau_12, tau_13 = delays(0.5, 2.0)
     fix = locate_source(tau_12, tau_13, np.eye(2) * 1e-14, L, C).without_range()
-    assert fix.p_MS == pytest.approx((math.cos(0.5), math.sin(0.5)))
-    along = np.array(fix.p_MS)
+    assert fix.p_AS == pytest.approx((math.cos(0.5), math.sin(0.5)))
+    along = np.array(fix.p_AS)
     across = np.array([-along[1], along[0]])
     assert along @ fix.covariance @ along == pytest.approx(0.0, abs=1e-18)
     assert across @ fix.covariance @ across == pytest.approx(fix.bearing_std**2)

@@ -95,7 +95,7 @@ def test_left_is_left():
     """A sign that is broken somewhere makes this fail."""
     frame = heard(chirp, 40.0, 1.5, 30.0)
     fix = found_in(frame)
-    assert fix.p_MS == pytest.approx(
+    assert fix.p_AS == pytest.approx(
         (1.5 * math.cos(math.radians(40)), 1.5 * math.sin(math.radians(40))), abs=0.01
     )
     mirrored = found_in(frame[::-1].copy())
@@ -203,7 +203,7 @@ def test_plane_wave_has_a_bearing_and_no_range():
     assert not fix.range_valid
     assert fix.range == 0.0
     assert math.degrees(fix.bearing) == pytest.approx(20.0, abs=0.1)
-    assert math.hypot(*fix.p_MS) == pytest.approx(1.0)
+    assert math.hypot(*fix.p_AS) == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(
