@@ -9,12 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
+from systems.array_shape import ArrayShape
+from systems.coherent import refine_source
 from systems.delay_plan import DelayPlan
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
-from systems.signals import SAMPLE_RATE_HZ
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
@@ -94,6 +96,23 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+
+    @classmethod
+    def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
+        """For frames as ``MicArray`` publishes them.
+
+        Raises:
+            ValueError: The array cannot serve at this rate and band.
+        """
+        plan = DelayPlan(
+            shape=shape,
+            c=parameters.sound_speed_m_s or c,
+            sample_rate_hz=SAMPLE_RATE_HZ,
+            frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),
+            low_hz=parameters.low_hz,
+            high_hz=parameters.high_hz,
+        )
+        return cls(plan, parameters)
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
@@ -175,6 +194,20 @@ class Localiser:
         if extra_s > 0.0:
             covariance = covariance + extra_s**2 * (np.eye(len(covariance)) + 1.0)
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if parameters.method == "ml" and extra_s == 0.0:
+            bins = delays.band
+            hertz = plan.sample_rate_hz / plan.length
+            fix = (
+                refine_source(
+                    frame,
+                    fix,
+                    plan.shape,
+                    plan.c,
+                    sample_rate_hz=plan.sample_rate_hz,
+                    band_hz=(bins.start * hertz, (bins.stop - 1) * hertz),
+                )
+                or fix
+            )
         if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
             return None
         if fix.range_std > parameters.maximum_relative_range_std * fix.range:

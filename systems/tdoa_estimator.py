@@ -9,7 +9,6 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
 from systems.array_shape import ArrayShape
-from systems.delay_plan import DelayPlan
 from systems.localise import HearingMemory, Localiser, TDOAParameters
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
@@ -26,15 +25,9 @@ def robot_localiser(
     Returns:
         The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
-    plan = DelayPlan(
-        shape=ArrayShape.of(robot.microphones_m),
-        c=parameters.sound_speed_m_s or acoustics.c,
-        sample_rate_hz=SAMPLE_RATE_HZ,
-        frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),
-        low_hz=parameters.low_hz,
-        high_hz=parameters.high_hz,
-    )
-    return Localiser(plan, parameters), np.mean(robot.microphones_m, axis=0)
+    shape = ArrayShape.of(robot.microphones_m)
+    localiser = Localiser.of(parameters, shape, acoustics.c)
+    return localiser, np.mean(robot.microphones_m, axis=0)
 
 
 class TDOAEstimator(LeafSystem):
