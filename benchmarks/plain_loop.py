@@ -15,14 +15,15 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.builder import block_seed
 from systems.active_impedance_controller import active_force
+from systems.array_tolerances import draw_tolerances
 from systems.collision_vector import collision_vectors, echo_points
 from systems.delays import DelayPlan
 from systems.diff_drive_plant import body_twist, plant_derivatives
 from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
-from systems.mic_array import frame_instants, microphones_B, record_frame
-from systems.noise import tick_generator
+from systems.mic_array import real_array, record_frame
+from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.sound_emitter import history_ticks, make_emission
 from systems.source_fix import SourceFix
@@ -34,7 +35,7 @@ from systems.source_tracker import (
     held_target,
     past_pose,
 )
-from systems.tdoa_estimator import localise
+from systems.tdoa_estimator import localise, row_spacing
 from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
 from systems.waveforms import make_waveform
 from systems.wheel_odometry import advance_pose, encoder_angle
@@ -57,21 +58,26 @@ class PlainLoop:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         c = scenario.acoustics.c
-        spacing = scenario.robot.microphone_spacing_m
+        self.spacing = row_spacing(scenario.robot)
         self.path = scenario.source.path()
         self.obstacles = [o.path() for o in scenario.obstacles]
         self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
         seed = block_seed(scenario.seed, "sound_emitter")
         self.waveform = make_waveform(scenario.sound, seed)
         self.ticks = history_ticks(MAXIMUM_RANGE_M, c)
-        self.instants = frame_instants(scenario.microphones)
-        self.p_BM = microphones_B(scenario.robot)
         self.mic_seed = block_seed(scenario.seed, "mic_array")
+        microphones = scenario.microphones
+        errors = draw_tolerances(
+            microphones,
+            len(scenario.robot.microphones_m),
+            tick_generator(self.mic_seed, BEFORE_THE_RUN),
+        )
+        self.array = real_array(scenario.robot, microphones, errors, c)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,
             frame_samples=round(T * SAMPLE_RATE_HZ),
-            max_delay_s=spacing / c,
+            max_delay_s=self.spacing / c,
             low_hz=scenario.tdoa.low_hz,
             high_hz=scenario.tdoa.high_hz,
         )
@@ -191,17 +197,14 @@ class PlainLoop:
             time,
             last,
             now,
-            self.instants,
-            self.p_BM,
-            scenario.acoustics.c,
+            self.array,
             parameters=scenario.microphones,
             seed=self.mic_seed,
         )
         history[:-1] = history[1:]
         frame = audio.counts.astype(np.float32)
-        spacing = scenario.robot.microphone_spacing_m
         c = scenario.acoustics.c
-        return localise(frame, self.plan, scenario.tdoa, spacing, c), now
+        return localise(frame, self.plan, scenario.tdoa, self.spacing, c), now
 
     def _drive(self, state: Any, wheels: Any) -> Any:
         """One third-order Runge-Kutta step, the one that Drake takes."""

@@ -14,12 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.acoustics import AcousticParameters
+from systems.adc import MicArrayParameters, channel_skew
 from systems.collision_vector import CollisionVectorParameters
 from systems.diff_drive_plant import PlantParameters
 from systems.geometry import rectangle_clearance
 from systems.ideal_source_sensor import IdealHearingParameters
 from systems.impedance import AttractionParameters, RepulsionParameters
-from systems.mic_array import MicArrayParameters
 from systems.obstacles import ObstacleParameters
 from systems.parameters import NonNegative, Parameters, Point, Positive
 from systems.paths import WaypointPath
@@ -154,6 +154,11 @@ class Scenario(Parameters):
                 f"plant.motor_lag_s: {lag} s is too short for steps of {step} s, which "
                 f"would be unstable; set integrator.step_s to {lag:g} or less"
             )
+        return self
+
+    @model_validator(mode="after")
+    def _check_channels(self) -> Scenario:
+        channel_skew(self.microphones, len(self.robot.microphones_m))
         return self
 
     @model_validator(mode="after")

@@ -6,16 +6,14 @@ from typing import Annotated
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.noise import tick_generator
 from systems.parameters import Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
-__all__ = ["MicArrayParameters", "convert", "frame_noise"]
-
-_Triple = Annotated[tuple[float, float, float], Strict(False)]
+__all__ = ["MicArrayParameters", "channel_skew", "convert", "frame_noise"]
 
 
 class MicArrayParameters(Parameters):
@@ -35,8 +33,21 @@ class MicArrayParameters(Parameters):
     """Voltage at which the converter clips, V, of either sign."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
-    channel_skew_s: _Triple = (0.0, 0.0, 0.0)
-    """Time by which each channel is sampled later, s; below one sample."""
+    channel_skew_s: Annotated[tuple[float, ...], Strict(False)] = ()
+    """Time by which each channel is sampled later, s; below one sample.
+
+    One time for each microphone, or none where all are sampled at once.
+    """
+
+    position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
+    """Each microphone stands off its place by up to this in x and in y, m.
+
+    This error and the next two are uniform, and drawn once from the seed.
+    """
+    delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
+    """Each channel is sampled up to this earlier or later, s."""
+    gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
+    """The gain of each channel, noise included, is off by up to this, dB."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -59,14 +70,30 @@ class MicArrayParameters(Parameters):
         return gain * self.full_scale / self.adc_full_scale_v
 
 
+def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
+    """(count,) s by which each channel is sampled later.
+
+    Raises:
+        ValueError: The skew is given for another number of channels.
+    """
+    skew = parameters.channel_skew_s
+    if len(skew) not in (0, count):
+        raise ValueError(
+            f"microphones.channel_skew_s: {skew} has {len(skew)} times for {count} "
+            "microphones; give one for each, or []"
+        )
+    return np.array(skew) if skew else np.zeros(count)
+
+
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
     """White noise of unit variance that only the seed and the tick decide."""
     return tick_generator(seed, tick).standard_normal(shape, dtype=np.float32)
 
 
 @njit(cache=True)
-def _silent_counts(noise, sigma, full_scale, out):  # pragma: no cover  (compiled)
+def _silent_counts(noise, sigmas, full_scale, out):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
+        sigma = sigmas[m]
         for k in range(noise.shape[1]):
             x = np.rint(sigma * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
@@ -74,9 +101,10 @@ def _silent_counts(noise, sigma, full_scale, out):  # pragma: no cover  (compile
 
 @njit(cache=True)
 def _counts(
-    pressure, gain, noise, sigma, full_scale, out
+    pressure, gains, noise, sigmas, full_scale, out
 ):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
+        gain, sigma = gains[m], sigmas[m]
         for k in range(noise.shape[1]):
             x = np.rint(gain * pressure[m, k] + sigma * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
@@ -87,6 +115,7 @@ def convert(
     noise: NDArray[np.float32],
     noise_pa: float,
     parameters: MicArrayParameters,
+    gains: ArrayLike = 1.0,
 ) -> NDArray[np.int16]:
     """Counts of the converter, rounded to nearest and clipped.
 
@@ -95,16 +124,19 @@ def convert(
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
         parameters: Sensitivity, gain and resolution.
+        gains: True over stated gain of all channels, or (m,) of each.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
     """
-    gain = np.float32(parameters.counts_per_pa)
-    sigma = np.float32(parameters.counts_per_pa * noise_pa)
+    counts_per_pa = np.full(len(noise), parameters.counts_per_pa) * gains
+    sigmas = (counts_per_pa * noise_pa).astype(np.float32)
     full_scale = np.float32(parameters.full_scale)
     out = np.empty(noise.shape, dtype=np.int16)
     if pressure is None:
-        _silent_counts(noise, sigma, full_scale, out)
+        _silent_counts(noise, sigmas, full_scale, out)
     else:
-        _counts(pressure, gain, noise, sigma, full_scale, out)
+        _counts(
+            pressure, counts_per_pa.astype(np.float32), noise, sigmas, full_scale, out
+        )
     return out

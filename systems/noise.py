@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from numpy.random import SFC64, Generator
 
-__all__ = ["tick_generator"]
+__all__ = ["BEFORE_THE_RUN", "tick_generator"]
+
+#: Tick of what is drawn once, when a block is built; no run gets there.
+BEFORE_THE_RUN = 2**62
 
 
 def tick_generator(seed: int, tick: int) -> Generator:

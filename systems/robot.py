@@ -2,9 +2,18 @@
 
 from __future__ import annotations
 
-from systems.parameters import Parameters, Positive
+import math
+from itertools import combinations
+from typing import Annotated
 
-__all__ = ["RobotParameters"]
+from pydantic import Field, Strict, model_validator
+
+from systems.parameters import Parameters, Point, Positive
+
+__all__ = ["LEAST_SPACING_M", "RobotParameters"]
+
+#: Microphones nearer to one another than this are one, m.
+LEAST_SPACING_M = 1e-3
 
 
 class RobotParameters(Parameters):
@@ -20,8 +29,15 @@ class RobotParameters(Parameters):
     """Extent of the body along its y axis, the microphone bar included, m."""
     control_point_m: Positive = 0.175
     """Distance epsilon of the control point P ahead of the axle, m."""
-    microphone_spacing_m: Positive = 0.40
-    """Distance l between neighbouring microphones, m (Han 2019, 2.3)."""
+    microphones_m: Annotated[tuple[Point, ...], Strict(False), Field(min_length=3)] = (
+        (0.0, 0.4),
+        (0.0, 0.0),
+        (0.0, -0.4),
+    )
+    """Microphones from P in B axes, m, at least three; no two within 1 mm.
+
+    A row with 0.4 m between neighbours, from left to right (Han 2019, 2.3).
+    """
     wheel_radius_m: Positive = 0.06
     """Radius of the driven wheels, m."""
     wheel_separation_m: Positive = 0.41
@@ -30,6 +46,16 @@ class RobotParameters(Parameters):
     """Virtual mass M at P, kg: the mass of the robot."""
     top_speed_m_s: Positive = 0.72
     """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
+
+    @model_validator(mode="after")
+    def _check_microphones(self) -> RobotParameters:
+        for (i, a), (j, b) in combinations(enumerate(self.microphones_m), 2):
+            if math.dist(a, b) < LEAST_SPACING_M:
+                raise ValueError(
+                    f"microphones_m: microphones {i} and {j}, at {a} and {b}, are "
+                    f"less than {LEAST_SPACING_M:g} m apart; move one"
+                )
+        return self
 
     @property
     def top_wheel_speed(self) -> float:

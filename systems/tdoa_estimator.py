@@ -20,7 +20,7 @@ from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
 from systems.source_fix import SourceFix
 
-__all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise"]
+__all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise", "row_spacing"]
 
 
 class TDOAParameters(Parameters):
@@ -32,6 +32,8 @@ class TDOAParameters(Parameters):
     """Lower end of the band, Hz."""
     high_hz: float = Field(default=15_000.0, gt=0.0, le=SAMPLE_RATE_HZ / 2)
     """Upper end of the band, Hz."""
+    sound_speed_m_s: Positive | None = None
+    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
     minimum_correlation: Fraction = 0.75
     """Least correlation coefficient, within the band, of every pair."""
     maximum_closure_s: Positive = 1.5e-5
@@ -50,6 +52,23 @@ class TDOAParameters(Parameters):
                 f"low_hz: {self.low_hz:g} must be below high_hz = {self.high_hz:g}"
             )
         return self
+
+
+def row_spacing(robot: RobotParameters) -> float:
+    """Distance between neighbours of three microphones across the robot, m.
+
+    Raises:
+        ValueError: The microphones are no such row from left to right.
+    """
+    places = robot.microphones_m
+    spacing = (places[0][1] - places[-1][1]) / 2.0
+    row = ((0.0, spacing), (0.0, 0.0), (0.0, -spacing))
+    if len(places) != 3 or spacing <= 0.0 or not np.allclose(places, row, 0.0, 1e-9):
+        raise ValueError(
+            f"robot.microphones_m: {places} is not a row of three from "
+            "left to right with P in its middle; TDOAEstimator needs one"
+        )
+    return spacing
 
 
 def is_heard(delays: DelayEstimate | None, parameters: TDOAParameters) -> bool:
@@ -128,7 +147,7 @@ class TDOAEstimator(LeafSystem):
     Args:
         parameters: Method, band and thresholds.
         robot: Spacing of the microphones.
-        acoustics: Speed of sound.
+        acoustics: Speed of sound, where the parameters set none.
 
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
@@ -142,8 +161,9 @@ class TDOAEstimator(LeafSystem):
     ) -> None:
         super().__init__()
         self._parameters = parameters or TDOAParameters()
-        self._spacing = (robot or RobotParameters()).microphone_spacing_m
-        self._c = (acoustics or AcousticParameters()).c
+        self._spacing = row_spacing(robot or RobotParameters())
+        air = acoustics or AcousticParameters()
+        self._c = self._parameters.sound_speed_m_s or air.c
         self._plan = DelayPlan(
             sample_rate_hz=SAMPLE_RATE_HZ,
             frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),

@@ -288,4 +288,5 @@ def test_han_table_6_swaps_width_and_length() -> None:
     """820 mm can only be across: wheels 410 mm and microphones 800 mm apart."""
     robot = RobotParameters()
     assert robot.length_m < robot.wheel_separation_m < robot.width_m
-    assert robot.width_m - 2.0 * robot.microphone_spacing_m == pytest.approx(0.02)
+    left, _, right = (y for _, y in robot.microphones_m)
+    assert robot.width_m - (left - right) == pytest.approx(0.02)

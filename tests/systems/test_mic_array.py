@@ -65,6 +65,18 @@ def test_microphones_from_left_to_right():
     np.testing.assert_allclose(microphones_B(RobotParameters()), expected)
 
 
+def test_any_number_of_microphones_stands_where_it_is_put():
+    """Five at random places: each hears the tone by its own distance from S."""
+    places = np.random.default_rng(2).uniform(-0.3, 0.3, (5, 2))
+    robot = RobotParameters(microphones_m=tuple(map(tuple, places.tolist())))
+    audio = recorded(emission((1.5, 1.2)), parameters=quiet(), robot=robot)
+    ranges = np.linalg.norm([1.5 - 0.175, 1.2] - places, axis=1)
+    phases, _ = phase_and_amplitude(audio.counts)
+    np.testing.assert_allclose(
+        np.exp(1j * phases), np.exp(-2j * np.pi * TONE * ranges / 340.0), atol=1e-3
+    )
+
+
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (1.0, -0.5, 2.2)])
 def test_phases_and_levels_of_a_resting_source(pose):
     """The source is ahead and to the left of the robot: M1 is nearest."""
@@ -116,6 +128,60 @@ def test_skewed_channels_sample_later():
         phase_and_amplitude(late.counts)[0] - phase_and_amplitude(plain.counts)[0]
     )
     np.testing.assert_allclose(difference, 2 * np.pi * TONE * np.array(skew), atol=5e-5)
+
+
+def with_errors(array, sent, errors):
+    """Frame of a context whose numeric parameters are set, by their numbers."""
+    context = array.CreateDefaultContext()
+    context.SetTime(TIME)
+    array.GetInputPort("emission").FixValue(context, Value(sent))
+    array.GetInputPort("pose_WB").FixValue(context, [1.0, -0.5, 0.4])
+    array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
+    for index, values in errors.items():
+        context.get_mutable_numeric_parameter(index).SetFromVector(values)
+    return array.GetOutputPort("audio").Eval(context).counts
+
+
+def test_errors_of_a_context_shift_what_its_microphones_hear():
+    """Places, delays, gains and air of one trial; the block itself stays as it is."""
+    generator = np.random.default_rng(5)
+    array = MicArray(parameters=quiet())
+    places = generator.uniform(-0.01, 0.01, (3, 2))
+    delays = generator.uniform(-2e-5, 2e-5, 3)
+    gains = np.array([1.1, 0.9, 1.02])
+    source, c = np.array([3.0, 0.7]), 344.0
+    errors = {
+        MicArray.POSITION_ERRORS: places.ravel(),
+        MicArray.CHANNEL_DELAYS: delays,
+        MicArray.GAINS: gains,
+        MicArray.SOUND_SPEED: [c],
+    }
+    counts = with_errors(array, emission(source), errors)
+    turn = np.array([[math.cos(0.4), -math.sin(0.4)], [math.sin(0.4), math.cos(0.4)]])
+    p_WM = (microphones_B(RobotParameters()) + places) @ turn.T + [1.0, -0.5]
+    ranges = np.linalg.norm(source - p_WM, axis=1)
+    phases, amplitudes = phase_and_amplitude(counts)
+    expected = np.exp(2j * np.pi * TONE * (delays - ranges / c))
+    np.testing.assert_allclose(np.exp(1j * phases), expected, atol=2e-4)
+    expected = 0.1 * math.sqrt(2) / ranges * quiet().counts_per_pa * gains
+    np.testing.assert_allclose(amplitudes, expected, rtol=1e-3)
+    plain = with_errors(array, emission(source), {})
+    np.testing.assert_array_equal(
+        plain, with_errors(MicArray(parameters=quiet()), emission(source), {})
+    )
+
+
+def test_default_errors_come_from_the_seed():
+    tolerant = quiet(
+        position_tolerance_m=1e-3, delay_tolerance_s=1e-6, gain_tolerance_db=1.0
+    )
+    frames = [
+        with_errors(MicArray(parameters=tolerant, seed=seed), emission((3.0, 0.7)), {})
+        for seed in (1, 1, 2)
+    ]
+    np.testing.assert_array_equal(frames[0], frames[1])
+    levels = [phase_and_amplitude(frame)[1] for frame in frames]
+    assert np.abs(levels[0] / levels[2] - 1.0).min() > 1e-3
 
 
 def test_noise_level_refers_to_one_metre():
@@ -180,6 +246,11 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
     expected *= 0.1 * math.sqrt(2) * quiet().counts_per_pa
     # 3 mm are 5 % of the tone's phase; 0.2 % of the amplitude is noise.
     np.testing.assert_allclose(counts, expected, atol=2e-3 * expected.max())
+
+
+def test_skew_of_another_number_of_channels_is_refused():
+    with pytest.raises(ValueError, match=r"microphones\.channel_skew_s.*3 microph"):
+        MicArray(parameters=MicArrayParameters(channel_skew_s=(0.0, 1e-6)))
 
 
 def test_wrong_emission_is_refused():

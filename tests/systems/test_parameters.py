@@ -111,7 +111,19 @@ def test_robot_of_table_6():
     robot = RobotParameters()
     assert robot.top_wheel_speed == pytest.approx(12.0)  # 0.72 / 0.06
     assert robot.control_point_m == robot.length_m / 2
-    assert 2 * robot.microphone_spacing_m <= robot.width_m
+    assert max(y for _, y in robot.microphones_m) <= robot.width_m / 2
+
+
+@pytest.mark.parametrize(
+    ("places", "message"),
+    [
+        (((0.0, 0.4), (0.0, -0.4)), "at least 3"),
+        (((0.0, 0.4), (0.0, 0.0), (0.0005, 0.4)), r"microphones_m: .*0 and 2"),
+    ],
+)
+def test_microphones_that_are_no_array(places, message):
+    with pytest.raises(ValidationError, match=message):
+        RobotParameters(microphones_m=places)
 
 
 @pytest.mark.parametrize(

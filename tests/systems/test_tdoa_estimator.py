@@ -12,6 +12,7 @@ from pydrake.common.value import Value
 
 from systems.adc import MicArrayParameters, convert, frame_noise
 from systems.delay_plan import DelayPlan
+from systems.robot import RobotParameters
 from systems.signals import AudioFrame
 from systems.tdoa_estimator import TDOAEstimator, TDOAParameters, localise
 
@@ -178,6 +179,15 @@ def test_ports_show_the_frame_after_one_tick():
     assert np.linalg.eigvalsh(covariance).min() > 0.0
 
 
+def test_speed_of_sound_that_the_estimator_believes_in():
+    """Far away sin(bearing) = c tau_13 / 2l: 3 % too fast reads 3 % too much."""
+    block = TDOAEstimator(parameters=TDOAParameters(sound_speed_m_s=1.03 * C))
+    context, updates = listen(block, audio(heard(chirp, 30.0, 1e4, 30.0)))
+    context.SetDiscreteState(updates)
+    bearing = read(block, context)["source_bearing"][0]
+    assert math.sin(bearing) == pytest.approx(1.03 * 0.5, abs=2e-3)
+
+
 def test_nothing_heard_reads_zero():
     block = TDOAEstimator()
     noise = Generator(Philox(key=1)).standard_normal((3, N))
@@ -194,6 +204,19 @@ def test_plane_wave_has_a_bearing_and_no_range():
     assert fix.range == 0.0
     assert math.degrees(fix.bearing) == pytest.approx(20.0, abs=0.1)
     assert math.hypot(*fix.p_AS) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    "places",
+    [
+        ((0.0, -0.4), (0.0, 0.0), (0.0, 0.4)),
+        ((0.0, 0.4), (0.1, 0.0), (0.0, -0.4)),
+        ((0.0, 0.4), (0.0, 0.1), (0.0, -0.1), (0.0, -0.4)),
+    ],
+)
+def test_microphones_in_no_row_are_refused(places):
+    with pytest.raises(ValueError, match=r"robot\.microphones_m.*row of three"):
+        TDOAEstimator(robot=RobotParameters(microphones_m=places))
 
 
 def test_wrong_audio_is_refused():
