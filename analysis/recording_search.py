@@ -102,13 +102,13 @@ class RecordingSearch:
         return steered_response(gated, self.grid)
 
     @cached_property
-    def diffuse_response(self) -> float:
-        """The greatest response to sound that comes from all around alike."""
+    def diffuse_response(self) -> NDArray[np.float32]:
+        """(g,) response to sound that comes from all around alike."""
         weights = self.recording.weights.mean(axis=0, dtype=np.float64)
         phase = np.outer(self.shape.distances_m, self.recording.angular_frequency)
         share = weights / max(weights.sum(), 1e-30)
         cross = np.sinc(phase / (math.pi * self.c)) * share
-        return float(self._responses(cross.astype(np.complex64)).max())
+        return self._responses(cross.astype(np.complex64))
 
     def sightings(self) -> Iterator[Sighting]:
         """Stretches with a source, in order of time."""
@@ -161,7 +161,7 @@ class RecordingSearch:
         if weight < _LEAST_WEIGHT:
             return None
         best = int(np.argmax(response + _HELP * near))
-        if response[best] < self._threshold(stretch):
+        if response[best] < self._threshold(best, stretch):
             return None
         fit = self._delays(best, stretch)
         if fit is None:
@@ -176,12 +176,12 @@ class RecordingSearch:
             response=float(response[best]),
         )
 
-    def _threshold(self, stretch: slice) -> float:
+    def _threshold(self, place: int, stretch: slice) -> float:
         # Windows that overlap by half, with the shape used, are worth half as
         # many independent values; and few of the pairs are independent.
         values = self.recording.weights[stretch].sum() / 2.0
         deviation = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
-        return self.diffuse_response + _DEVIATIONS * deviation
+        return float(self.diffuse_response[place]) + _DEVIATIONS * deviation
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
         """Delays of the channels, aligned for a place of the grid first."""

@@ -2,9 +2,8 @@
 
 The delays are those that make the channels agree best in phase, over all
 pairs, snapshots and frequencies. Frequencies where the channels agree count
-more. How much the bands of frequencies disagree on the delays gives the errors:
-noise and reflections from all around are counted, a single reflection that
-moves all bands alike is not.
+more. How much the bands of frequencies disagree on the delays gives the errors
+that noise makes, and reflections, as far as they move bands apart.
 """
 
 from __future__ import annotations
@@ -20,6 +19,11 @@ __all__ = ["AlignedDelays", "fit_aligned_delays"]
 
 _BANDS = 24
 _LEAST_BANDS = 4
+
+# Reflections move bands alike as well as apart: by how much the errors are
+# larger than the bands' disagreement, for each part that is not coherent.
+# From simulated rooms with reverberation times of 0.15-0.6 s.
+_ECHO_ERROR = 1.0
 _STEPS = 12
 _SETTLED = 1e-4  # of the period of the highest frequency
 _MOST_COHERENT = 0.9999
@@ -85,10 +89,10 @@ def fit_aligned_delays(
     inverse = np.linalg.inv(curve)
     scatter = slope.T @ slope * bands / (bands - 1)
     scale = float(np.trace(inverse @ scatter)) / (count - 1)
+    coherence = float(aligned / (len(first) * (gain * total).sum()))
+    echo = 1.0 + _ECHO_ERROR * (1.0 - min(coherence, 1.0))
     return AlignedDelays(
-        tau=tau,
-        covariance=scale * inverse,
-        coherence=float(aligned / (len(first) * (gain * total).sum())),
+        tau=tau, covariance=echo**2 * scale * inverse, coherence=coherence
     )
 
 
