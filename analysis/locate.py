@@ -26,6 +26,12 @@ _BAND_HZ = (300.0, 15_000.0)
 _TOP_OF_RATE = 0.45
 
 
+# Snapshots of a stretch: more of them for a source that is faint or far, of
+# which fewer show too little.
+_SNAPSHOTS = (8, 32, 128)
+_LEAST_ESTIMATES = 3
+
+
 def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
     """Locates the source of a recording, stretch by stretch.
 
@@ -63,12 +69,7 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
             f"{where} has {samples.shape[1]} samples, less than one frame of "
             f"{recording.window.size}; record longer"
         )
-    search = RecordingSearch(recording, shape, geometry.c)
-    estimates = []
-    for sighting in search.sightings():
-        fix = place_source(sighting, shape, geometry.c)
-        if fix is not None:
-            estimates.append(SourceEstimate.of(sighting.t_s, fix))
+    search, estimates = _estimates(recording, shape, geometry.c)
     array = {
         "microphones": [list(place) for place in geometry.microphones],
         "channels": list(geometry.columns),
@@ -80,6 +81,23 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "frame_s": search.stretch_s,
     }
     return LocateResult(array, shape, estimates, len(search.stretches))
+
+
+def _estimates(
+    recording: RecordingSpectra, shape: ArrayShape, c: float
+) -> tuple[RecordingSearch, list[SourceEstimate]]:
+    """By the shortest stretches in which something is heard often enough."""
+    best: tuple[RecordingSearch, list[SourceEstimate]] | None = None
+    for snapshots in _SNAPSHOTS:
+        search = RecordingSearch(recording, shape, c, snapshots)
+        placed = ((s.t_s, place_source(s, shape, c)) for s in search.sightings())
+        found = [SourceEstimate.of(t_s, fix) for t_s, fix in placed if fix is not None]
+        if best is None or len(found) > len(best[1]):
+            best = search, found
+        if len(found) >= min(_LEAST_ESTIMATES, len(search.stretches)):
+            return search, found
+    assert best is not None
+    return best
 
 
 def _equalised(

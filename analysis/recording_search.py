@@ -24,9 +24,6 @@ from systems.steered_response import (
 
 __all__ = ["RecordingSearch", "Sighting"]
 
-#: Snapshots of a stretch, and from one stretch to the next.
-SNAPSHOTS, ADVANCE = 8, 4
-
 # Least mean weight of a stretch's snapshots: the rest is silence or echo.
 _LEAST_WEIGHT = 0.02
 # A response counts above that of a diffuse field by this many deviations of
@@ -60,13 +57,16 @@ class RecordingSearch:
     recording: RecordingSpectra
     shape: ArrayShape
     c: float
+    snapshots: int
+    """Of a stretch; stretches overlap by half."""
 
     @cached_property
     def stretches(self) -> list[slice]:
         """Snapshots of each stretch."""
         count = len(self.recording.starts)
-        firsts = range(0, max(1, count - SNAPSHOTS + 1), ADVANCE)
-        return [slice(k, min(k + SNAPSHOTS, count)) for k in firsts]
+        size = min(self.snapshots, count)
+        firsts = range(0, count - size + 1, max(1, size // 2))
+        return [slice(k, k + size) for k in firsts]
 
     @property
     def stretch_s(self) -> float:
