@@ -18,6 +18,7 @@ from scipy.signal.windows import kaiser
 from systems.signals import Emission
 
 __all__ = [
+    "INTERPOLATION_KERNEL",
     "KERNEL_REACH",
     "MINIMUM_RANGE_M",
     "microphone_paths",
@@ -51,7 +52,8 @@ def _kernel() -> NDArray[np.float32]:
     return (taps / taps.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
-_KERNEL = _kernel()
+#: (phases + 1, taps) windowed sinc for delays of 0 ... 1 sample.
+INTERPOLATION_KERNEL = _kernel()
 
 
 @njit(cache=True)
@@ -253,6 +255,13 @@ def propagate(
         return None
     out = np.empty((len(times), count), dtype=np.float32)
     _interpolate(
-        emission.samples, _KERNEL, first, delays, rates, c / rate, MINIMUM_RANGE_M, out
+        emission.samples,
+        INTERPOLATION_KERNEL,
+        first,
+        delays,
+        rates,
+        c / rate,
+        MINIMUM_RANGE_M,
+        out,
     )
     return out
