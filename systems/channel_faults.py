@@ -35,7 +35,7 @@ _PILE = 4.0
 _COHERENT, _INCOHERENT = 5.0, 2.5
 
 # Least lead of one sign of a correlation over the other, as a share of both.
-_LEAD = 0.08
+_LEAD = 0.1
 
 
 @dataclass(frozen=True)
@@ -173,9 +173,9 @@ def _strangers(
     measured: PairCorrelations, use: NDArray[np.int64]
 ) -> list[ChannelFault]:
     """Channels that share nothing with the others, which share a sound."""
-    noise = measured.noise / np.sqrt(len(measured.levels))
+    height = np.maximum(measured.pooled_highest, -measured.pooled_lowest)
     table = np.zeros((use.size, use.size))
-    table[tuple(measured.pairs.T)] = measured.pooled / noise
+    table[tuple(measured.pairs.T)] = height / measured.noise
     best = (table + table.T).max(axis=0)
     if use.size < 3 or best.max() < _COHERENT:
         return []
@@ -195,32 +195,30 @@ def _inverted(
     measured: PairCorrelations, use: NDArray[np.int64], dead: set[int]
 ) -> list[ChannelFault]:
     """Channels whose correlations with most others are upside down."""
-    high, low = measured.highest.mean(axis=0), -measured.lowest.mean(axis=0)
+    high, low = measured.pooled_highest, -measured.pooled_lowest
+    heard = np.maximum(high, low) > _COHERENT * measured.noise
     table = np.zeros((use.size, use.size))
-    lead = (high - low) / np.maximum(high + low, 1e-300)
-    table[tuple(measured.pairs.T)] = np.where(
-        np.maximum(high, low) > 2.0 * measured.noise, lead, 0.0
-    )
+    table[tuple(measured.pairs.T)] = np.where(heard, (high - low) / (high + low), 0.0)
     table += table.T
+    alive = np.array([k not in dead for k in use.tolist()])
     signs = np.sign(np.linalg.eigh(table)[1][:, -1])
     signs[signs == 0.0] = 1.0
-    if (signs < 0.0).sum() * 2 > use.size:
+    if np.sum(signs * alive) < 0.0:
         signs = -signs
-    faults = []
-    for k in np.flatnonzero(signs < 0.0).tolist():
-        # On average over the others, each taken with its own sign.
-        if int(use[k]) in dead or table[k] @ signs / (use.size - 1) > -_LEAD:
-            continue
-        faults.append(
-            ChannelFault(
-                "inverted",
-                (int(use[k]),),
-                f"channel {use[k] + 1}: inverted, its correlation with the others is "
-                "negative; exchange the wires of its microphone, or the sign of its "
-                "samples",
-            )
+    # Every channel must agree with the others, on average, once signs are mended.
+    agreement = signs * (table @ (signs * alive)) / max(alive.sum() - 1, 1)
+    if np.any(agreement[alive] < _LEAD):
+        return []
+    return [
+        ChannelFault(
+            "inverted",
+            (int(use[k]),),
+            f"channel {use[k] + 1}: inverted, its correlation with the others is "
+            "negative; exchange the wires of its microphone, or the sign of its "
+            "samples",
         )
-    return faults
+        for k in np.flatnonzero((signs < 0.0) & alive)
+    ]
 
 
 def _order(

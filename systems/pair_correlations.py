@@ -26,24 +26,22 @@ _DENSITY = 4
 
 @dataclass(frozen=True)
 class PairCorrelations:
-    """Extremes of the correlations of f frames and p pairs, and levels."""
+    """Extremes of the correlations of p pairs in f frames, and levels."""
 
     pairs: NDArray[np.int64]
     """(p, 2) channels i < j."""
-    highest: NDArray[np.float64]
-    """(f, p) largest value, in [-1, 1]."""
-    lowest: NDArray[np.float64]
-    """(f, p) smallest value."""
     lag_of_highest: NDArray[np.float64]
     """(f, p) delay t_j - t_i, samples."""
     lag_of_lowest: NDArray[np.float64]
     """(f, p) samples."""
-    pooled: NDArray[np.float64]
-    """(p,) largest size of the correlation's mean over the frames."""
+    pooled_highest: NDArray[np.float64]
+    """(p,) largest value of the correlation's mean over the frames."""
+    pooled_lowest: NDArray[np.float64]
+    """(p,) its smallest value."""
     levels: NDArray[np.float64]
     """(f, n) RMS of the channels within the band."""
     noise: float
-    """What the largest value is about in independent noise."""
+    """About what the pooled extremes are in independent noise."""
 
 
 def correlate_pairs(
@@ -88,16 +86,15 @@ def correlate_pairs(
     pairs = np.stack(np.triu_indices(count, 1), axis=1)
     values = [_correlation(spectra[i], spectra[j], gate) for i, j in pairs]
     extremes = [_extremes(v, gate) for v in values]
-    highest, lowest, at_highest, at_lowest = np.stack(extremes, axis=2)
+    at_highest, at_lowest = np.stack(extremes, axis=2)
     return PairCorrelations(
         pairs=pairs,
-        highest=highest,
-        lowest=lowest,
         lag_of_highest=at_highest,
         lag_of_lowest=at_lowest,
-        pooled=np.array([np.abs(v.mean(axis=0)).max() for v in values]),
+        pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
+        pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
         levels=np.sqrt(power / length).T,
-        noise=math.sqrt(math.log(2.0 * gate + 1.0) / bins),
+        noise=math.sqrt(math.log(2.0 * gate + 1.0) / bins / chosen.size),
     )
 
 
@@ -116,18 +113,14 @@ def _correlation(
 
 
 def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
-    """(4, f) highest and lowest value, and the lags of both."""
-    high, at_high = _vertex(values)
-    low, at_low = _vertex(-values)
-    return np.stack((high, -low, at_high / _DENSITY - gate, at_low / _DENSITY - gate))
+    """(2, f) lags of the highest and the lowest value."""
+    return np.stack((_vertex(values), _vertex(-values))) / _DENSITY - gate
 
 
-def _vertex(
-    values: NDArray[np.float64],
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Largest values of the rows, and their places by a parabola."""
+def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of the rows' largest values, by a parabola."""
     rows = np.arange(len(values))
     best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
     left, top, right = (values[rows, best + k] for k in (-1, 0, 1))
     curve = np.minimum(left - 2.0 * top + right, -1e-12)
-    return top, best + np.clip(0.5 * (left - right) / curve, -1.0, 1.0)
+    return best + np.clip(0.5 * (left - right) / curve, -1.0, 1.0)
