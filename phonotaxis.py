@@ -118,11 +118,14 @@ def _parser() -> argparse.ArgumentParser:
     scenarios.set_defaults(run=_scenarios)
 
     locate = commands.add_parser(
-        "locate", help="range and bearing over time of a recording"
+        "locate", help="bearing and range over time of a recording"
     )
     locate.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
     locate.add_argument(
         "--geometry", metavar="FILE.yaml", help="places of the microphones"
+    )
+    locate.add_argument(
+        "--out", metavar="DIR", help="directory for locate.json and locate.png"
     )
     locate.add_argument("--json", action="store_true", help="print one JSON document")
     locate.set_defaults(run=_locate)
@@ -258,16 +261,34 @@ def _scenarios(options: argparse.Namespace) -> None:
 
 def _locate(options: argparse.Namespace) -> None:
     from analysis.locate import load_geometry, locate
+    from analysis.locate_text import locate_text
+    from analysis.result_directory import choose_directory, whole_directory
 
-    try:
-        geometry = load_geometry(Path(options.geometry)) if options.geometry else None
-        result = locate(Path(options.recording), geometry)
-    except ValueError as error:
-        raise InputError.from_error(error) from None
+    with ExitStack() as stack:
+        try:
+            geometry = (
+                load_geometry(Path(options.geometry)) if options.geometry else None
+            )
+            if options.out is not None:
+                out = choose_directory(options.out)
+                directory = stack.enter_context(whole_directory(out))
+            result = locate(Path(options.recording), geometry)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        document = result.to_dict()
+        if options.out is not None:
+            from analysis.locate_plots import write_locate
+
+            document["out"] = str(out)
+            write_locate(result, document, directory)
+    for fault in result.faults:
+        print(f"phonotaxis: {fault}", file=sys.stderr)
     if options.json:
-        print(json.dumps(result.to_dict()))
-    else:
-        print(result.to_text())
+        print(json.dumps(document, allow_nan=False))
+        return
+    print(locate_text(result))
+    if options.out is not None:
+        print(f"results in {out}")
 
 
 def _localization(options: argparse.Namespace) -> None:

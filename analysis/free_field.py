@@ -24,12 +24,11 @@ from analysis.estimation_errors import (
 )
 from systems.adc import MicArrayParameters, convert
 from systems.array_shape import ArrayShape
-from systems.delay_plan import DelayPlan
+from systems.localise import Localiser, TDOAParameters
 from systems.mic_array import FRAME_SAMPLES
 from systems.propagation import propagate
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
 from systems.source_fix import SourceFix
-from systems.tdoa_estimator import TDOAParameters, localise
 from systems.waveforms import EDGE_S, SoundParameters, make_waveform
 
 __all__ = [
@@ -56,17 +55,9 @@ Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 def frame_estimator(
     parameters: TDOAParameters, shape: ArrayShape, c: float
 ) -> Estimator:
-    """What ``TDOAEstimator`` does to a (n, samples) frame."""
-    assert shape.equal_row is not None
-    spacing = shape.equal_row[1]
-    plan = DelayPlan(
-        sample_rate_hz=SAMPLE_RATE_HZ,
-        frame_samples=FRAME_SAMPLES,
-        max_delay_s=spacing / c,
-        low_hz=parameters.low_hz,
-        high_hz=parameters.high_hz,
-    )
-    return lambda frame: localise(frame, plan, parameters, spacing, c)
+    """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears."""
+    localiser = Localiser.of(parameters, shape, c)
+    return lambda frame: localiser.localise(frame, localiser.blank())[0]
 
 
 @dataclass(frozen=True)

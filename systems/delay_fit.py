@@ -25,10 +25,13 @@ from numpy.typing import NDArray
 __all__ = ["DelayProblem", "fit_delays"]
 
 _STEPS = 30
-_SETTLED = 1e-13
+_SETTLED = 1e-9
 
 # Two places explain the delays alike where their chi-squares differ by less.
 _SAME_CHI_SQUARE = 9.0
+
+# Keeps slopes finite along a row and in the plane of a plane array.
+_LEAST_COSINE = 0.05
 
 
 class DelayProblem(NamedTuple):
@@ -110,6 +113,17 @@ def _tangent(u, span):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
+def _coordinates(problem, u, bound):  # pragma: no cover  (compiled)
+    """(d, k) what the coordinates of a direction do to it."""
+    if bound:
+        return _tangent(u, problem.span)
+    # Microphones a little off their plane hear the component off it too.
+    v = problem.span @ u
+    off = max(math.sqrt(max(1.0 - v @ v, 0.0)), _LEAST_COSINE)
+    return problem.span.T - np.outer(problem.side, v) / off
+
+
+@njit(cache=True)
 def _lifted(v, span, side):  # pragma: no cover  (compiled)
     """Direction with components v in the span, completed to the side."""
     u = v @ span
@@ -131,7 +145,7 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
         u, w and the sum of squares there.
     """
     span = problem.span
-    basis = _tangent(u, span) if bound else np.ascontiguousarray(span.T)
+    basis = _coordinates(problem, u, bound)
     r, J = _system(problem, basis, u, w)
     cost, damping = r @ r, 0.0
     for _ in range(_STEPS):
@@ -146,10 +160,9 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
         if bound:
             u_next = u + basis @ step[:k]
             u_next /= np.sqrt(u_next @ u_next)
-            basis_next = _tangent(u_next, span)
         else:
             u_next = _lifted(span @ u + step[:k], span, problem.side)
-            basis_next = basis
+        basis_next = _coordinates(problem, u_next, bound)
         r_next, J_next = _system(problem, basis_next, u_next, w + step[k])
         cost_next = r_next @ r_next
         if cost_next <= cost:
@@ -158,7 +171,7 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
             damping *= 0.1
         else:
             damping = max(10.0 * damping, 1e-3)
-        if np.abs(step).max() < _SETTLED or damping > 1e8:
+        if np.abs(step).max() < _SETTLED:
             break
     return u, w, cost
 
@@ -230,7 +243,7 @@ def _covariance(problem, u, w, prior):  # pragma: no cover  (compiled)
     side = problem.side
     ambiguous = side.any()
     span = problem.span
-    basis = np.ascontiguousarray(span.T) if ambiguous else _tangent(u, span)
+    basis = _coordinates(problem, u, bound=not ambiguous)
     _, J = _system(problem, basis, u, w)
     A = J.T @ J
     k = basis.shape[1]
@@ -246,7 +259,7 @@ def _covariance(problem, u, w, prior):  # pragma: no cover  (compiled)
         inside = np.ascontiguousarray(C[:k, :k])
         size = math.sqrt(max(v @ (inside @ v), 0.0))
         off = max(math.sqrt(max(1.0 - v @ v, 0.0)), math.sqrt(size), 1e-6)
-        basis = basis - np.outer(side, v) / off
+        basis = span.T - np.outer(side, v) / off
     return C, basis
 
 
@@ -280,8 +293,9 @@ def _search(problem):  # pragma: no cover  (compiled)
             break  # a start from far away would end there as well
         v = directions[s]
         length = np.sqrt(v @ v)
-        if length > 1.0 or (bound and length > 0.0):
-            v = v / length
+        if length > 1.0 or bound:
+            # Nothing at all points to a source amid the microphones.
+            v = v / length if length > 0.0 else span[0]
         u, w = _from_centroid(v, inverse[s], p[0], span, side)
         us[s], ws[s], costs[s] = _descend_within(problem, u, w, far)
     order = np.argsort(costs)
