@@ -18,13 +18,20 @@ signal this is the bound of Knapp and Carter (1976).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-__all__ = ["LocalizationBound", "SlopeEnergy", "arrival_information", "position_bound"]
+__all__ = [
+    "LocalizationBound",
+    "SlopeEnergy",
+    "arrival_information",
+    "polar_gradients",
+    "position_bound",
+]
 
 # Beyond this condition number a position cannot be told from the delays.
 _LARGEST_CONDITION = 1e14
@@ -79,6 +86,18 @@ class LocalizationBound:
     """rad; None in the plane."""
     range_std: float
     """m."""
+
+    @classmethod
+    def mean(cls, bounds: Sequence[LocalizationBound]) -> LocalizationBound:
+        """Of errors over many frames: variances and covariances averaged."""
+        elevations = [b.elevation_std for b in bounds if b.elevation_std is not None]
+        return cls(
+            delays=np.mean([b.delays for b in bounds], axis=0),
+            covariance=np.mean([b.covariance for b in bounds], axis=0),
+            bearing_std=_rms([b.bearing_std for b in bounds]),
+            elevation_std=_rms(elevations) if elevations else None,
+            range_std=_rms([b.range_std for b in bounds]),
+        )
 
 
 def arrival_information(
@@ -149,10 +168,14 @@ def position_bound(
     if not np.isfinite(covariance).all():
         elevation = None if len(p_AS) == 2 else math.inf
         return LocalizationBound(delays, covariance, math.inf, elevation, math.inf)
-    stds = [math.sqrt(g @ covariance @ g) for g in _polar_gradients(p_AS)]
+    stds = [math.sqrt(g @ covariance @ g) for g in polar_gradients(p_AS)]
     return LocalizationBound(
         delays, covariance, stds[0], stds[2] if len(stds) > 2 else None, stds[1]
     )
+
+
+def _rms(values: Sequence[float]) -> float:
+    return math.sqrt(np.mean(np.square(values)))
 
 
 def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -162,7 +185,7 @@ def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.asarray(np.linalg.inv(information))
 
 
-def _polar_gradients(p: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+def polar_gradients(p: NDArray[np.float64]) -> list[NDArray[np.float64]]:
     """Gradients of azimuth, range and, in space, elevation."""
     distance = float(np.linalg.norm(p))
     flat = math.hypot(p[0], p[1])

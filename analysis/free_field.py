@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
 from analysis.estimation_errors import (
@@ -32,16 +32,12 @@ from systems.source_fix import SourceFix
 from systems.waveforms import EDGE_S, SoundParameters, make_waveform
 
 __all__ = [
-    "PAPER_CELLS",
     "FreeFieldCell",
     "Loudspeaker",
     "frame_estimator",
     "run_cell",
     "total_consistency",
 ]
-
-#: Range (m) and bearing (deg) of the cells of Han 2019, tables 1 and 2.
-PAPER_CELLS = tuple((r, b) for r in (1.0, 2.0, 3.0, 4.0) for b in (0.0, 30.0, 60.0))
 
 #: Full scale of the converter over the largest sample.
 _HEADROOM = 1.2
@@ -91,9 +87,21 @@ class Loudspeaker:
         return len(self.samples) / SAMPLE_RATE_HZ
 
     def pressure(
-        self, begin: float, p_AS: NDArray[np.float64], shape: ArrayShape, c: float
+        self,
+        begin: ArrayLike,
+        p_AS: NDArray[np.float64],
+        p_AM: NDArray[np.float64],
+        c: float,
     ) -> NDArray[np.float32]:
-        """(n, samples) of the frame that begins then, at rest at p_AS, Pa."""
+        """(n, samples) of a frame, source and microphones at rest, Pa.
+
+        Args:
+            begin: Time of the frame's first sample, of every channel or one for
+                all, s.
+            p_AS: (2,) source, m.
+            p_AM: (n, 2) microphones, m.
+            c: Speed of sound, m/s.
+        """
         emission = Emission(
             samples=self.samples,
             start_time=0.0,
@@ -104,8 +112,9 @@ class Loudspeaker:
             level_pa=self.level_pa,
             sounding=True,
         )
-        times = np.tile([begin, begin + FRAME_PERIOD_S], (shape.count, 1))
-        p_WM = np.repeat(shape.p_AM[:, None, :], 2, axis=1)
+        begins = np.broadcast_to(begin, len(p_AM))
+        times = np.stack((begins, begins + FRAME_PERIOD_S), axis=1)
+        p_WM = np.repeat(p_AM[:, None, :], 2, axis=1)
         heard = propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
         assert heard is not None
         return heard
@@ -223,7 +232,7 @@ def run_cell(
     bounds = []
     for _ in range(trials):
         begin = rng.uniform(_LEAD_S, loudspeaker.seconds - _LEAD_S)
-        pressure = loudspeaker.pressure(begin, p_AS, shape, c)
+        pressure = loudspeaker.pressure(begin, p_AS, shape.p_AM, c)
         noise = rng.standard_normal(pressure.shape, dtype=np.float32)
         loudest = np.abs(pressure + np.float32(noise_pa) * noise).max()
         converter = _fitted_converter(float(loudest))

@@ -36,7 +36,7 @@ def test_pressure_is_the_sound_delayed_and_weakened():
     """Against a delay by the Fourier transform of the whole sound."""
     p_AS = np.array([1.2, 0.7])
     begin = 0.43217
-    heard = LOUDSPEAKER.pressure(begin, p_AS, SHAPE, C)
+    heard = LOUDSPEAKER.pressure(begin, p_AS, SHAPE.p_AM, C)
     spectrum = fft.rfft(LOUDSPEAKER.samples.astype(float))
     frequency = fft.rfftfreq(len(LOUDSPEAKER.samples), 1e-5)
     for channel, p in zip(heard, SHAPE.p_AM, strict=True):
