@@ -166,13 +166,15 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
         seed=block_seed(scenario.seed, "mic_array"),
     )
     emitters = {"emitter": _emitter(scenario, scenario.sound, microphones)}
-    for interferer in scenario.interferers:
+    for k, interferer in enumerate(scenario.interferers):
         suffix = f"_{interferer.name}"
         robot = SourceRobot(source=interferer, suffix=suffix)
         emitters[f"source{suffix}"] = robot
-        emitters[f"emitter{suffix}"] = _emitter(
-            scenario, interferer.sound, microphones, suffix
-        )
+        try:
+            emitter = _emitter(scenario, interferer.sound, microphones, suffix)
+        except ValueError as error:
+            raise ValueError(f"interferers.{k}.{error}") from None
+        emitters[f"emitter{suffix}"] = emitter
     return {
         **emitters,
         "microphones": microphones,

@@ -19,6 +19,7 @@ from systems.array_tolerances import (
     real_array,
 )
 from systems.cache import declare_cache
+from systems.ego_noise import EgoNoise, driving_share
 from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.propagation import microphone_paths, propagate
 from systems.reverberation import Reverberation
@@ -61,6 +62,7 @@ def record_frame(
     seed: int,
     rise: float = 0.0,
     reflections: Sequence[NDArray[np.float32] | None] = (),
+    ego_noise: NDArray[np.float32] | None = None,
 ) -> AudioFrame:
     """The frame that ends now.
 
@@ -74,6 +76,7 @@ def record_frame(
         seed: Seed of the noise.
         rise: Height of the microphones above the sources, m.
         reflections: (n, FRAME_SAMPLES) Pa each, of the sources' reflections.
+        ego_noise: (n, FRAME_SAMPLES) over the level of the first source at 1 m.
 
     Raises:
         ValueError: A source is out of the emission's reach.
@@ -86,7 +89,10 @@ def record_frame(
     pressure = _total([*direct, *reflections])
     tick = round(time / FRAME_PERIOD_S)
     noise = frame_noise((len(p_WM), FRAME_SAMPLES), seed, tick)
-    noise_pa = emissions[0].level_pa * 10.0 ** (-parameters.snr_db_at_1m / 20.0)
+    snr = 10.0 ** (parameters.snr_db_at_1m / 20.0)
+    if ego_noise is not None:
+        noise += np.float32(snr) * ego_noise
+    noise_pa = emissions[0].level_pa / snr
     return AudioFrame(
         counts=convert(pressure, noise, noise_pa, parameters, array.gains),
         full_scale=parameters.full_scale,
@@ -151,8 +157,8 @@ class MicArray(LeafSystem):
         seed: Seed of the noise and of the array's errors.
 
     Raises:
-        ValueError: The skew is given for another number of channels, or the
-            room cannot be.
+        ValueError: The skew is given for another number of channels, the room
+            cannot be, or the file of the ego noise cannot be used.
     """
 
     POSITION_ERRORS, CHANNEL_DELAYS, GAINS, SOUND_SPEED = range(4)
@@ -175,6 +181,10 @@ class MicArray(LeafSystem):
         c = (acoustics or AcousticParameters()).c
         self._declare_errors(c)
         self._reverberation = Reverberation(room, c) if room else None
+        self._ego_noise = None
+        if self._parameters.ego_noise_file is not None:
+            count = len(self._robot.microphones_m)
+            self._ego_noise = EgoNoise(self._parameters, count, seed)
         self._rise = room.rise_m if room else 0.0
         self._sources = [
             self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
@@ -289,6 +299,10 @@ class MicArray(LeafSystem):
         time = context.get_time()
         pose = np.asarray(self._pose_WB.Eval(context))
         velocity = np.asarray(self._velocity_WB.Eval(context))
+        ego_noise = None
+        if self._ego_noise is not None:
+            share = driving_share(velocity, self._robot)
+            ego_noise = self._ego_noise.frame(round(time / FRAME_PERIOD_S), share)
         array: Any = self._array.Eval(context)
         last = context.get_discrete_state(0).value()
         before = last[1:4], last[4:7]
@@ -305,5 +319,6 @@ class MicArray(LeafSystem):
                 seed=self._seed,
                 rise=self._rise,
                 reflections=self._reflections(context, emissions, array),
+                ego_noise=ego_noise,
             )
         )

@@ -70,6 +70,17 @@ def test_interferers_are_wired_to_the_microphones():
         assert wires[emitter, f"pose_WS_{name}"] == f"source_robot_{name}"
 
 
+def test_bad_files_are_named_by_their_whole_field(tmp_path):
+    missing = str(tmp_path / "missing.wav")
+    interferer = {"name": "fan", "sound": {"kind": "wav", "file": missing}}
+    for data, field in (
+        ({"interferers": [interferer]}, r"interferers\.0\.sound\.file"),
+        ({"microphones": {"ego_noise_file": missing}}, r"microphones\.ego_noise_file"),
+    ):
+        with pytest.raises(ValueError, match=rf"^{field}: .*missing\.wav"):
+            build_sound_follower(Scenario.model_validate(data))
+
+
 def test_emitters_reach_back_as_far_as_the_room_answers():
     """By 0.4 s: 136 m, where 30 m are enough without a room."""
     scenario = Scenario.model_validate(

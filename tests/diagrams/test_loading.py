@@ -115,13 +115,17 @@ def test_dumped_scenario_loads_as_it_was(tmp_path, name):
 def test_relative_files_lie_beside_the_scenario(tmp_path):
     text = """
 sound: {kind: wav, file: a.wav}
+microphones: {ego_noise_file: c.wav}
 interferers:
   - {name: fan, sound: {kind: wav, file: b.wav}}
   - {name: drill}
 """
     scenario = load_scenario(write(tmp_path, text))
-    files = [scenario.sound.file, scenario.interferers[0].sound.file]
-    assert files == [str((tmp_path / name).resolve()) for name in ("a.wav", "b.wav")]
+    assert [
+        scenario.sound.file,
+        scenario.interferers[0].sound.file,
+        scenario.microphones.ego_noise_file,
+    ] == [str((tmp_path / name).resolve()) for name in ("a.wav", "b.wav", "c.wav")]
 
 
 def test_fields_of_a_group_that_is_unset_may_be_overridden(tmp_path):
