@@ -25,7 +25,7 @@ __all__ = ["exchanged_channels", "levels_contradict", "misfit"]
 # Delays fit where they are right to this part of a sample, or to this share of
 # what sound needs across the array.
 _FIT_SAMPLES = 0.25
-_FIT_SHARE = 0.03
+_FIT_SHARE = 0.05
 
 # Fewer frames whose pairs agree prove nothing.
 _LEAST_FRAMES = 5
@@ -152,7 +152,7 @@ def _agreeing(
     to_pairs = to_pairs[:, 1:]
     d = lags * metres_per_sample
     differences = d @ np.linalg.pinv(to_pairs).T
-    errors = np.abs(d - differences @ to_pairs.T).max(axis=1)
+    errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
     agree = errors < _tolerance(shape, metres_per_sample)
     return differences[agree], levels[agree]
 
