@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate."""
+"""The command line: simulate, scenarios, locate, localization."""
 
 from __future__ import annotations
 
@@ -118,14 +118,38 @@ def _parser() -> argparse.ArgumentParser:
     scenarios.set_defaults(run=_scenarios)
 
     locate = commands.add_parser(
-        "locate", help="range and bearing over time of a recording"
+        "locate", help="bearing and range over time of a recording"
     )
     locate.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
     locate.add_argument(
         "--geometry", metavar="FILE.yaml", help="places of the microphones"
     )
+    locate.add_argument(
+        "--out", metavar="DIR", help="directory for locate.json and locate.png"
+    )
     locate.add_argument("--json", action="store_true", help="print one JSON document")
     locate.set_defaults(run=_locate)
+
+    localization = commands.add_parser(
+        "localization", help="the papers' localisation tables, ours, and the bound"
+    )
+    localization.add_argument(
+        "--trials", metavar="N", type=int, default=100, help="measurements a cell (100)"
+    )
+    localization.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    localization.add_argument(
+        "--tolerances",
+        action="store_true",
+        help="redraw errors of the array for every measurement, within 0.2 mm, "
+        "0.2 us and 0.2 %% of the speed of sound",
+    )
+    localization.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    localization.add_argument(
+        "--json", action="store_true", help="print one JSON document"
+    )
+    localization.set_defaults(run=_localization)
     return parser
 
 
@@ -174,7 +198,7 @@ def _run(scenario: Any, follower: Any) -> Any:
     from diagrams import make_simulator, simulate
 
     try:
-        with _Progress(scenario.duration_s) as progress:
+        with _Progress(scenario.duration_s, "s simulated") as progress:
             # Compiled functions load, or at first compile, before the clock starts.
             make_simulator(follower).AdvanceTo(0.1)
             return simulate(scenario, follower=follower, progress=progress)
@@ -185,18 +209,18 @@ def _run(scenario: Any, follower: Any) -> Any:
 
 
 class _Progress:
-    """A bar of simulated seconds on a terminal, nothing in a pipe.
+    """A bar on a terminal, nothing in a pipe.
 
-    Holds Ctrl-C back to the next simulated second: compiled callbacks turn an
-    exception that strikes inside them into a SystemError.
+    Holds Ctrl-C back to the next call: compiled callbacks turn an exception
+    that strikes inside them into a SystemError.
     """
 
-    def __init__(self, duration: float) -> None:
+    def __init__(self, total: float, unit: str) -> None:
         from tqdm import tqdm
 
-        form = "{l_bar}{bar}| {n:.0f}/{total:.0f} s simulated, {remaining} left"
+        form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
         self._bar = tqdm(
-            total=duration,
+            total=total,
             disable=not sys.stderr.isatty(),
             bar_format=form,
             leave=False,
@@ -211,8 +235,8 @@ class _Progress:
     def _interrupt(self, *_: Any) -> None:
         self._interrupted = True
 
-    def __call__(self, time: float) -> None:
-        self._bar.update(time - self._bar.n)
+    def __call__(self, done: float) -> None:
+        self._bar.update(done - self._bar.n)
         if self._interrupted:
             raise KeyboardInterrupt
 
@@ -237,16 +261,65 @@ def _scenarios(options: argparse.Namespace) -> None:
 
 def _locate(options: argparse.Namespace) -> None:
     from analysis.locate import load_geometry, locate
+    from analysis.locate_text import locate_text
+    from analysis.result_directory import choose_directory, whole_directory
 
-    try:
-        geometry = load_geometry(Path(options.geometry)) if options.geometry else None
-        result = locate(Path(options.recording), geometry)
-    except ValueError as error:
-        raise InputError.from_error(error) from None
+    with ExitStack() as stack:
+        try:
+            geometry = (
+                load_geometry(Path(options.geometry)) if options.geometry else None
+            )
+            if options.out is not None:
+                out = choose_directory(options.out)
+                directory = stack.enter_context(whole_directory(out))
+            result = locate(Path(options.recording), geometry)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        document = result.to_dict()
+        if options.out is not None:
+            from analysis.locate_plots import write_locate
+
+            document["out"] = str(out)
+            write_locate(result, document, directory)
+    for fault in result.faults:
+        print(f"phonotaxis: {fault}", file=sys.stderr)
     if options.json:
-        print(json.dumps(result.to_dict()))
+        print(json.dumps(document, allow_nan=False))
+        return
+    print(locate_text(result))
+    if options.out is not None:
+        print(f"results in {out}")
+
+
+def _localization(options: argparse.Namespace) -> None:
+    from analysis.localization import prepare_localization
+    from analysis.localization_report import (
+        localization_summary,
+        localization_text,
+        write_localization,
+    )
+    from analysis.result_directory import choose_directory, whole_directory
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            experiment = prepare_localization(
+                [] if options.seed is None else [f"seed={options.seed}"],
+                trials=options.trials,
+                tolerances=options.tolerances,
+            )
+            directory = stack.enter_context(whole_directory(out))
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        with _Progress(experiment.measurements, "measurements") as progress:
+            cells = experiment.run(progress)
+        summary = localization_summary(experiment, cells, out)
+        write_localization(experiment, cells, summary, directory)
+    if options.json:
+        print(json.dumps(summary))
     else:
-        print(result.to_text())
+        print(localization_text(summary))
+        print(f"\nresults in {out}")
 
 
 if __name__ == "__main__":

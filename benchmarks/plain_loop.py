@@ -15,17 +15,16 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.builder import block_seed
 from systems.active_impedance_controller import active_force
-from systems.array_tolerances import draw_tolerances
+from systems.array_tolerances import draw_tolerances, real_array
 from systems.collision_vector import collision_vectors, echo_points
-from systems.delays import DelayPlan
 from systems.diff_drive_plant import body_twist, plant_derivatives
 from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
-from systems.mic_array import real_array, record_frame
+from systems.mic_array import microphones_B, record_frame
 from systems.noise import BEFORE_THE_RUN, tick_generator
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
-from systems.sound_emitter import history_ticks, make_emission
+from systems.signals import FRAME_PERIOD_S
+from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.source_fix import SourceFix
 from systems.source_tracker import (
     NEVER_HEARD_S,
@@ -35,7 +34,7 @@ from systems.source_tracker import (
     held_target,
     past_pose,
 )
-from systems.tdoa_estimator import localise, row_spacing
+from systems.tdoa_estimator import port_values, robot_localiser
 from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
 from systems.waveforms import make_waveform
 from systems.wheel_odometry import advance_pose, encoder_angle
@@ -48,8 +47,6 @@ from systems.wheel_speed_command import (
 __all__ = ["PlainLoop"]
 
 T = FRAME_PERIOD_S
-#: Reach of the loudspeaker, the default of ``SoundEmitter``.
-MAXIMUM_RANGE_M = 30.0
 
 
 class PlainLoop:
@@ -58,7 +55,6 @@ class PlainLoop:
     def __init__(self, scenario: Scenario) -> None:
         self.scenario = scenario
         c = scenario.acoustics.c
-        self.spacing = row_spacing(scenario.robot)
         self.path = scenario.source.path()
         self.obstacles = [o.path() for o in scenario.obstacles]
         self.sizes = np.array([e for o in scenario.obstacles for e in o.size_m])
@@ -72,19 +68,17 @@ class PlainLoop:
             len(scenario.robot.microphones_m),
             tick_generator(self.mic_seed, BEFORE_THE_RUN),
         )
-        self.array = real_array(scenario.robot, microphones, errors, c)
+        p_BM = microphones_B(scenario.robot)
+        self.array = real_array(p_BM, microphones, errors, c)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
-        self.plan = DelayPlan(
-            sample_rate_hz=SAMPLE_RATE_HZ,
-            frame_samples=round(T * SAMPLE_RATE_HZ),
-            max_delay_s=self.spacing / c,
-            low_hz=scenario.tdoa.low_hz,
-            high_hz=scenario.tdoa.high_hz,
+        self.localiser, self.p_PA_B = robot_localiser(
+            scenario.tdoa, scenario.robot, scenario.acoustics
         )
 
     def run(self) -> NDArray[np.float64]:
         """(ticks + 1, 7) states of the plant at every tick."""
         scenario = self.scenario
+        self.memory = self.localiser.blank()
         state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
         odometry, angles = list(scenario.start.pose), [0.0, 0.0]
         blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, 0.0, Candidates.none()
@@ -126,9 +120,8 @@ class PlainLoop:
         epsilon = self.scenario.robot.control_point_m
         now = track
         if fix is not None:
-            estimate = Estimate(
-                list(fix.p_AS), fix.covariance.ravel().tolist(), fix.range_valid
-            )
+            ports = port_values(fix, self.p_PA_B)
+            estimate = Estimate(ports[2].tolist(), ports[3].tolist(), fix.range_valid)
             then = past_pose(pose, track.pose_1, track.pose_2, 1.5 * T)
             folded = fold_estimate(track, estimate, then, tracker, epsilon)
             if folded is None:
@@ -193,7 +186,7 @@ class PlainLoop:
         now = (np.array(state[:3]), velocity)
         emission = make_emission(time, self.waveform, scenario.sound, history.copy())
         audio = record_frame(
-            emission,
+            [emission],
             time,
             last,
             now,
@@ -203,8 +196,8 @@ class PlainLoop:
         )
         history[:-1] = history[1:]
         frame = audio.counts.astype(np.float32)
-        c = scenario.acoustics.c
-        return localise(frame, self.plan, scenario.tdoa, self.spacing, c), now
+        fix, self.memory = self.localiser.localise(frame, self.memory)
+        return fix, now
 
     def _drive(self, state: Any, wheels: Any) -> Any:
         """One third-order Runge-Kutta step, the one that Drake takes."""

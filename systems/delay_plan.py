@@ -1,4 +1,4 @@
-"""Sizes of the transforms that measure delays."""
+"""Sizes of the transforms that measure delays, and the pairs to measure."""
 
 from __future__ import annotations
 
@@ -6,7 +6,12 @@ import math
 from dataclasses import dataclass
 from functools import cached_property
 
+import numpy as np
+from numpy.typing import NDArray
 from scipy import fft
+
+from systems.array_shape import ArrayShape
+from systems.delay_peaks import PairTables
 
 __all__ = ["DelayPlan"]
 
@@ -17,20 +22,22 @@ _GRID_DENSITY = 5.0
 _LEAST_OVERLAP = 0.25
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class DelayPlan:
     """What can be worked out before the first frame.
 
     Raises:
-        ValueError: Band, frame and spacing do not fit the sample rate.
+        ValueError: Band, frame and array do not fit the sample rate.
     """
 
+    shape: ArrayShape
+    """The microphones, in the order of the channels."""
+    c: float
+    """Speed of sound, m/s."""
     sample_rate_hz: float
     """Rate of the frames, Hz."""
     frame_samples: int
     """Length of the frames."""
-    max_delay_s: float
-    """Largest delay between neighbours, spacing / c, s."""
     low_hz: float
     """Lower end of the band, Hz."""
     high_hz: float
@@ -43,22 +50,51 @@ class DelayPlan:
                 f"or below half the sample rate of {self.sample_rate_hz:g} Hz; lower "
                 "the band or record at a higher rate"
             )
-        if 2 * self.max_lag > (1.0 - _LEAST_OVERLAP) * self.frame_samples:
+        if self.max_lag > (1.0 - _LEAST_OVERLAP) * self.frame_samples:
             raise ValueError(
-                f"spacing: sound needs {self.max_delay_s * 1e3:.2f} ms from microphone "
-                f"to microphone, too long for frames of {self.frame_samples} samples; "
+                f"microphones: sound takes {self.shape.max_delay(self.c) * 1e3:.2f} ms "
+                f"across them, too long for frames of {self.frame_samples} samples; "
                 "use longer frames"
             )
 
     @property
     def max_lag(self) -> int:
-        """Largest delay between neighbours, samples."""
-        return math.ceil(self.max_delay_s * self.sample_rate_hz)
+        """Largest delay between any two channels, samples."""
+        return math.ceil(self.shape.max_delay(self.c) * self.sample_rate_hz)
+
+    @cached_property
+    def edges(self) -> NDArray[np.int64]:
+        """(n - 1, 2) pairs of near channels that join all, as a tree from channel 0.
+
+        Near pairs have few lags to search. The first channel of an edge is 0 or
+        the second one of an earlier edge.
+        """
+        places = self.shape.p_AM
+        gaps = np.linalg.norm(places[:, np.newaxis] - places, axis=2)
+        joined, edges = [0], []
+        while len(joined) < len(places):
+            rest = [k for k in range(len(places)) if k not in joined]
+            _, i, j = min((gaps[i, j], i, j) for i in joined for j in rest)
+            edges.append((i, j))
+            joined.append(j)
+        return np.array(edges)
+
+    @cached_property
+    def edge_lags(self) -> NDArray[np.int64]:
+        """(n - 1,) largest delay along each edge, samples."""
+        first, second = self.shape.p_AM[self.edges.T]
+        distances = np.linalg.norm(first - second, axis=1)
+        return np.ceil(distances / self.c * self.sample_rate_hz).astype(np.int64)
+
+    @cached_property
+    def tables(self) -> PairTables:
+        """Joins the delays of all pairs."""
+        return PairTables.of(self.shape.pairs)
 
     @cached_property
     def length(self) -> int:
         """Samples of the Fourier transform, padded so that lags do not wrap."""
-        least = self.frame_samples + self.max_lag + 2
+        least = self.frame_samples + int(self.edge_lags.max()) + 2
         return int(fft.next_fast_len(least, real=True))
 
     @cached_property
@@ -75,6 +111,7 @@ class DelayPlan:
         return int(fft.next_fast_len(least, real=True))
 
     @cached_property
-    def gate(self) -> int:
-        """Largest lag on that grid, one more than sound can take."""
-        return math.ceil(self.max_lag * self.grid / self.length) + 1
+    def gates(self) -> NDArray[np.int64]:
+        """(n - 1,) largest lag on that grid, one more than sound can take."""
+        exact = self.edge_lags * (self.grid / self.length)
+        return np.ceil(exact).astype(np.int64) + 1

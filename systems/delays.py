@@ -1,180 +1,98 @@
-"""Delays between three microphones in a row, from one frame of their sound.
+"""Delays between the channels of a frame.
 
-A method first finds the delays of the two neighbouring pairs on a grid. Then
-the three channels are cut to the stretch that they share, so that the edges
-of the frame do not bend the result, and the peak of their cross-correlation is
-found by Newton's method on the cross-spectrum. The coherence of the cut
-channels gives the errors of the delays.
+The delays of neighbouring channels are first found on a grid. Then the
+channels are cut to the stretch that they share, so that the edges of the frame
+do not bend the result, and the peak of each pair's cross-correlation is found
+by Newton's method on the cross-spectrum. The coherence of the cut channels
+gives the errors of the delays.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.delay_peaks import find_peaks, whitening
+from systems.delay_peaks import Peaks, find_peaks
 from systems.delay_plan import DelayPlan
+from systems.delay_search import DelaySearch, search_delays
+from systems.occupied_band import occupied_band
 
-__all__ = ["METHODS", "DelayEstimate", "DelayPlan", "amdf", "estimate_delays"]
+__all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look"]
 
 # The channels are cut again when a delay has moved by more than this, samples.
 _SETTLED = 0.75
 _CUTS = 4
 
 
-@dataclass(frozen=True)
-class DelayEstimate:
-    """Delays of one frame and what speaks for them."""
-
-    tau_12: float
-    """s; positive when the sound reaches the first channel earlier."""
-    tau_13: float
-    """s."""
-    covariance: NDArray[np.float64]
-    """(2, 2) of the two, s^2."""
-    correlation: float
-    """Least correlation coefficient of the three pairs, 0 to 1."""
-    closure: float
-    """|tau_12 + tau_23 - tau_13| before the three are reconciled, s."""
-    ambiguity: float
-    """Second peak over first within the gate, 0 to 1; worst pair."""
-
-
-def amdf(
-    x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
-) -> NDArray[np.float64]:
-    """Average magnitude difference of two channels (Han 2019, eq. 4-6).
-
-    The papers maximise 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1.
-    Here the sum itself is minimised, so that equal signals do no harm; both
-    signs of the lag are searched; and the sum is divided by the number of its
-    terms, for the printed one favours large lags.
-
-    Args:
-        x_i: (n,) samples.
-        x_j: (n,) samples.
-        max_lag: Largest lag, below n.
-
-    Returns:
-        (2 max_lag + 1,) for the lags -max_lag ... max_lag. The minimum stands
-        at the delay t_j - t_i.
-    """
-    return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
-
-
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
-    n = x_i.size
-    out = np.empty(2 * max_lag + 1)
-    for lag in range(-max_lag, max_lag + 1):
-        first, last = max(0, -lag), min(n, n - lag)
-        total = np.float32(0.0)
-        for k in range(first, last):
-            total += abs(x_i[k] - x_j[k + lag])
-        out[lag + max_lag] = total / (last - first)
-    return out
-
-
-@njit(cache=True)
-def _peak(values):  # pragma: no cover  (compiled)
-    """Place of the highest value, and the next peak's height over it.
-
-    The main lobe ends on either side where the values have fallen below half
-    the peak. A peak on the border is no peak: its ambiguity is 1.
-    """
-    best = np.argmax(values)
-    top = values[best]
-    if best in (0, values.size - 1) or top <= 0.0:
-        return best, 1.0
-    low, high = best, best
-    while low > 0 and values[low] > 0.5 * top:
-        low -= 1
-    while high < values.size - 1 and values[high] > 0.5 * top:
-        high += 1
-    second = 0.0
-    for k in range(values.size):
-        if (k < low or k > high) and values[k] > second:
-            second = values[k]
-    return best, second / top
-
-
-def _search_gcc(
-    frame: NDArray[np.float32], plan: DelayPlan, *, phat: bool
-) -> tuple[NDArray[np.float64], float]:
-    spectra = fft.rfft(frame, plan.length)[:, plan.band]
-    cross = spectra[:2].conj() * spectra[1:]
-    lags, ambiguity = _correlation_peaks(cross, plan)
-    if phat:
-        # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
-        # the plain correlation counts as well.
-        white = cross * whitening(cross)
-        lags, ambiguity_white = _correlation_peaks(white, plan)
-        ambiguity = max(ambiguity, ambiguity_white)
-    return lags, ambiguity
-
-
-def _correlation_peaks(
-    cross: NDArray[np.complex64], plan: DelayPlan
-) -> tuple[NDArray[np.float64], float]:
-    whole = np.zeros((2, plan.grid // 2 + 1), dtype=np.complex64)
-    whole[:, plan.band] = cross
-    correlation = fft.irfft(whole, plan.grid, overwrite_x=True)
-    step = plan.length / plan.grid
-    lags, ambiguity = np.empty(2), 0.0
-    for k in range(2):
-        gated = np.concatenate(
-            (correlation[k, -plan.gate :], correlation[k, : plan.gate + 1])
-        )
-        best, ratio = _peak(gated)
-        lags[k] = (best - plan.gate) * step
-        ambiguity = max(ambiguity, ratio)
-    return lags, ambiguity
-
-
-def _search_amdf(
-    frame: NDArray[np.float32], plan: DelayPlan
-) -> tuple[NDArray[np.float64], float]:
-    lags, ambiguity = np.empty(2), 0.0
-    for k in range(2):
-        difference = amdf(frame[k], frame[k + 1], plan.max_lag + 1)
-        # Its depth below the mean is what a correlation has as height.
-        best, ratio = _peak(difference.mean() - difference)
-        lags[k] = best - plan.max_lag - 1
-        ambiguity = max(ambiguity, ratio)
-    return lags, ambiguity
-
-
-@dataclass(frozen=True)
-class _Method:
-    search: Callable[
-        [NDArray[np.float32], DelayPlan], tuple[NDArray[np.float64], float]
-    ]
-    """Lags of the neighbouring pairs in samples, and their ambiguity."""
-    phat: bool
-    """Weights of the cross-spectrum in the second step."""
-    whole_samples: bool
-    """Whether the delays stay whole samples, as the papers have them."""
+class _Method(NamedTuple):
+    phat: bool = False
+    """Whether the cross-spectra are whitened."""
+    by_amdf: bool = False
+    """Whether delays are whole samples by the papers' function."""
 
 
 #: Ways to measure delays, by name.
 METHODS = {
-    "gcc": _Method(
-        search=lambda frame, plan: _search_gcc(frame, plan, phat=False),
-        phat=False,
-        whole_samples=False,
-    ),
-    "gcc_phat": _Method(
-        search=lambda frame, plan: _search_gcc(frame, plan, phat=True),
-        phat=True,
-        whole_samples=False,
-    ),
-    "amdf": _Method(search=_search_amdf, phat=False, whole_samples=True),
+    "gcc": _Method(),
+    "gcc_phat": _Method(phat=True),
+    "amdf": _Method(by_amdf=True),
+    "ml": _Method(),  # starts from the correlation; see systems.coherent
 }
+
+
+@dataclass(frozen=True)
+class DelayEstimate:
+    """Delays of one frame and what speaks for them."""
+
+    tau: NDArray[np.float64]
+    """(n - 1,) t_k - t_0 of the channels 1 ... n - 1, s; positive where the
+    sound reaches channel 0 earlier."""
+    covariance: NDArray[np.float64]
+    """(n - 1, n - 1) of the delays, s^2."""
+    correlation: float
+    """Least correlation coefficient of the pairs, 0 to 1."""
+    closure: float
+    """Largest disagreement of a pair's own delay with ``tau``, s."""
+    ambiguity: float
+    """Second peak over first within the gate, 0 to 1; worst edge."""
+    chance: float
+    """Probability that noise alone has peaks as high as these."""
+    noise_energy: float
+    """Of what the mean channel does not share with the others, within the band,
+    units of the frame squared."""
+    band: slice
+    """Bins of the plan's transform that were used."""
+
+
+def look(
+    frame: NDArray[np.float32],
+    plan: DelayPlan,
+    method: str = "gcc",
+    *,
+    find_band: bool = False,
+) -> tuple[DelaySearch, slice] | None:
+    """First look at a frame; see ``estimate_delays``.
+
+    Returns:
+        The search and the bins that it used, or None where a channel is silent.
+    """
+    chosen = METHODS[method]
+    if not frame.any(axis=1).all():
+        return None
+    spectra = fft.rfft(frame, plan.length)[:, plan.band]
+    band = plan.band
+    if find_band:
+        first, last = occupied_band(spectra, plan.sample_rate_hz / plan.length)
+        spectra = spectra[:, first:last]
+        band = slice(plan.band.start + first, plan.band.start + last)
+    search = search_delays(
+        frame, spectra, plan, band, phat=chosen.phat, by_amdf=chosen.by_amdf
+    )
+    return search, band
 
 
 def estimate_delays(
@@ -182,59 +100,76 @@ def estimate_delays(
     plan: DelayPlan,
     method: str = "gcc",
     *,
-    maximum_ambiguity: float = 1.0,
+    find_band: bool = False,
+    seen: tuple[DelaySearch, slice] | None = None,
 ) -> DelayEstimate | None:
     """Delays of a frame.
 
     Args:
-        frame: (3, frame_samples), any unit, first channel at one end of the
-            row, last one at the other.
-        plan: Rates, band and geometry.
+        frame: (n, frame_samples), any unit.
+        plan: Rates, band and array.
         method: A key of METHODS.
-        maximum_ambiguity: Frames beyond it are given up after the search,
-            which spares most of the work on frames that hold noise alone.
+        find_band: Whether to use the occupied part of the band alone.
+        seen: What ``look`` returned for this frame, if it was called already.
 
     Returns:
-        The estimate, however poor, or None where a channel is silent, the
-        correlation has no peak within the gate, or the frame is given up.
+        The estimate, however poor, or None where a channel is silent or the
+        correlation has no peak within the gate.
     """
     chosen = METHODS[method]
-    if not frame.any(axis=1).all():
+    seen = seen or look(frame, plan, method, find_band=find_band)
+    if seen is None:
         return None
-    lags, ambiguity = chosen.search(frame, plan)
-    if ambiguity > maximum_ambiguity:
-        return None
+    search, band = seen
+    arrivals, settled = search.arrivals, False
     for _ in range(_CUTS):
-        if np.abs(lags).max() > plan.max_lag + 1:
+        if np.ptp(arrivals) > plan.max_lag + 1:
             return None
         peaks = find_peaks(
             frame,
-            lags,
+            arrivals,
+            plan.tables,
             length=plan.length,
-            band=plan.band,
+            band=band,
             phat=chosen.phat,
-            newton=not chosen.whole_samples,
+            newton=not chosen.by_amdf,
         )
         if peaks is None:
             return None
-        moved = np.abs(peaks.tau[:2] - lags).max()
-        lags = peaks.tau[:2]
-        if moved < _SETTLED:
+        reconciled = plan.tables.to_delays @ peaks.tau
+        moved = np.abs(reconciled - arrivals[1:]).max()
+        arrivals = np.concatenate(([0.0], reconciled))
+        settled = moved < _SETTLED
+        if settled:
             break
-    else:
+    if not settled:
         return None
-    covariance = peaks.covariance
-    if chosen.whole_samples:
-        # Rounding of two arrivals to whole samples: 1/12 a pair.
-        covariance = covariance + np.array([[2.0, 1.0], [1.0, 2.0]]) / 24.0
-    # Least squares over the three pairs, whose delays must add up.
-    tau, rate = peaks.tau, plan.sample_rate_hz
-    gap = tau[2] - tau[0] - tau[1]
+    return _estimate(peaks, arrivals, search, band, plan, rounded=chosen.by_amdf)
+
+
+def _estimate(
+    peaks: Peaks,
+    arrivals: NDArray[np.float64],
+    search: DelaySearch,
+    band: slice,
+    plan: DelayPlan,
+    *,
+    rounded: bool,
+) -> DelayEstimate:
+    rate = plan.sample_rate_hz
+    variances = peaks.variances
+    if rounded:
+        # Rounding of arrivals to whole samples: 1/12 a pair.
+        variances = variances + 1.0 / 24.0
+    first, second = plan.tables.pairs.T
+    gaps = peaks.tau - (arrivals[second] - arrivals[first])
     return DelayEstimate(
-        tau_12=float(tau[0] + gap / 3.0) / rate,
-        tau_13=float(tau[2] - gap / 3.0) / rate,
-        covariance=covariance / rate**2,
-        correlation=float(min(peaks.correlation, 1.0)),
-        closure=float(abs(gap)) / rate,
-        ambiguity=float(ambiguity),
+        tau=arrivals[1:] / rate,
+        covariance=(variances[0] + np.diag(variances[1:])) / rate**2,
+        correlation=peaks.correlation,
+        closure=float(np.abs(gaps).max()) / rate,
+        ambiguity=search.ambiguity,
+        chance=search.chance,
+        noise_energy=peaks.noise_energy,
+        band=band,
     )

@@ -17,7 +17,7 @@ from systems.array_shape import ArrayShape
 from systems.delay_fit import DelayProblem, fit_delays
 from systems.source_fix import SourceFix
 
-__all__ = ["locate_source"]
+__all__ = ["angles_of", "locate_source", "whitening_matrix"]
 
 # Keeps errors of the azimuth finite right above an array.
 _LEAST_COSINE = 1e-3
@@ -48,7 +48,7 @@ def locate_source(
     u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
         DelayProblem(
             c * np.asarray(tau, dtype=np.float64),
-            _whitening_matrix(covariance) / c,
+            whitening_matrix(covariance) / c,
             shape.p_AM,
             shape.span,
             np.zeros(shape.dimension) if shape.ahead is None else shape.ahead,
@@ -56,7 +56,7 @@ def locate_source(
         0.5 / shape.aperture_m,
     )
     valid = math.isfinite(variance)
-    bearing_std, elevation, elevation_std = _angles(u, of_u, shape)
+    bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
     return SourceFix(
         bearing=math.atan2(u[1], u[0]),
         bearing_std=bearing_std,
@@ -72,16 +72,25 @@ def locate_source(
     )
 
 
-def _whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
     """L^-1 of a covariance L L^T, which may be singular to rounding."""
     floor = 1e-12 * np.diag(covariance) + 1e-30
     return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
 
 
-def _angles(
+def angles_of(
     u: NDArray[np.float64], of_u: NDArray[np.float64], shape: ArrayShape
 ) -> tuple[float, float | None, float | None]:
-    """Standard deviation of the azimuth; elevation, and its own."""
+    """Angles of a direction, with errors.
+
+    Args:
+        u: (d,) unit vector.
+        of_u: (d, d) its covariance.
+        shape: The array, which may not tell every angle.
+
+    Returns:
+        Standard deviation of the azimuth; elevation, and its own; rad.
+    """
     cosine = max(math.hypot(u[0], u[1]), _LEAST_COSINE)
     variance = (
         u[1] * u[1] * of_u[0, 0]

@@ -2,118 +2,32 @@
 
 from __future__ import annotations
 
-import math
-from typing import Literal
-
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.delay_plan import DelayPlan
-from systems.delays import DelayEstimate, estimate_delays
-from systems.near_field import locate_source
-from systems.parameters import Fraction, Parameters, Positive
+from systems.array_shape import ArrayShape
+from systems.localise import HearingMemory, Localiser, TDOAParameters
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
 from systems.source_fix import SourceFix
 
-__all__ = ["TDOAEstimator", "TDOAParameters", "is_heard", "localise", "row_spacing"]
+__all__ = ["TDOAEstimator", "TDOAParameters", "port_values", "robot_localiser"]
 
 
-class TDOAParameters(Parameters):
-    """How delays are measured, and when they are believed."""
-
-    method: Literal["gcc", "gcc_phat", "amdf"] = "gcc"
-    """Cross-correlation, the same with whitened spectrum, or the papers' AMDF."""
-    low_hz: Positive = 300.0
-    """Lower end of the band, Hz."""
-    high_hz: float = Field(default=15_000.0, gt=0.0, le=SAMPLE_RATE_HZ / 2)
-    """Upper end of the band, Hz."""
-    sound_speed_m_s: Positive | None = None
-    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
-    minimum_correlation: Fraction = 0.75
-    """Least correlation coefficient, within the band, of every pair."""
-    maximum_closure_s: Positive = 1.5e-5
-    """Largest disagreement |tau_12 + tau_23 - tau_13|, s."""
-    maximum_ambiguity: Fraction = 0.8
-    """Largest second peak over the first one."""
-    maximum_bearing_std_deg: Positive = 3.0
-    """Largest standard deviation of a bearing, deg."""
-    maximum_relative_range_std: Positive = 0.25
-    """A range is valid where its standard deviation is below this share."""
-
-    @model_validator(mode="after")
-    def _check(self) -> TDOAParameters:
-        if self.low_hz >= self.high_hz:
-            raise ValueError(
-                f"low_hz: {self.low_hz:g} must be below high_hz = {self.high_hz:g}"
-            )
-        return self
-
-
-def row_spacing(robot: RobotParameters) -> float:
-    """Distance between neighbours of three microphones across the robot, m.
-
-    Raises:
-        ValueError: The microphones are no such row from left to right.
-    """
-    places = robot.microphones_m
-    spacing = (places[0][1] - places[-1][1]) / 2.0
-    row = ((0.0, spacing), (0.0, 0.0), (0.0, -spacing))
-    if len(places) != 3 or spacing <= 0.0 or not np.allclose(places, row, 0.0, 1e-9):
-        raise ValueError(
-            f"robot.microphones_m: {places} is not a row of three from "
-            "left to right with P in its middle; TDOAEstimator needs one"
-        )
-    return spacing
-
-
-def is_heard(delays: DelayEstimate | None, parameters: TDOAParameters) -> bool:
-    """Whether a frame's delays belong to one sound in one place."""
-    return (
-        delays is not None
-        and delays.correlation >= parameters.minimum_correlation
-        and delays.closure <= parameters.maximum_closure_s
-        and delays.ambiguity <= parameters.maximum_ambiguity
-    )
-
-
-def localise(
-    frame: NDArray[np.float32],
-    plan: DelayPlan,
-    parameters: TDOAParameters,
-    spacing: float,
-    c: float,
-) -> SourceFix | None:
-    """Where the sound of a frame comes from.
-
-    Args:
-        frame: (3, n) channels from left to right, any unit.
-        plan: Made for these frames, this band and this array.
-        parameters: Method and thresholds.
-        spacing: Distance between neighbouring microphones, m.
-        c: Speed of sound, m/s.
+def robot_localiser(
+    parameters: TDOAParameters, robot: RobotParameters, acoustics: AcousticParameters
+) -> tuple[Localiser, NDArray[np.float64]]:
+    """The localiser of the robot's own microphones.
 
     Returns:
-        The source in the front half plane, or None where nothing is heard.
+        The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
-    delays = estimate_delays(
-        frame,
-        plan,
-        parameters.method,
-        maximum_ambiguity=parameters.maximum_ambiguity,
-    )
-    if delays is None or not is_heard(delays, parameters):
-        return None
-    fix = locate_source(delays.tau_12, delays.tau_13, delays.covariance, spacing, c)
-    if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
-        return None
-    if fix.range_std > parameters.maximum_relative_range_std * fix.range:
-        return fix.without_range()
-    return fix
+    shape = ArrayShape.of(robot.microphones_m)
+    localiser = Localiser.of(parameters, shape, acoustics.c)
+    return localiser, np.mean(robot.microphones_m, axis=0)
 
 
 class TDOAEstimator(LeafSystem):
@@ -132,22 +46,27 @@ class TDOAEstimator(LeafSystem):
         - detected [0 or 1]
         - range_valid [0 or 1]
 
-    Delays come from ``systems.delays``, range and bearing from
-    ``systems.near_field``. Microphones in a row cannot tell front from back:
-    the source is reported in the front half plane. Where nothing is heard all
-    outputs are zero. Where ``range_valid`` is 0 the range is 0, p_PS_B is the
-    unit vector along the bearing and the covariance is that of this vector.
-    The covariance (row major, of p_PS_B) counts noise only, not errors of the
+    ``systems.localise`` tells where the sound of a frame comes from: delays of
+    all pairs of channels, a place that explains them, and its errors. Range and
+    bearing count from the microphones' centroid, for the default row M2 = P;
+    p_PS_B from P. Microphones in a row cannot tell front from back: the source
+    is reported in the front half plane. Where nothing is heard all outputs are
+    zero. Where ``range_valid`` is 0 the range is 0, p_PS_B is the unit vector
+    along the bearing and the covariance is that of this vector. The covariance
+    (row major, of p_PS_B) counts noise and echoes, not errors of the
     microphones' places or of the speed of sound.
 
-    State: the outputs, one group a port.
+    State: the outputs, one group a port, and what ``HearingMemory`` holds.
     Rate and latency: updated every 25 ms from the frame that ends then, and
     visible after it: one tick, the time that a processor takes.
 
     Args:
         parameters: Method, band and thresholds.
-        robot: Spacing of the microphones.
-        acoustics: Speed of sound, where the parameters set none.
+        robot: Places of the microphones.
+        acoustics: Speed of sound.
+
+    Raises:
+        ValueError: The array cannot serve at this rate and band.
 
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
@@ -160,30 +79,21 @@ class TDOAEstimator(LeafSystem):
         acoustics: AcousticParameters | None = None,
     ) -> None:
         super().__init__()
-        self._parameters = parameters or TDOAParameters()
-        self._spacing = row_spacing(robot or RobotParameters())
-        air = acoustics or AcousticParameters()
-        self._c = self._parameters.sound_speed_m_s or air.c
-        self._plan = DelayPlan(
-            sample_rate_hz=SAMPLE_RATE_HZ,
-            frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),
-            max_delay_s=self._spacing / self._c,
-            low_hz=self._parameters.low_hz,
-            high_hz=self._parameters.high_hz,
+        self._localiser, self._p_PA_B = robot_localiser(
+            parameters or TDOAParameters(),
+            robot or RobotParameters(),
+            acoustics or AcousticParameters(),
         )
         self.set_name("tdoa_estimator")
         self._audio = self.DeclareAbstractInputPort(
             name="audio", model_value=Value(object())
         )
-        for name, size in (
-            ("source_bearing", 1),
-            ("source_range", 1),
-            ("p_PS_B", 2),
-            ("covariance", 4),
-            ("detected", 1),
-            ("range_valid", 1),
-        ):
+        for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
+        blank = self._localiser.blank()
+        self._noise = self.DeclareDiscreteState([blank.noise_energy])
+        self._echoes = self.DeclareDiscreteState(blank.echoes.ravel())
+        self._echo_shape = blank.echoes.shape
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
         )
@@ -201,28 +111,54 @@ class TDOAEstimator(LeafSystem):
                 f"record at {SAMPLE_RATE_HZ} Hz"
             )
         frame = audio.counts.astype(np.float32)
-        fix = localise(frame, self._plan, self._parameters, self._spacing, self._c)
+        echoes = context.get_discrete_state(self._echoes).value()
+        before = HearingMemory(
+            float(context.get_discrete_state(self._noise).value()[0]),
+            echoes.astype(np.float32).reshape(self._echo_shape),
+        )
+        fix, after = self._localiser.localise(frame, before)
+        if after.noise_energy != before.noise_energy:
+            discrete_state.set_value(self._noise, [after.noise_energy])
+        if after.echoes is not before.echoes:
+            discrete_state.set_value(self._echoes, after.echoes.ravel())
         if fix is None and not context.get_discrete_state(_DETECTED).value()[0]:
             return  # silence goes on, and the state is zero already
-        for group, values in enumerate(_port_values(fix)):
+        for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
 
+
+#: Output ports and their sizes.
+_PORTS = (
+    ("source_bearing", 1),
+    ("source_range", 1),
+    ("p_PS_B", 2),
+    ("covariance", 4),
+    ("detected", 1),
+    ("range_valid", 1),
+)
 
 #: Index of the state group behind the port ``detected``.
 _DETECTED = 4
 
 #: Values of the output ports where nothing is heard.
-_NOTHING = tuple(np.zeros(size) for size in (1, 1, 2, 4, 1, 1))
+_NOTHING = tuple(np.zeros(size) for _, size in _PORTS)
 
 
-def _port_values(fix: SourceFix | None) -> tuple[NDArray[np.float64], ...]:
-    """Values of the output ports, in order."""
+def port_values(
+    fix: SourceFix | None, p_PA_B: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], ...]:
+    """Values of the output ports, in order.
+
+    Args:
+        fix: What was heard.
+        p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+    """
     if fix is None:
         return _NOTHING
     return (
         np.array([fix.bearing]),
         np.array([fix.range]),
-        np.array(fix.p_AS),
+        fix.p_AS + p_PA_B if fix.range_valid else fix.p_AS,
         fix.covariance.ravel(),
         np.ones(1),
         np.array([float(fix.range_valid)]),

@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from systems.delays import amdf
+from systems.delay_search import amdf
 from systems.near_field import source_from_delays
 from systems.propagation import propagate
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission

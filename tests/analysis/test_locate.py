@@ -10,6 +10,7 @@ import pytest
 import soundfile
 
 from analysis.locate import ArrayGeometry, load_geometry, locate
+from analysis.locate_text import locate_text
 
 C = 340.0
 ROBOT = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
@@ -160,7 +161,7 @@ def test_noise_has_no_bearing(tmp_path):
     assert document["estimates"] == []
     assert document["summary"]["bearing_deg"] is None
     assert document["summary"]["observable"] == []
-    assert "nothing to locate" in locate(tmp_path / "a.wav").to_text()
+    assert "nothing to locate" in locate_text(locate(tmp_path / "a.wav"))
 
 
 def test_document_has_the_keys_that_others_rely_on(tmp_path):
@@ -181,9 +182,9 @@ def test_document_has_the_keys_that_others_rely_on(tmp_path):
         document["summary"].keys()
     )
     times = [estimate["t_s"] for estimate in document["estimates"]]
-    assert times[0] == pytest.approx(0.0125, abs=1e-3)
+    assert times[0] == pytest.approx(document["array"]["frame_s"] / 2, abs=1e-3)
     assert times == sorted(times)
-    assert "25.0" in result.to_text()
+    assert "25.0" in locate_text(result)
 
 
 def write(path, samples, rate=48_000):
@@ -233,11 +234,8 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("", "names no microphones"),
         ("- 1\n- 2\n", "names no microphones"),
         ("microphones: [[0, 1], [0, 0]\n", "is not YAML"),
-        ("microphones: [[0, 1], [0, 0]]\n", "three in a row"),
-        ("microphones: [[0, 0.4], [0, 0], [0, -0.5]]\n", "equally spaced"),
-        ("microphones: [[0, 0.4], [0.1, 0], [0, -0.4]]\n", "equally spaced"),
-        ("microphones: [[0, 0], [0, 0], [0, 0]]\n", "one place"),
-        ("microphones: [[0, 0, 0], [0, 0, 1], [0, 0, 2]]\n", "level"),
+        ("microphones: [[0, 1], [0, 0]]\n", "2 given.*at least 3"),
+        ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
         (GOOD + "channels: [0, 1]\n", "2 named for 3"),
         (GOOD + "channels: [0, 1, 1]\n", "twice"),

@@ -6,12 +6,15 @@ import numpy as np
 import pytest
 from numpy.random import Generator, Philox
 
+from systems.array_shape import ArrayShape
 from systems.delay_plan import DelayPlan
-from systems.delays import METHODS, amdf, estimate_delays
+from systems.delay_search import amdf
+from systems.delays import METHODS, estimate_delays
 
 FS = 100_000.0
 N = 2500
-PLAN = DelayPlan(FS, N, 0.4 / 340.0, 300.0, 15_000.0)
+ROW = ArrayShape.of([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
+PLAN = DelayPlan(ROW, 340.0, FS, N, 300.0, 15_000.0)
 # Whitened bins that hold little but the frame's edges weigh as much as others.
 ACCURACY = {"gcc": 0.02, "gcc_phat": 0.15}
 
@@ -51,10 +54,10 @@ def measured(rows, method="gcc"):
 def test_known_shifts(method, shifts):
     rows = shifted(band_noise(5000, 500, 8_000), shifts)
     found = measured(noisy(rows, 40.0, 1), method)
-    assert found.tau_12 * FS == pytest.approx(
+    assert found.tau[0] * FS == pytest.approx(
         shifts[1] - shifts[0], abs=ACCURACY[method]
     )
-    assert found.tau_13 * FS == pytest.approx(
+    assert found.tau[1] * FS == pytest.approx(
         shifts[2] - shifts[0], abs=ACCURACY[method]
     )
     assert found.correlation > 0.98
@@ -64,8 +67,8 @@ def test_known_shifts(method, shifts):
 def test_amdf_finds_whole_samples_of_either_sign():
     rows = shifted(band_noise(5000, 500, 8_000), (20, 0, 15))
     found = measured(noisy(rows, 30.0, 1), "amdf")
-    assert found.tau_12 * FS == pytest.approx(-20, abs=1e-9)
-    assert found.tau_13 * FS == pytest.approx(-5, abs=1e-9)
+    assert found.tau[0] * FS == pytest.approx(-20, abs=1e-9)
+    assert found.tau[1] * FS == pytest.approx(-5, abs=1e-9)
 
 
 def test_amdf_is_the_mean_over_the_overlap():
@@ -92,7 +95,7 @@ def test_equal_signals_have_no_delay():
     rows = np.tile(band_noise(N, 500, 8_000), (3, 1)).astype(np.float32)
     for method in METHODS:
         found = measured(rows, method)
-        assert found.tau_12 == pytest.approx(0.0, abs=1e-9)
+        assert found.tau[0] == pytest.approx(0.0, abs=1e-9)
         assert found.correlation == pytest.approx(1.0, abs=1e-6)
         assert np.isfinite(found.covariance).all()
 
@@ -110,7 +113,7 @@ def test_single_impulse_at_the_edge_is_no_crash(method):
     rows = np.zeros((3, N), dtype=np.float32)
     rows[0, 0] = rows[1, N - 1] = rows[2, 3] = 1.0
     found = estimate_delays(rows, PLAN, method)
-    assert found is None or found.correlation < 0.75 or found.closure > 1.5e-5
+    assert found is None or found.ambiguity > 0.9 or found.closure > 5e-6
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -135,7 +138,7 @@ def test_scatter_is_at_the_cramer_rao_bound():
     errors, stated = [], []
     for seed in range(120):
         found = measured(noisy(rows, snr_db, seed))
-        errors.append((found.tau_12 - 20.4 / FS, found.tau_13 - 33.9 / FS))
+        errors.append((found.tau[0] - 20.4 / FS, found.tau[1] - 33.9 / FS))
         stated.append(found.covariance)
     # Power densities: signal 1 / (high - low), noise 10^-2 / (FS / 2).
     ratio = (FS / 2) / (high - low) * 10 ** (snr_db / 10)
@@ -156,14 +159,15 @@ def test_scatter_is_at_the_cramer_rao_bound():
     [
         ({"high_hz": 60_000.0}, "half the sample rate"),
         ({"low_hz": 16_000.0}, "band"),
-        ({"max_delay_s": 0.02}, "longer frames"),
+        ({"c": 30.0}, "longer frames"),
     ],
 )
 def test_plan_that_cannot_work(settings, complaint):
     fields = {
+        "shape": ROW,
+        "c": 340.0,
         "sample_rate_hz": FS,
         "frame_samples": N,
-        "max_delay_s": 0.4 / 340.0,
         "low_hz": 300.0,
         "high_hz": 15_000.0,
     }

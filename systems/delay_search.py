@@ -1,0 +1,244 @@
+"""First search for the delays of a frame, and whether it holds a sound at all.
+
+Channels of noise alone are independent, whatever its colour. The correlation
+of two such channels at a given lag is then Gaussian with a variance that the
+channels' own spectra give, so the height of its highest peak says how likely
+noise alone would reach it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import fft
+
+from systems.delay_peaks import whitening
+from systems.delay_plan import DelayPlan
+
+__all__ = ["DelaySearch", "amdf", "search_delays"]
+
+
+@dataclass(frozen=True)
+class DelaySearch:
+    """What the first look at a frame tells."""
+
+    arrivals: NDArray[np.float64]
+    """(n,) arrival at each channel after channel 0, samples."""
+    ambiguity: float
+    """Second peak over first within the gate, 0 to 1; worst edge."""
+    chance: float
+    """Probability that noise alone has peaks as high as these."""
+    energy: float
+    """Of the mean channel within the band, units of the frame squared."""
+
+
+def amdf(
+    x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
+) -> NDArray[np.float64]:
+    """Average magnitude difference of two channels (Han 2019, eq. 4-6).
+
+    The papers maximise 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1.
+    Here the sum itself is minimised, so that equal signals do no harm; both
+    signs of the lag are searched; and the sum is divided by the number of its
+    terms, for the printed one favours large lags.
+
+    Args:
+        x_i: (n,) samples.
+        x_j: (n,) samples.
+        max_lag: Largest lag, below n.
+
+    Returns:
+        (2 max_lag + 1,) for the lags -max_lag ... max_lag. The minimum stands
+        at the delay t_j - t_i.
+    """
+    return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
+    n = x_i.size
+    out = np.empty(2 * max_lag + 1)
+    for lag in range(-max_lag, max_lag + 1):
+        first, last = max(0, -lag), min(n, n - lag)
+        total = np.float32(0.0)
+        for k in range(first, last):
+            total += abs(x_i[k] - x_j[k + lag])
+        out[lag + max_lag] = total / (last - first)
+    return out
+
+
+@njit(cache=True)
+def _peak(values):  # pragma: no cover  (compiled)
+    """Place of the highest value, and the next peak's height over it.
+
+    The main lobe ends on either side where the values have fallen below half
+    the peak. A peak on the border is no peak: its ambiguity is 1.
+    """
+    best = np.argmax(values)
+    top = values[best]
+    if best in (0, values.size - 1) or top <= 0.0:
+        return best, 1.0
+    low, high = best, best
+    while low > 0 and values[low] > 0.5 * top:
+        low -= 1
+    while high < values.size - 1 and values[high] > 0.5 * top:
+        high += 1
+    second = 0.0
+    for k in range(values.size):
+        if (k < low or k > high) and values[k] > second:
+            second = values[k]
+    return best, second / top
+
+
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+def _cross_spectra(spectra, edges, first, out):  # pragma: no cover  (compiled)
+    """Fills out (e, bins) with cross-spectra, from the bin ``first`` on.
+
+    Returns:
+        (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the energy of
+        the mean channel.
+    """
+    channels, bins = spectra.shape
+    moments = np.zeros((edges.shape[0], 2))
+    for e in range(edges.shape[0]):
+        i, j = edges[e]
+        for k in range(bins):
+            c = spectra[i, k].conjugate() * spectra[j, k]
+            out[e, first + k] = c
+            square = c.real * c.real + c.imag * c.imag
+            moments[e, 0] += square
+            moments[e, 1] += square * np.float32((first + k) ** 2)
+    energy = 0.0
+    for m in range(channels):
+        for k in range(bins):
+            a = spectra[m, k]
+            energy += a.real * a.real + a.imag * a.imag
+    return moments, energy / channels
+
+
+@njit(cache=True)
+def _gated_peaks(correlation, gates):  # pragma: no cover  (compiled)
+    """Per edge: lag of the highest peak within the gate, ambiguity, height."""
+    lags = np.empty(gates.size)
+    ambiguity = 0.0
+    heights = np.empty(gates.size)
+    size = correlation.shape[1]
+    for e in range(gates.size):
+        gate = gates[e]
+        gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
+        gated[:gate] = correlation[e, size - gate :]
+        gated[gate:] = correlation[e, : gate + 1]
+        best, ratio = _peak(gated)
+        lags[e] = best - gate
+        heights[e] = gated[best]
+        if 0 < best < 2 * gate:  # vertex of the parabola
+            rise, fall = gated[best] - gated[best - 1], gated[best] - gated[best + 1]
+            lags[e] += 0.5 * (rise - fall) / max(rise + fall, np.float32(1e-30))
+        ambiguity = max(ambiguity, ratio)
+    return lags, ambiguity, heights
+
+
+def _chance_of_noise(
+    heights: NDArray[np.float64], counts: NDArray[np.float64]
+) -> float:
+    """Probability that noise reaches all peaks together.
+
+    Args:
+        heights: (e,) peaks over their standard deviation.
+        counts: (e,) how often noise crosses zero upwards within the gate; it
+            crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
+    """
+    log_product = 0.0
+    for z, count in zip(heights.tolist(), counts.tolist(), strict=True):
+        below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(
+            -count * math.exp(-0.5 * z * z) if z < 38.0 else 0.0
+        )
+        log_product += math.log(max(1.0 - below, 1e-300))
+    # Fisher: the product of m independent probabilities.
+    term, total = 1.0, 0.0
+    for k in range(len(heights)):
+        total += term
+        term *= -log_product / (k + 1)
+    return min(math.exp(log_product) * total, 1.0)
+
+
+def _correlation_search(
+    spectra: NDArray[np.complex64], plan: DelayPlan, band: slice, *, phat: bool
+) -> DelaySearch:
+    cross = np.zeros((len(plan.edges), plan.grid // 2 + 1), dtype=np.complex64)
+    moments, energy = _cross_spectra(spectra, plan.edges, band.start, cross)
+    if phat:
+        cross[:, band] *= whitening(cross[:, band])
+    correlation = fft.irfft(cross, plan.grid, overwrite_x=True, norm="forward")
+    lags, ambiguity, heights = _gated_peaks(correlation, plan.gates)
+    # Padding makes the bins dependent: fewer count than are summed.
+    padding = plan.length / plan.frame_samples
+    deviations = np.sqrt(2.0 * padding * moments[:, 0]) + 1e-300
+    rms_bins = np.sqrt(moments[:, 1] / (moments[:, 0] + 1e-300))
+    counts = 2.0 * plan.gates / plan.grid * rms_bins
+    return DelaySearch(
+        arrivals=_arrivals(lags * (plan.length / plan.grid), plan),
+        ambiguity=float(ambiguity),
+        chance=_chance_of_noise(heights / deviations, counts),
+        energy=energy / plan.length,
+    )
+
+
+def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]:
+    """(n,) arrivals from the lags along the edges."""
+    arrivals = np.zeros(len(lags) + 1)
+    for (i, j), lag in zip(plan.edges.tolist(), lags.tolist(), strict=True):
+        arrivals[j] = arrivals[i] + lag
+    return arrivals
+
+
+def _amdf_search(
+    frame: NDArray[np.float32], plan: DelayPlan
+) -> tuple[NDArray[np.float64], float]:
+    """Arrivals by the papers' function, and their ambiguity."""
+    lags, ambiguity = np.empty(len(plan.edges)), 0.0
+    for e, (i, j) in enumerate(plan.edges.tolist()):
+        reach = int(plan.edge_lags[e]) + 1
+        difference = amdf(frame[i], frame[j], reach)
+        # Its depth below the mean is what a correlation has as height.
+        best, ratio = _peak(difference.mean() - difference)
+        lags[e] = best - reach
+        ambiguity = max(ambiguity, ratio)
+    return _arrivals(lags, plan), ambiguity
+
+
+def search_delays(
+    frame: NDArray[np.float32],
+    spectra: NDArray[np.complex64],
+    plan: DelayPlan,
+    band: slice,
+    *,
+    phat: bool = False,
+    by_amdf: bool = False,
+) -> DelaySearch:
+    """Looks for a sound in a frame.
+
+    Args:
+        frame: (n, frame_samples), any unit.
+        spectra: (n, bins) its transform of ``plan.length`` within the band.
+        plan: Rates and array.
+        band: Bins of the transform.
+        phat: Whether to whiten.
+        by_amdf: Whether the delays are those of the papers' function.
+            Detection rests on the correlation all the same.
+    """
+    found = _correlation_search(spectra, plan, band, phat=False)
+    if phat:
+        # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
+        # the plain correlation counts as well, and noise is judged by it.
+        white = _correlation_search(spectra, plan, band, phat=True)
+        arrivals, ambiguity = white.arrivals, max(found.ambiguity, white.ambiguity)
+    elif by_amdf:
+        arrivals, ambiguity = _amdf_search(frame, plan)
+    else:
+        return found
+    return DelaySearch(arrivals, ambiguity, found.chance, found.energy)

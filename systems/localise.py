@@ -1,0 +1,215 @@
+"""From one frame of sound to a place, with what has to be remembered for it."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from systems.array_shape import ArrayShape
+from systems.coherent import refine_source
+from systems.delay_plan import DelayPlan
+from systems.delays import DelayEstimate, estimate_delays, look
+from systems.multilateration import locate_source
+from systems.parameters import Fraction, Parameters, Positive
+from systems.precedence import EchoMemory, keep_first_wave_front
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.source_fix import SourceFix
+
+__all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
+
+# From this correlation on, a frame holds hardly anything but the direct sound.
+_DIRECT_CORRELATION = 0.9
+
+# What channels do not share is noise as long as it is below this many times what
+# is heard between the sounds; beyond, it is echoes.
+_NOISE_MARGIN = 3.0
+
+# Frames over which the level of the noise is averaged.
+_NOISE_FRAMES = 8.0
+
+# Frames whose echoes were suppressed are believed from this correlation on, and
+# the echoes that slip through shift delays by this much (standard deviation, s):
+# from the trials in docs/localization.md.
+_ECHO_CORRELATION = 0.3
+_ECHO_ERROR_S = 1.5e-6
+
+
+class TDOAParameters(Parameters):
+    """How delays are measured, and when they are believed."""
+
+    method: Literal["gcc", "gcc_phat", "ml", "amdf"] = "gcc"
+    """Cross-correlation, the same with whitened spectrum, maximum likelihood
+    that starts from it, or the papers' AMDF."""
+    low_hz: Positive = 300.0
+    """Lower end of the band, Hz."""
+    high_hz: float = Field(default=15_000.0, gt=0.0, le=SAMPLE_RATE_HZ / 2)
+    """Upper end of the band, Hz."""
+    band: Literal["set", "found"] = "set"
+    """Use the band as it is set, or what of it each frame's sound occupies."""
+    sound_speed_m_s: Positive | None = None
+    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
+    false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
+    """Share of frames of noise alone in which a sound is heard."""
+    suppress_echoes: bool = True
+    """Weigh frames with echoes by the precedence of the first wave front."""
+    maximum_closure_s: Positive = 5e-6
+    """Largest disagreement of a pair's own delay with those of all pairs, s."""
+    maximum_ambiguity: Fraction = 0.8
+    """Largest second peak over the first one."""
+    maximum_bearing_std_deg: Positive = 3.0
+    """Largest standard deviation of a bearing, deg."""
+    maximum_relative_range_std: Positive = 0.25
+    """A range is valid where its standard deviation is below this share."""
+
+    @model_validator(mode="after")
+    def _check(self) -> TDOAParameters:
+        if self.low_hz >= self.high_hz:
+            raise ValueError(
+                f"low_hz: {self.low_hz:g} must be below high_hz = {self.high_hz:g}"
+            )
+        return self
+
+
+class HearingMemory(NamedTuple):
+    """What a frame leaves behind for the next one."""
+
+    noise_energy: float
+    """Of the mean channel within the band between the sounds, units of the frame
+    squared; 0 until such a frame was heard."""
+    echoes: NDArray[np.float32]
+    """(n, bins) see ``systems.precedence``."""
+
+
+class Localiser:
+    """Where the sounds of successive frames come from.
+
+    Args:
+        plan: Made for these frames, this band and this array.
+        parameters: Method and thresholds.
+    """
+
+    def __init__(self, plan: DelayPlan, parameters: TDOAParameters) -> None:
+        self.plan = plan
+        self.parameters = parameters
+        self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+
+    @classmethod
+    def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
+        """For frames as ``MicArray`` publishes them.
+
+        Raises:
+            ValueError: The array cannot serve at this rate and band.
+        """
+        plan = DelayPlan(
+            shape=shape,
+            c=parameters.sound_speed_m_s or c,
+            sample_rate_hz=SAMPLE_RATE_HZ,
+            frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),
+            low_hz=parameters.low_hz,
+            high_hz=parameters.high_hz,
+        )
+        return cls(plan, parameters)
+
+    def blank(self) -> HearingMemory:
+        """The memory before the first frame."""
+        return HearingMemory(0.0, self._sizes.silent())
+
+    def localise(
+        self, frame: NDArray[np.float32], memory: HearingMemory
+    ) -> tuple[SourceFix | None, HearingMemory]:
+        """Where the sound of a frame comes from.
+
+        Args:
+            frame: (n, samples) channels, any unit.
+            memory: What the last frame left.
+
+        Returns:
+            The source on the side of ``ArrayShape.ahead``, or None where nothing
+            is heard, and the new memory.
+        """
+        seen = look(
+            frame,
+            self.plan,
+            self.parameters.method,
+            find_band=self.parameters.band == "found",
+        )
+        if seen is None:
+            return None, memory
+        search = seen[0]
+        if search.chance > self.parameters.false_alarm_rate:
+            return None, self._after_noise(memory, search.energy)
+        if not self.parameters.suppress_echoes:
+            return self._fix(frame, self._delays(frame, seen)), memory
+        delays = self._delays(frame, seen)
+        if delays is not None and self._is_direct(delays, memory):
+            return self._fix(frame, delays), memory
+        dry, echoes = keep_first_wave_front(frame, memory.echoes, self._sizes)
+        memory = memory._replace(echoes=echoes)
+        delays = self._delays(dry)
+        if delays is None or delays.correlation < _ECHO_CORRELATION:
+            return None, memory
+        return self._fix(dry, delays, _ECHO_ERROR_S), memory
+
+    def _delays(self, frame, seen=None) -> DelayEstimate | None:
+        return estimate_delays(
+            frame,
+            self.plan,
+            self.parameters.method,
+            find_band=self.parameters.band == "found",
+            seen=seen,
+        )
+
+    def _after_noise(self, memory: HearingMemory, energy: float) -> HearingMemory:
+        known = memory.noise_energy
+        echoes = memory.echoes
+        if echoes.any():
+            echoes = self._sizes.faded(echoes, self.plan.frame_samples)
+        if known > 0.0:
+            energy = known + (energy - known) / _NOISE_FRAMES
+        return HearingMemory(energy, echoes)
+
+    def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
+        """Whether noise alone explains what the channels do not share."""
+        return (
+            delays.correlation >= _DIRECT_CORRELATION
+            or delays.noise_energy <= _NOISE_MARGIN * memory.noise_energy
+        )
+
+    def _fix(
+        self, frame, delays: DelayEstimate | None, extra_s: float = 0.0
+    ) -> SourceFix | None:
+        """The place behind the delays of a frame, where they are believed."""
+        parameters, plan = self.parameters, self.plan
+        if (
+            delays is None
+            or delays.closure > parameters.maximum_closure_s
+            or delays.ambiguity > parameters.maximum_ambiguity
+        ):
+            return None
+        covariance = delays.covariance
+        if extra_s > 0.0:
+            covariance = covariance + extra_s**2 * (np.eye(len(covariance)) + 1.0)
+        fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if parameters.method == "ml" and extra_s == 0.0:
+            bins = delays.band
+            hertz = plan.sample_rate_hz / plan.length
+            fix = (
+                refine_source(
+                    frame,
+                    fix,
+                    plan.shape,
+                    plan.c,
+                    sample_rate_hz=plan.sample_rate_hz,
+                    band_hz=(bins.start * hertz, (bins.stop - 1) * hertz),
+                )
+                or fix
+            )
+        if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
+            return None
+        if fix.range_std > parameters.maximum_relative_range_std * fix.range:
+            return fix.without_range()
+        return fix

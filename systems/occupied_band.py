@@ -1,0 +1,43 @@
+"""The part of the spectrum that a sound occupies."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["occupied_band"]
+
+# Spectra are smoothed over this width: bins of one frame scatter by 100 %.
+_SMOOTHING_HZ = 400.0
+
+# A sound stands this far above the floor, 6 dB.
+_ABOVE_FLOOR = 4.0
+
+# The floor is what a quarter of the band lies below.
+_FLOOR_QUANTILE = 0.25
+
+# Where less than this is occupied, a tone say, the whole band is used.
+_LEAST_WIDTH_HZ = 500.0
+
+
+def occupied_band(spectra: NDArray[np.complex64], bin_hz: float) -> tuple[int, int]:
+    """Bins from the first to the last that stand above the floor.
+
+    Args:
+        spectra: (channels, bins).
+        bin_hz: Distance of the bins, Hz.
+
+    Returns:
+        First bin and the one after the last; all where the sound fills the band,
+        or nothing stands out.
+    """
+    bins = spectra.shape[1]
+    width = max(1, round(_SMOOTHING_HZ / bin_hz))
+    power = np.mean(np.abs(spectra) ** 2, axis=0, dtype=np.float64)
+    smooth = np.convolve(power, np.full(width, 1.0 / width), mode="same")
+    occupied = np.flatnonzero(
+        smooth > _ABOVE_FLOOR * np.quantile(smooth, _FLOOR_QUANTILE)
+    )
+    if occupied.size * bin_hz < _LEAST_WIDTH_HZ:
+        return 0, bins
+    return int(occupied[0]), int(occupied[-1]) + 1
