@@ -15,16 +15,16 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.builder import block_seed
 from systems.active_impedance_controller import active_force
-from systems.array_tolerances import draw_tolerances
+from systems.array_tolerances import draw_tolerances, real_array
 from systems.collision_vector import collision_vectors, echo_points
 from systems.diff_drive_plant import body_twist, plant_derivatives
 from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
-from systems.mic_array import real_array, record_frame
+from systems.mic_array import microphones_B, record_frame
 from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S
-from systems.sound_emitter import history_ticks, make_emission
+from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.source_fix import SourceFix
 from systems.source_tracker import (
     NEVER_HEARD_S,
@@ -47,8 +47,6 @@ from systems.wheel_speed_command import (
 __all__ = ["PlainLoop"]
 
 T = FRAME_PERIOD_S
-#: Reach of the loudspeaker, the default of ``SoundEmitter``.
-MAXIMUM_RANGE_M = 30.0
 
 
 class PlainLoop:
@@ -70,7 +68,8 @@ class PlainLoop:
             len(scenario.robot.microphones_m),
             tick_generator(self.mic_seed, BEFORE_THE_RUN),
         )
-        self.array = real_array(scenario.robot, microphones, errors, c)
+        p_BM = microphones_B(scenario.robot)
+        self.array = real_array(p_BM, microphones, errors, c)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.localiser, self.p_PA_B = robot_localiser(
             scenario.tdoa, scenario.robot, scenario.acoustics
@@ -187,7 +186,7 @@ class PlainLoop:
         now = (np.array(state[:3]), velocity)
         emission = make_emission(time, self.waveform, scenario.sound, history.copy())
         audio = record_frame(
-            emission,
+            [emission],
             time,
             last,
             now,

@@ -29,6 +29,7 @@ from systems import (
     WheelSpeedCommand,
 )
 from systems.signals import FRAME_PERIOD_S
+from systems.waveforms import SoundParameters
 
 __all__ = ["SoundFollower", "block_seed", "build_sound_follower"]
 
@@ -60,8 +61,9 @@ class SoundFollower:
     """A built diagram, with its blocks by role.
 
     Roles: plant, odometry, source, obstacles, hearing, tracker, collision,
-    controller, command; with audio also emitter and microphones, with
-    ultrasonic sensing also ultrasonic.
+    controller, command; with audio also emitter and microphones, and
+    source_<name> and emitter_<name> of each interferer; with ultrasonic
+    sensing also ultrasonic.
     """
 
     diagram: Diagram
@@ -155,24 +157,45 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
                 seed=block_seed(scenario.seed, "ideal_source_sensor"),
             )
         }
+    microphones = MicArray(
+        parameters=scenario.microphones,
+        robot=scenario.robot,
+        acoustics=scenario.acoustics,
+        room=scenario.room,
+        interferers=[interferer.name for interferer in scenario.interferers],
+        seed=block_seed(scenario.seed, "mic_array"),
+    )
+    emitters = {"emitter": _emitter(scenario, scenario.sound, microphones)}
+    for k, interferer in enumerate(scenario.interferers):
+        suffix = f"_{interferer.name}"
+        robot = SourceRobot(source=interferer, suffix=suffix)
+        emitters[f"source{suffix}"] = robot
+        try:
+            emitter = _emitter(scenario, interferer.sound, microphones, suffix)
+        except ValueError as error:
+            raise ValueError(f"interferers.{k}.{error}") from None
+        emitters[f"emitter{suffix}"] = emitter
     return {
-        "emitter": SoundEmitter(
-            sound=scenario.sound,
-            acoustics=scenario.acoustics,
-            seed=block_seed(scenario.seed, "sound_emitter"),
-        ),
-        "microphones": MicArray(
-            parameters=scenario.microphones,
-            robot=scenario.robot,
-            acoustics=scenario.acoustics,
-            seed=block_seed(scenario.seed, "mic_array"),
-        ),
+        **emitters,
+        "microphones": microphones,
         "hearing": TDOAEstimator(
             parameters=scenario.tdoa,
             robot=scenario.robot,
             acoustics=scenario.acoustics,
         ),
     }
+
+
+def _emitter(
+    scenario: Scenario, sound: SoundParameters, microphones: MicArray, suffix: str = ""
+) -> SoundEmitter:
+    return SoundEmitter(
+        sound=sound,
+        acoustics=scenario.acoustics,
+        maximum_range_m=microphones.maximum_range_m,
+        seed=block_seed(scenario.seed, f"sound_emitter{suffix}"),
+        suffix=suffix,
+    )
 
 
 def _tracker(scenario: Scenario) -> Any:

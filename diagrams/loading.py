@@ -123,9 +123,15 @@ def _read(path: Path) -> dict[str, Any]:
 
 def _resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """A relative sound file lies beside the scenario, or where one works."""
-    sound = data.get("sound")
-    if isinstance(sound, dict) and isinstance(sound.get("file"), str):
-        sound["file"] = str((folder / sound["file"]).resolve())
+    interferers = data.get("interferers")
+    others = interferers if isinstance(interferers, list) else []
+    sounds = [other.get("sound") for other in others if isinstance(other, dict)]
+    for sound, key in [
+        (data.get("microphones"), "ego_noise_file"),
+        *((sound, "file") for sound in [data.get("sound"), *sounds]),
+    ]:
+        if isinstance(sound, dict) and isinstance(sound.get(key), str):
+            sound[key] = str((folder / sound[key]).resolve())
 
 
 def _override(data: dict[str, Any], text: str) -> None:
@@ -152,7 +158,9 @@ def _descend(node: Any, part: str, key: str) -> Any:
     if isinstance(node, list):
         return node[_index(node, part, key)]
     if isinstance(node, dict):
-        return node.setdefault(part, {})
+        if node.get(part) is None:  # also where a whole group is unset, as room
+            node[part] = {}
+        return node[part]
     raise ScenarioError(key, "leads into a plain value; shorten the key")
 
 

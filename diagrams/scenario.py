@@ -17,13 +17,16 @@ from systems.acoustics import AcousticParameters
 from systems.adc import MicArrayParameters, channel_skew
 from systems.collision_vector import CollisionVectorParameters
 from systems.diff_drive_plant import PlantParameters
-from systems.geometry import rectangle_clearance
+from systems.geometry import rectangle_clearance, rotate
 from systems.ideal_source_sensor import IdealHearingParameters
 from systems.impedance import AttractionParameters, RepulsionParameters
+from systems.interferers import InterfererParameters
+from systems.mic_array import microphones_B
 from systems.obstacles import ObstacleParameters
 from systems.parameters import NonNegative, Parameters, Point, Positive
 from systems.paths import WaypointPath
 from systems.robot import RobotParameters
+from systems.room import RoomParameters
 from systems.source_robot import SourceRobotParameters
 from systems.source_tracker import TrackerParameters
 from systems.tdoa_estimator import TDOAParameters
@@ -115,6 +118,8 @@ class Scenario(Parameters):
 
     acoustics: AcousticParameters = AcousticParameters()
     sound: SoundParameters = SoundParameters()
+    room: RoomParameters | None = None
+    interferers: Annotated[tuple[InterfererParameters, ...], Strict(False)] = ()
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
     ideal_hearing: IdealHearingParameters = IdealHearingParameters()
@@ -170,6 +175,40 @@ class Scenario(Parameters):
                     f"obstacles: the name {name!r} is taken; give each obstacle a "
                     "name of its own, other than 'source'"
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _check_interferers(self) -> Scenario:
+        names = [interferer.name for interferer in self.interferers]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(
+                    f"interferers: the name {name!r} is taken; give each interferer a "
+                    "name of its own"
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _check_room(self) -> Scenario:
+        if self.room is None:
+            return self
+        self.room.walls(self.acoustics.c)
+        x, y, theta = self.start.pose
+        dx, dy = rotate(theta, *microphones_B(self.robot).T)
+        places = {
+            "source.waypoints_m": self.source.waypoints_m,
+            "start.position_m (the microphones)": np.column_stack([x + dx, y + dy]),
+        }
+        for k, interferer in enumerate(self.interferers):
+            places[f"interferers.{k}.waypoints_m"] = interferer.waypoints_m
+        for field, points in places.items():
+            for point in points:
+                if not self.room.contains(point):
+                    raise ValueError(
+                        f"{field}: ({point[0]:g}, {point[1]:g}) is outside the room, "
+                        f"which begins at {tuple(self.room.corner.tolist())} and is "
+                        f"{self.room.size_m} m; set room.corner_m or room.size_m"
+                    )
         return self
 
     @model_validator(mode="after")

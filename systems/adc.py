@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.noise import tick_generator
-from systems.parameters import Parameters, Positive
+from systems.parameters import Fraction, Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
 __all__ = ["MicArrayParameters", "channel_skew", "convert", "frame_noise"]
@@ -39,6 +39,15 @@ class MicArrayParameters(Parameters):
     One time for each microphone, or none where all are sampled at once.
     """
 
+    ego_noise_file: str | None = None
+    """Recording of the robot's own noise (WAV, FLAC ...), repeated for ever.
+
+    One channel for all microphones, or one for each.
+    """
+    ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the ego noise at top speed, dB."""
+    ego_noise_share_at_rest: Fraction = 1.0
+    """Amplitude of the ego noise at rest over that at top speed; linear between."""
     position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
     """Each microphone stands off its place by up to this in x and in y, m.
 

@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from systems.adc import MicArrayParameters
+from systems.adc import MicArrayParameters, channel_skew
+from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["Tolerances", "draw_tolerances"]
+__all__ = ["RealArray", "Tolerances", "draw_tolerances", "real_array"]
+
+# Spacing of 2.5 ms: even a robot that spins at 4 rad/s bends the delay by
+# less than 1e-4 sample from a cubic in that time.
+_KNOTS = 11
 
 
 @dataclass(frozen=True)
@@ -43,3 +49,39 @@ def draw_tolerances(
         channel_delays=delays * parameters.delay_tolerance_s,
         gains=10.0 ** (gains_db / 20.0),
     )
+
+
+class RealArray(NamedTuple):
+    """The array and the air as they are, whatever they are thought to be."""
+
+    p_BM: NDArray[np.float64]
+    """(n, 2) microphones in B, m."""
+    instants: NDArray[np.float64]
+    """(n, knots) of each channel's knots from the frame's start, s."""
+    gains: NDArray[np.float64]
+    """(n,) true over stated gain of each channel."""
+    c: float
+    """Speed of sound, m/s."""
+
+
+def real_array(
+    p_BM: NDArray[np.float64],
+    parameters: MicArrayParameters,
+    tolerances: Tolerances,
+    c: float,
+) -> RealArray:
+    """The array with its errors.
+
+    Args:
+        p_BM: (n, 2) stated places of the microphones in B, m.
+        parameters: Stated skew of the channels.
+        tolerances: The errors of both, and of the gains.
+        c: Speed of sound, m/s.
+
+    Raises:
+        ValueError: The skew is given for another number of channels.
+    """
+    late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
+    knots = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS)
+    instants = knots + late[:, None]
+    return RealArray(p_BM + tolerances.position_errors, instants, tolerances.gains, c)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,30 +11,36 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, channel_skew, convert, frame_noise
-from systems.array_tolerances import Tolerances, draw_tolerances
+from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.array_tolerances import (
+    RealArray,
+    Tolerances,
+    draw_tolerances,
+    real_array,
+)
 from systems.cache import declare_cache
+from systems.ego_noise import EgoNoise, driving_share
 from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.propagation import microphone_paths, propagate
+from systems.reverberation import Reverberation
 from systems.robot import RobotParameters
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame, Emission
+from systems.room import RoomParameters
+from systems.signals import (
+    FRAME_PERIOD_S,
+    FRAME_SAMPLES,
+    SAMPLE_RATE_HZ,
+    AudioFrame,
+    Emission,
+)
+from systems.sound_emitter import MAXIMUM_RANGE_M
 
 __all__ = [
     "FRAME_SAMPLES",
     "MicArray",
     "MicArrayParameters",
-    "RealArray",
     "microphones_B",
-    "real_array",
     "record_frame",
 ]
-
-#: Samples a channel in a frame.
-FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
-
-# Spacing of 2.5 ms: even a robot that spins at 4 rad/s bends the delay by
-# less than 1e-4 sample from a cubic in that time.
-_KNOTS = 11
 
 # Two instants closer than this are one tick of a 25 ms clock, s.
 _SAME_INSTANT_S = 1e-6
@@ -44,44 +51,8 @@ def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
     return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
 
 
-class RealArray(NamedTuple):
-    """The array and the air as they are, whatever they are thought to be."""
-
-    p_BM: NDArray[np.float64]
-    """(n, 2) microphones in B, m."""
-    instants: NDArray[np.float64]
-    """(n, knots) of each channel's knots from the frame's start, s."""
-    gains: NDArray[np.float64]
-    """(n,) true over stated gain of each channel."""
-    c: float
-    """Speed of sound, m/s."""
-
-
-def real_array(
-    robot: RobotParameters,
-    parameters: MicArrayParameters,
-    tolerances: Tolerances,
-    c: float,
-) -> RealArray:
-    """The array with its errors.
-
-    Args:
-        robot: Stated places of the microphones.
-        parameters: Stated skew of the channels.
-        tolerances: The errors of both, and of the gains.
-        c: Speed of sound, m/s.
-
-    Raises:
-        ValueError: The skew is given for another number of channels.
-    """
-    p_BM = microphones_B(robot) + tolerances.position_errors
-    late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
-    knots = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS)
-    return RealArray(p_BM, knots + late[:, None], tolerances.gains, c)
-
-
 def record_frame(
-    emission: Emission,
+    emissions: Sequence[Emission],
     time: float,
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     now: tuple[NDArray[np.float64], NDArray[np.float64]],
@@ -89,34 +60,55 @@ def record_frame(
     *,
     parameters: MicArrayParameters,
     seed: int,
+    rise: float = 0.0,
+    reflections: Sequence[NDArray[np.float32] | None] = (),
+    ego_noise: NDArray[np.float32] | None = None,
 ) -> AudioFrame:
     """The frame that ends now.
 
     Args:
-        emission: What has left the source.
+        emissions: What has left the sources; noise refers to the first one.
         time: Now, s.
         before: Pose and velocity of the robot a frame ago, (3,) each.
         now: Pose and velocity of the robot now.
         array: From ``real_array``.
         parameters: Microphones, amplifier and converter.
         seed: Seed of the noise.
+        rise: Height of the microphones above the sources, m.
+        reflections: (n, FRAME_SAMPLES) Pa each, of the sources' reflections.
+        ego_noise: (n, FRAME_SAMPLES) over the level of the first source at 1 m.
 
     Raises:
-        ValueError: The source is out of the emission's reach.
+        ValueError: A source is out of the emission's reach.
     """
     begin = time - FRAME_PERIOD_S
     times = begin + array.instants
     p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
-    pressure = propagate(emission, times, p_WM, v_WM, FRAME_SAMPLES, array.c)
+    arriving = (p_WM, v_WM, FRAME_SAMPLES, array.c, rise)
+    direct = [propagate(emission, times, *arriving) for emission in emissions]
+    pressure = _total([*direct, *reflections])
     tick = round(time / FRAME_PERIOD_S)
     noise = frame_noise((len(p_WM), FRAME_SAMPLES), seed, tick)
-    noise_pa = emission.level_pa * 10.0 ** (-parameters.snr_db_at_1m / 20.0)
+    snr = 10.0 ** (parameters.snr_db_at_1m / 20.0)
+    if ego_noise is not None:
+        noise += np.float32(snr) * ego_noise
+    noise_pa = emissions[0].level_pa / snr
     return AudioFrame(
         counts=convert(pressure, noise, noise_pa, parameters, array.gains),
         full_scale=parameters.full_scale,
         sample_rate_hz=SAMPLE_RATE_HZ,
         time=time,
     )
+
+
+def _total(
+    pressures: Sequence[NDArray[np.float32] | None],
+) -> NDArray[np.float32] | None:
+    """Their sum, in the place of the first; None where all are silent."""
+    heard = [pressure for pressure in pressures if pressure is not None]
+    for pressure in heard[1:]:
+        heard[0] += pressure
+    return heard[0] if heard else None
 
 
 class MicArray(LeafSystem):
@@ -137,6 +129,12 @@ class MicArray(LeafSystem):
     ``systems.propagation``. A robot that has no tick behind it, or is read
     between two ticks, is taken to have come at its present velocity.
 
+    In a room the direct sound is as without one. The reflections are those of
+    robot and source at rest where they were at the last multiple of the room's
+    ``update_period_s``, so that their geometry is up to that old (and older by
+    what sound takes for the way); the frame that ends at such an instant fades
+    from the places before to those of that instant.
+
     Numeric parameters, by the class's constants of these names; a trial may
     set them in its context, at the latest before the first tick:
     ``POSITION_ERRORS`` (2 n, x and y of one microphone after the other, m),
@@ -144,7 +142,8 @@ class MicArray(LeafSystem):
     ``systems.array_tolerances``; ``SOUND_SPEED`` (1, m/s), of the air. Their
     defaults are drawn from the seed, within the tolerances of the parameters.
 
-    State: time, pose and velocity of the robot at the last tick.
+    State: time, pose and velocity of the robot at the last tick; in a room
+    also time, pose of the robot and place of each source at the last update.
     Rate and latency: a function of the state and the present inputs; no
     latency. The state is updated every 25 ms.
 
@@ -152,10 +151,14 @@ class MicArray(LeafSystem):
         parameters: Microphones, amplifier and converter.
         robot: Places of the microphones.
         acoustics: Speed of sound.
+        room: Walls, if there are any.
+        interferers: Names of further sources; each adds an input port
+            ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the array's errors.
 
     Raises:
-        ValueError: The skew is given for another number of channels.
+        ValueError: The skew is given for another number of channels, the room
+            cannot be, or the file of the ego noise cannot be used.
     """
 
     POSITION_ERRORS, CHANNEL_DELAYS, GAINS, SOUND_SPEED = range(4)
@@ -166,6 +169,8 @@ class MicArray(LeafSystem):
         parameters: MicArrayParameters | None = None,
         robot: RobotParameters | None = None,
         acoustics: AcousticParameters | None = None,
+        room: RoomParameters | None = None,
+        interferers: Sequence[str] = (),
         seed: int = 0,
     ) -> None:
         super().__init__()
@@ -173,13 +178,26 @@ class MicArray(LeafSystem):
         self._robot = robot or RobotParameters()
         self._seed = seed
         self.set_name("mic_array")
-        self._declare_errors((acoustics or AcousticParameters()).c)
-        self._emission = self.DeclareAbstractInputPort(
-            name="emission", model_value=Value(object())
-        )
+        c = (acoustics or AcousticParameters()).c
+        self._declare_errors(c)
+        self._reverberation = Reverberation(room, c) if room else None
+        self._ego_noise = None
+        if self._parameters.ego_noise_file is not None:
+            count = len(self._robot.microphones_m)
+            self._ego_noise = EgoNoise(self._parameters, count, seed)
+        self._rise = room.rise_m if room else 0.0
+        self._sources = [
+            self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
+            for name in ("emission", *(f"emission_{name}" for name in interferers))
+        ]
         self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
         self._velocity_WB = self.DeclareVectorInputPort(name="velocity_WB", size=3)
         self.DeclareDiscreteState(np.r_[-np.inf, np.zeros(6)])
+        if room:
+            self._update_ticks = round(room.update_period_s / FRAME_PERIOD_S)
+            self.DeclareDiscreteState(
+                np.r_[-np.inf, np.zeros(3 + 2 * len(self._sources))]
+            )
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
@@ -191,11 +209,18 @@ class MicArray(LeafSystem):
                 self.time_ticket(),
                 self.xd_ticket(),
                 self._array.ticket(),
-                self._emission.ticket(),
+                *(source.ticket() for source in self._sources),
                 self._pose_WB.ticket(),
                 self._velocity_WB.ticket(),
             },
         )
+
+    @property
+    def maximum_range_m(self) -> float:
+        """Longest way of sound that the emissions must reach back for, m."""
+        if self._reverberation is None:
+            return MAXIMUM_RANGE_M
+        return max(MAXIMUM_RANGE_M, self._reverberation.maximum_range_m)
 
     def _declare_errors(self, c: float) -> None:
         drawn = draw_tolerances(
@@ -203,7 +228,8 @@ class MicArray(LeafSystem):
             len(self._robot.microphones_m),
             tick_generator(self._seed, BEFORE_THE_RUN),
         )
-        real_array(self._robot, self._parameters, drawn, c)  # refuses bad skews
+        # Refuses a bad skew before anything runs.
+        real_array(microphones_B(self._robot), self._parameters, drawn, c)
         # In the order of the constants' numbers.
         groups: Any = (
             drawn.position_errors.ravel(),
@@ -226,38 +252,73 @@ class MicArray(LeafSystem):
             for index in range(context.num_numeric_parameter_groups())
         )
         tolerances = Tolerances(positions.reshape(-1, 2), delays, gains)
-        return real_array(self._robot, self._parameters, tolerances, float(c))
+        p_BM = microphones_B(self._robot)
+        return real_array(p_BM, self._parameters, tolerances, float(c))
 
     def _remember(self, context, discrete_state):
         state = np.empty(7)
         state[0] = context.get_time()
         state[1:4] = self._pose_WB.Eval(context)
         state[4:] = self._velocity_WB.Eval(context)
-        discrete_state.set_value(state)
+        discrete_state.set_value(0, state)
+        if self._reverberation and self._updates(state[0]):
+            held = np.r_[state[0], self._places(context, self._emissions(context))]
+            discrete_state.set_value(1, held)
+
+    def _updates(self, time: float) -> bool:
+        """Whether reflections take new places at a tick."""
+        return round(time / FRAME_PERIOD_S) % self._update_ticks == 0
+
+    def _emissions(self, context) -> list[Emission]:
+        emissions: list[Any] = [port.Eval(context) for port in self._sources]
+        for emission, port in zip(emissions, self._sources, strict=True):
+            if not isinstance(emission, Emission):
+                raise TypeError(
+                    f"MicArray: port {port.get_name()} carries a "
+                    f"{type(emission).__name__}; connect the emission of a SoundEmitter"
+                )
+        return emissions
+
+    def _places(self, context, emissions: list[Emission]) -> NDArray[np.float64]:
+        """Pose of the robot and places of the sources, one after the other."""
+        now = [emission.p_WS[-1] for emission in emissions]
+        return np.concatenate([self._pose_WB.Eval(context), *now])
+
+    def _reflections(self, context, emissions: list[Emission], array: RealArray):
+        if self._reverberation is None:
+            return ()
+        present = self._places(context, emissions)
+        held = context.get_discrete_state(1).value()
+        old = held[1:] if np.isfinite(held[0]) else present
+        time = context.get_time()
+        new = present if self._updates(time) else old
+        return self._reverberation.frames(emissions, time, old, new, array)
 
     def _record(self, context, output) -> None:
-        emission = self._emission.Eval(context)
-        if not isinstance(emission, Emission):
-            raise TypeError(
-                f"MicArray: port emission carries a {type(emission).__name__}; "
-                "connect the emission of a SoundEmitter"
-            )
+        emissions = self._emissions(context)
         time = context.get_time()
         pose = np.asarray(self._pose_WB.Eval(context))
         velocity = np.asarray(self._velocity_WB.Eval(context))
+        ego_noise = None
+        if self._ego_noise is not None:
+            share = driving_share(velocity, self._robot)
+            ego_noise = self._ego_noise.frame(round(time / FRAME_PERIOD_S), share)
         array: Any = self._array.Eval(context)
-        last = context.get_discrete_state_vector().value()
+        last = context.get_discrete_state(0).value()
         before = last[1:4], last[4:7]
         if abs(last[0] - (time - FRAME_PERIOD_S)) > _SAME_INSTANT_S:
             before = pose - FRAME_PERIOD_S * velocity, velocity
         output.set_value(
             record_frame(
-                emission,
+                emissions,
                 time,
                 before,
                 (pose, velocity),
                 array,
                 parameters=self._parameters,
                 seed=self._seed,
+                rise=self._rise,
+                reflections=self._reflections(context, emissions, array),
+                ego_noise=ego_noise,
             )
         )

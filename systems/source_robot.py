@@ -68,24 +68,30 @@ def SourceRobot_(T):
         A function of time alone: no state, no latency. The source is an
         exogenous body, so that gradients do not pass through it.
 
-        Parameters: ``SourceRobotParameters``.
+        Args:
+            source: ``SourceRobotParameters``, or ``InterfererParameters``.
+            suffix: Ends the names of block and ports; empty for the source
+                that is followed.
         """
 
-        def _construct(self, *, source=None, converter=None):
+        def _construct(self, *, source=None, suffix="", converter=None):
             super().__init__(converter=converter)
             self._source = source or SourceRobotParameters()
+            self._suffix = suffix
             self._path = self._source.path()
-            self.set_name("source_robot")
+            self.set_name(f"source_robot{suffix}")
             for name, calc in (("pose_WS", self._pose), ("v_WS", self._velocity)):
                 self.DeclareVectorOutputPort(
-                    name=name,
+                    name=f"{name}{suffix}",
                     size=3,
                     calc=calc,
                     prerequisites_of_calc={self.time_ticket()},
                 )
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(self, source=other._source, converter=converter)
+            Impl._construct(
+                self, source=other._source, suffix=other._suffix, converter=converter
+            )
 
         def _pose(self, context, output):
             output.SetFromVector(self._path.pose(seconds(context)))

@@ -14,7 +14,12 @@ from systems.parameters import NonNegative, Parameters, Positive
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.sound_file import read_sound
 
-__all__ = ["MICROPHONE_BAND_HZ", "SoundParameters", "make_waveform"]
+__all__ = [
+    "MICROPHONE_BAND_HZ",
+    "SoundParameters",
+    "band_limited",
+    "make_waveform",
+]
 
 #: What the microphones pass (Han 2019, 4.1). The filter is applied to the
 #: waveform: a linear filter common to all microphones commutes with
@@ -98,7 +103,7 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     raw = _SYNTHESES[sound.kind](sound, seed)
-    endless = _band_limited(raw, *MICROPHONE_BAND_HZ)
+    endless = band_limited(raw, *MICROPHONE_BAND_HZ)
     if np.std(endless) <= 1e-6 * max(np.abs(raw).max(), 1e-3):
         field = f"sound.file: {sound.file}" if sound.kind == "wav" else "sound.tone_hz"
         low, high = MICROPHONE_BAND_HZ
@@ -134,7 +139,7 @@ def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 def _band_noise(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     length = round(max(sound.on_s, _NOISE_SECONDS) * SAMPLE_RATE_HZ)
     white = np.random.default_rng(seed).standard_normal(length)
-    return _band_limited(white, sound.low_hz, sound.high_hz)
+    return band_limited(white, sound.low_hz, sound.high_hz)
 
 
 def _tone(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
@@ -170,7 +175,7 @@ def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     return mono[np.argmax(np.abs(mono) > threshold) :]
 
 
-def _band_limited(
+def band_limited(
     samples: NDArray[np.float64], low_hz: float, high_hz: float
 ) -> NDArray[np.float64]:
     """Zero-phase Butterworth band-pass."""

@@ -55,6 +55,45 @@ def test_blocks_of_the_full_build():
     assert block_names(follower) == COMMON_BLOCKS | audio | {"ultrasonic_array"}
 
 
+def test_interferers_are_wired_to_the_microphones():
+    names = ("fan", "drill")
+    scenario = Scenario.model_validate({"interferers": [{"name": n} for n in names]})
+    follower = build_sound_follower(scenario)
+    wires = {
+        (to.get_name(), to.get_input_port(i).get_name()): origin.get_name()
+        for (to, i), (origin, _) in follower.diagram.connection_map().items()
+    }
+    assert wires["mic_array", "emission"] == "sound_emitter"
+    for name in names:
+        emitter = f"sound_emitter_{name}"
+        assert wires["mic_array", f"emission_{name}"] == emitter
+        assert wires[emitter, f"pose_WS_{name}"] == f"source_robot_{name}"
+
+
+def test_bad_files_are_named_by_their_whole_field(tmp_path):
+    missing = str(tmp_path / "missing.wav")
+    interferer = {"name": "fan", "sound": {"kind": "wav", "file": missing}}
+    for data, field in (
+        ({"interferers": [interferer]}, r"interferers\.0\.sound\.file"),
+        ({"microphones": {"ego_noise_file": missing}}, r"microphones\.ego_noise_file"),
+    ):
+        with pytest.raises(ValueError, match=rf"^{field}: .*missing\.wav"):
+            build_sound_follower(Scenario.model_validate(data))
+
+
+def test_emitters_reach_back_as_far_as_the_room_answers():
+    """By 0.4 s: 136 m, where 30 m are enough without a room."""
+    scenario = Scenario.model_validate(
+        {"room": {"reverberation_time_s": 0.4}, "interferers": [{"name": "fan"}]}
+    )
+    follower = build_sound_follower(scenario)
+    context = follower.diagram.CreateDefaultContext()
+    for role in ("emitter", "emitter_fan"):
+        block = follower.blocks[role]
+        emission = block.get_output_port(0).Eval(block.GetMyContextFromRoot(context))
+        assert emission.start_time <= -0.4 - 0.025
+
+
 def test_blocks_of_the_ideal_build():
     ideal = {"ideal_source_sensor", "ideal_obstacle_sensor"}
     assert block_names(build()) == COMMON_BLOCKS - {"collision_vector"} | ideal

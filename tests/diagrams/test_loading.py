@@ -21,6 +21,7 @@ from diagrams.loading import (
 )
 from diagrams.scenario import Scenario
 from systems.parameters import Parameters
+from systems.room import RoomParameters
 
 ONE_OF_EVERYTHING = """
 name: one of everything
@@ -37,6 +38,9 @@ obstacles:
   - {name: box, size_m: [0.2, 0.1], waypoints_m: [[2, 2]], heading_deg: 45}
   - {name: cart, waypoints_m: [[3, 3], [3, -3]], speed_m_s: 0.1, start_time_s: 1}
 stop: {goal_margin_m: 0.2, stuck_after_s: 5}
+room: {size_m: [8, 8, 3], reverberation_time_s: 0.3}
+interferers:
+  - {name: fan, waypoints_m: [[0, 3]], sound: {kind: band_noise}}
 acoustics: {temperature_c: 25}
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
@@ -106,6 +110,28 @@ def test_values_arrive(tmp_path):
 def test_dumped_scenario_loads_as_it_was(tmp_path, name):
     scenario = load_scenario(name, ["seed=3", "repulsion.velocity_term=closing"])
     assert load_scenario(write(tmp_path, dump_scenario(scenario))) == scenario
+
+
+def test_relative_files_lie_beside_the_scenario(tmp_path):
+    text = """
+sound: {kind: wav, file: a.wav}
+microphones: {ego_noise_file: c.wav}
+interferers:
+  - {name: fan, sound: {kind: wav, file: b.wav}}
+  - {name: drill}
+"""
+    scenario = load_scenario(write(tmp_path, text))
+    assert [
+        scenario.sound.file,
+        scenario.interferers[0].sound.file,
+        scenario.microphones.ego_noise_file,
+    ] == [str((tmp_path / name).resolve()) for name in ("a.wav", "b.wav", "c.wav")]
+
+
+def test_fields_of_a_group_that_is_unset_may_be_overridden(tmp_path):
+    path = write(tmp_path, dump_scenario(Scenario()))
+    scenario = load_scenario(path, ["room.reverberation_time_s=0.3"])
+    assert scenario.room == RoomParameters(reverberation_time_s=0.3)
 
 
 def test_a_dump_is_the_whole_scenario():

@@ -81,6 +81,38 @@ def test_skew_is_given_for_every_microphone_or_none():
         Scenario.model_validate({"microphones": {"channel_skew_s": [0.0, 1e-6]}})
 
 
+@pytest.mark.parametrize(
+    ("data", "message"),
+    [
+        (
+            {"source": {"waypoints_m": [[2.0, 0.0], [3.0, 0.0], [3.0, 4.0]]}},
+            r"source\.waypoints_m: \(3, 4\) is outside the room",
+        ),
+        (
+            {"interferers": [{"name": "fan", "waypoints_m": [[-3.6, 0.0]]}]},
+            r"interferers\.0\.waypoints_m: \(-3\.6, 0\)",
+        ),
+        (
+            {"start": {"position_m": [3.4, 0.0]}},
+            r"start\.position_m \(the microphones\)",
+        ),
+        ({"room": {"reverberation_time_s": 0.1}}, r"room\.reverberation_time_s"),
+        ({"room": {"absorption": 0.01}}, r"room\.maximum_order"),
+    ],
+)
+def test_all_that_sounds_is_in_the_room(data, message):
+    with pytest.raises(ValidationError, match=message):
+        Scenario.model_validate({"room": {}} | data)
+
+
+def test_every_interferer_has_a_name_of_its_own():
+    twice = [{"name": "fan"}, {"name": "fan", "waypoints_m": [[1.0, 2.0]]}]
+    with pytest.raises(ValidationError, match=r"interferers: the name 'fan' is taken"):
+        Scenario.model_validate({"interferers": twice})
+    with pytest.raises(ValidationError, match="name"):
+        Scenario.model_validate({"interferers": [{"name": "Fan 1"}]})
+
+
 def test_seed_fits_the_generators():
     assert Scenario(seed=2**63 - 1).seed == 2**63 - 1
     for seed in (-1, 2**63):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -251,6 +252,26 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
 def test_skew_of_another_number_of_channels_is_refused():
     with pytest.raises(ValueError, match=r"microphones\.channel_skew_s.*3 microph"):
         MicArray(parameters=MicArrayParameters(channel_skew_s=(0.0, 1e-6)))
+
+
+def test_sources_add_up():
+    """Two places, two sources: what one block hears of both is the sum."""
+    array = MicArray(parameters=quiet(), interferers=["fan"])
+    silent = emission((2.0, 0.5), sounding=False)
+    sent = emission((2.0, 0.5)), emission((1.0, -2.0))
+    heard = []
+    for first, second in ((sent[0], sent[1]), (sent[0], silent), (silent, sent[1])):
+        context = array.CreateDefaultContext()
+        context.SetTime(TIME)
+        array.GetInputPort("emission").FixValue(context, Value(first))
+        array.GetInputPort("emission_fan").FixValue(context, Value(second))
+        array.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
+        array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
+        audio: Any = array.GetOutputPort("audio").Eval(context)
+        heard.append(audio.counts.astype(float))
+    # Each frame is rounded and holds the same noise, below one count.
+    np.testing.assert_allclose(heard[0], heard[1] + heard[2], atol=3.0)
+    assert np.std(heard[2]) > 100.0
 
 
 def test_wrong_emission_is_refused():

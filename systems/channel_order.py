@@ -1,0 +1,174 @@
+"""Whether delays belong to a place, or only do so with two channels exchanged.
+
+Not to be seen from sound is an exchange that makes the array its own mirror
+image (the ends of a symmetric row, opposite corners of a square), and which of
+two exchanges it was if they differ by such an image (the two ends of either
+side of a square: both are named). A source straight ahead of a row shows no
+exchange at all, for all its delays are alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.array_shape import ArrayShape
+from systems.coherent import arrival_delays
+from systems.multilateration import locate_source
+from systems.source_fix import SourceFix
+
+__all__ = ["exchanged_channels", "levels_contradict", "misfit"]
+
+# Delays fit where they are right to this part of a sample, or to this share of
+# what sound needs across the array.
+_FIT_SAMPLES = 0.25
+_FIT_SHARE = 0.05
+
+# Fewer frames whose pairs agree prove nothing.
+_LEAST_FRAMES = 5
+
+# Shares of such frames that fit a wrong geometry at most, and a right one at
+# least; shares nearer to each other than this are alike; and one that is hopeless.
+_WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
+
+
+def levels_contradict(
+    levels: NDArray[np.float64],
+    fix: SourceFix,
+    shape: ArrayShape,
+    least_spread_db: float = 3.0,
+) -> bool:
+    """Whether a near source would be heard at other levels than these.
+
+    Exchanged neighbours in a row, for one, make the delays of a source very
+    near to the array. Its levels would fall as 1/R.
+
+    Args:
+        levels: (n,) RMS of the channels' sound, any unit.
+        fix: A fix, with a range or without.
+        shape: The n microphones.
+        least_spread_db: Spread of 1/R below which nothing is claimed, dB.
+
+    Returns:
+        True where the levels follow less than half of what 1/R asks for.
+    """
+    if not fix.range_valid:
+        return False
+    ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
+    expected = -20.0 * np.log10(np.maximum(ranges, 1e-3))
+    if np.ptp(expected) < least_spread_db:
+        return False
+    expected -= expected.mean()
+    measured = 20.0 * np.log10(np.maximum(levels, 1e-300))
+    return bool(measured @ expected < 0.5 * (expected @ expected))
+
+
+def exchanged_channels(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> list[tuple[int, int]]:
+    """Exchanges, each of two channels, of which one makes the delays fit.
+
+    Args:
+        lags: (f, p) delays of ``shape.pairs`` in f frames, samples.
+        levels: (f, n) levels of the channels, any unit.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+
+    Returns:
+        Pairs of numbers from 0. Empty where the delays fit as they are, or where
+        no exchange helps.
+    """
+    d, levels = _agreeing(lags, levels, shape, metres_per_sample)
+    tolerance = _tolerance(shape, metres_per_sample)
+    if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance) > _WRONG:
+        return []
+    exchanges = list(combinations(range(shape.count), 2))
+    shares = [
+        _fitting(
+            d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
+        )
+        for pair in exchanges
+    ]
+    best = max(shares)
+    if best < _RIGHT:
+        return []
+    return [
+        pair
+        for pair, share in zip(exchanges, shares, strict=True)
+        if share > best - _ALIKE
+    ]
+
+
+def misfit(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> float | None:
+    """Share of the frames that fit no place, if it is hopeless; else None.
+
+    Args:
+        lags: As for ``exchanged_channels``.
+        levels: As there.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+    """
+    d, levels = _agreeing(lags, levels, shape, metres_per_sample)
+    if len(d) < 2 * _LEAST_FRAMES:
+        return None
+    share = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
+    return 1.0 - share if share < _HOPELESS else None
+
+
+def _exchanged(p: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
+    order = np.arange(len(p))
+    order[[i, j]] = j, i
+    return p[order]
+
+
+def _tolerance(shape: ArrayShape, metres_per_sample: float) -> float:
+    return max(_FIT_SAMPLES * metres_per_sample, _FIT_SHARE * shape.aperture_m)
+
+
+def _agreeing(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(f, n - 1) differences of range, m, and levels where all pairs agree."""
+    to_pairs = np.zeros((len(shape.pairs), shape.count))
+    rows = np.arange(len(shape.pairs))
+    to_pairs[rows, shape.pairs[:, 1]] = 1.0
+    to_pairs[rows, shape.pairs[:, 0]] = -1.0
+    to_pairs = to_pairs[:, 1:]
+    d = lags * metres_per_sample
+    differences = d @ np.linalg.pinv(to_pairs).T
+    errors = np.abs(d - differences @ to_pairs.T).max(axis=1)
+    agree = errors < _tolerance(shape, metres_per_sample)
+    return differences[agree], levels[agree]
+
+
+def _fitting(
+    differences: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    tolerance: float,
+) -> float:
+    """Share of the frames that a place outside the array explains."""
+    if shape.kind == "plane" and shape.dimension == 2:
+        # The source need not lie in the plane.
+        shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
+    covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
+    fits = 0
+    for d, level in zip(differences, levels, strict=True):
+        fix = locate_source(d, covariance, shape, 1.0)
+        off = np.abs(arrival_delays(fix, shape, 1.0) - d).max()
+        fits += bool(off < tolerance and not levels_contradict(level, fix, shape))
+    return fits / len(differences)
