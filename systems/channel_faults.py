@@ -118,13 +118,11 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     """A channel whose samples pile up at an extreme, far above the next values."""
+    _, counts = np.unique(channel, return_counts=True)
     most = 0
-    for values in (channel, -channel):
-        near_top = np.sort(values[values >= values.max() - 0.02 * np.ptp(values)])[::-1]
-        _, counts = np.unique(-near_top, return_counts=True)
-        pile, following = counts[0], counts[1:4].max(initial=0)
-        if pile >= _LEAST_PILE and pile > _PILE * following:
-            most += int(pile)
+    for ends in (counts, counts[::-1]):
+        if ends[0] >= _LEAST_PILE and ends[0] > _PILE * ends[1:4].max(initial=0):
+            most += int(ends[0])
     share = most / channel.size
     if share < _CLIPPED_SHARE:
         return None
@@ -138,7 +136,7 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
 
 def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelFault]:
     """Channels far below or above the others."""
-    level = 20.0 * np.log10(np.maximum(np.median(measured.levels, axis=0), 1e-300))
+    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
     faults = []
     for k, channel in enumerate(use.tolist()):
         over = float(level[k] - np.median(np.delete(level, k)))

@@ -86,22 +86,24 @@ def exchanged_channels(
     """
     d, levels = _agreeing(lags, levels, shape, metres_per_sample)
     tolerance = _tolerance(shape, metres_per_sample)
-    if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance) > _WRONG:
+    if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance)[0] > _WRONG:
         return []
     exchanges = list(combinations(range(shape.count), 2))
-    shares = [
+    found = [
         _fitting(
             d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
         )
         for pair in exchanges
     ]
-    best = max(shares)
+    best = max(share for share, _ in found)
     if best < _RIGHT:
         return []
+    least = min(error for share, error in found if share > best - _ALIKE)
+    limit = 1.5 * least + 0.05 * tolerance
     return [
         pair
-        for pair, share in zip(exchanges, shares, strict=True)
-        if share > best - _ALIKE
+        for pair, (share, error) in zip(exchanges, found, strict=True)
+        if share > best - _ALIKE and error < limit
     ]
 
 
@@ -122,7 +124,7 @@ def misfit(
     d, levels = _agreeing(lags, levels, shape, metres_per_sample)
     if len(d) < 2 * _LEAST_FRAMES:
         return None
-    share = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
+    share, _ = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
     return 1.0 - share if share < _HOPELESS else None
 
 
@@ -150,7 +152,7 @@ def _agreeing(
     to_pairs = to_pairs[:, 1:]
     d = lags * metres_per_sample
     differences = d @ np.linalg.pinv(to_pairs).T
-    errors = np.abs(d - differences @ to_pairs.T).max(axis=1)
+    errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
     agree = errors < _tolerance(shape, metres_per_sample)
     return differences[agree], levels[agree]
 
@@ -160,15 +162,21 @@ def _fitting(
     levels: NDArray[np.float64],
     shape: ArrayShape,
     tolerance: float,
-) -> float:
-    """Share of the frames that a place outside the array explains."""
+) -> tuple[float, float]:
+    """Share of the frames that a place outside the array explains, and RMS error.
+
+    The error in m is that of the frames that it explains.
+    """
     if shape.kind == "plane" and shape.dimension == 2:
         # The source need not lie in the plane.
         shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
     covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
-    fits = 0
+    errors = []
     for d, level in zip(differences, levels, strict=True):
         fix = locate_source(d, covariance, shape, 1.0)
-        off = np.abs(arrival_delays(fix, shape, 1.0) - d).max()
-        fits += bool(off < tolerance and not levels_contradict(level, fix, shape))
-    return fits / len(differences)
+        off = arrival_delays(fix, shape, 1.0) - d
+        if np.abs(off).max() < tolerance and not levels_contradict(level, fix, shape):
+            errors.append(off)
+    if not errors:
+        return 0.0, np.inf
+    return len(errors) / len(differences), float(np.sqrt(np.mean(np.square(errors))))

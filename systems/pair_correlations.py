@@ -40,6 +40,8 @@ class PairCorrelations:
     """(p,) its smallest value."""
     levels: NDArray[np.float64]
     """(f, n) RMS of the channels within the band."""
+    level: NDArray[np.float64]
+    """(n,) RMS over all these frames."""
     noise: float
     """About what the pooled extremes are in independent noise."""
 
@@ -72,7 +74,7 @@ def correlate_pairs(
     cut = np.reshape(samples[:, : frames * length], (count, frames, length))
     energy = np.var(cut, axis=2)
     mean = energy.mean(axis=1, keepdims=True)
-    loudness = np.median(energy / np.maximum(mean, 1e-300), axis=0)
+    loudness = np.mean(energy / np.maximum(mean, 1e-300), axis=0)
     chosen = np.sort(np.argsort(-loudness)[:_FRAMES])
     window = np.hanning(length)
     spectra = fft.rfft(cut[:, chosen] * window, 2 * length)
@@ -94,6 +96,7 @@ def correlate_pairs(
         pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
         pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
         levels=np.sqrt(power / length).T,
+        level=np.sqrt(power.mean(axis=1) / length),
         noise=math.sqrt(math.log(2.0 * gate + 1.0) / bins / chosen.size),
     )
 
