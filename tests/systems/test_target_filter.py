@@ -166,9 +166,7 @@ def test_errors_and_innovations_are_what_the_covariances_say():
     assert np.mean(np.array(innovations) > GATE) == pytest.approx(0.01, abs=0.004)
 
 
-@given(
-    st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(0.01, 0.2), st.booleans()
-)
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(0.01, 0.2), st.booleans())
 def test_without_noise_the_track_is_at_the_sighting(x, y, dx, two):
     """To rounding, however much was known before."""
     memory = blank_memory(2 if two else 1)
@@ -195,7 +193,9 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
     h = np.array([*n, 0.0, 0.0])
     variance = (0.02 * 2.0) ** 2
     information = np.linalg.inv(P) + np.outer(h, h) / variance
-    np.testing.assert_allclose(np.linalg.inv(covariance), information, rtol=1e-6, atol=1e-9)
+    np.testing.assert_allclose(
+        np.linalg.inv(covariance), information, rtol=1e-6, atol=1e-9
+    )
     np.testing.assert_allclose(u @ after[:2], u @ before[:2], atol=1e-12)
     kept = h @ P @ h / (h @ P @ h + variance)
     np.testing.assert_allclose(n @ (after[:2] - at), off * (1 - kept), atol=1e-9)
