@@ -175,7 +175,7 @@ def _tracked(
     )
     localiser, p_PA_B = robot_localiser(parameters, robot, _AIR)
     tracker = TrackerModel(
-        TrackerParameters(resolve_front_back=False), robot, 1.5 * FRAME_PERIOD_S
+        TrackerParameters(resolve_front_back=False, hold="world"), robot, 1.5 * FRAME_PERIOD_S
     )
     pose = layout.pose_WB
     track, memory, believed = tracker.start(pose), localiser.blank(), False
@@ -191,7 +191,7 @@ def _tracked(
                 ports[2].tolist(), ports[3].tolist(), ranged=fix.range_valid
             )
             track = tracker.hear(track, estimate, pose)
-        track = track.older(pose)
+        track = tracker.older(track, pose)
     return np.array(tracker.position(track, pose)) if believed else None
 
 

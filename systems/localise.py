@@ -22,7 +22,7 @@ from systems.source_fix import SourceFix
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
 # From this correlation on, a frame holds hardly anything but the direct sound.
-_DIRECT_CORRELATION = 0.9
+_DIRECT_CORRELATION = 0.98
 
 # What channels do not share is noise as long as it is below this many times what
 # is heard between the sounds; beyond, it is echoes.
@@ -31,11 +31,18 @@ _NOISE_MARGIN = 3.0
 # Frames over which the level of the noise is averaged.
 _NOISE_FRAMES = 8.0
 
-# Frames whose echoes were suppressed are believed from this correlation on, and
-# the echoes that slip through shift delays by this much (standard deviation, s):
-# from the trials in docs/localization.md.
-_ECHO_CORRELATION = 0.3
-_ECHO_ERROR_S = 1.5e-6
+# Frames whose echoes were suppressed are believed from this correlation on, and up
+# to this ambiguity.
+_ECHO_CORRELATION = 0.4
+_ECHO_AMBIGUITY = 0.7
+
+# Echoes that slip through, those off the floor above all, shift each arrival by
+# itself (standard deviation, s) and the whole direction (rad). The less of a
+# frame is news, the more: from this share on they count fully. All from the
+# trials in rooms, docs/localization.md.
+_ECHO_ERROR_S = 1.2e-6
+_ECHO_ERROR_RAD = 2e-3
+_ECHO_NEWS = 0.12
 
 
 class TDOAParameters(Parameters):
@@ -147,12 +154,16 @@ class Localiser:
         delays = self._delays(frame, seen)
         if delays is not None and self._is_direct(delays, memory):
             return self._fix(frame, delays), memory
-        dry, echoes = keep_first_wave_front(frame, memory.echoes, self._sizes)
+        dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
         memory = memory._replace(echoes=echoes)
         delays = self._delays(dry)
-        if delays is None or delays.correlation < _ECHO_CORRELATION:
+        if (
+            delays is None
+            or delays.correlation < _ECHO_CORRELATION
+            or delays.ambiguity > _ECHO_AMBIGUITY
+        ):
             return None, memory
-        return self._fix(dry, delays, _ECHO_ERROR_S), memory
+        return self._fix(dry, delays, self._echo_errors(news)), memory
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
@@ -179,8 +190,18 @@ class Localiser:
             or delays.noise_energy <= _NOISE_MARGIN * memory.noise_energy
         )
 
+    def _echo_errors(self, news: float) -> NDArray[np.float64]:
+        """(n - 1, n - 1) covariance of delays, for a share of news, s^2."""
+        places = self.plan.shape.p_AM
+        turns = (places[1:] - places[0]) * (_ECHO_ERROR_RAD / self.plan.c)
+        single = _ECHO_ERROR_S**2 * (np.eye(len(turns)) + 1.0)
+        return (single + turns @ turns.T) * max(1.0, _ECHO_NEWS / news) ** 2
+
     def _fix(
-        self, frame, delays: DelayEstimate | None, extra_s: float = 0.0
+        self,
+        frame: NDArray[np.float32],
+        delays: DelayEstimate | None,
+        echoes: NDArray[np.float64] | None = None,
     ) -> SourceFix | None:
         """The place behind the delays of a frame, where they are believed."""
         parameters, plan = self.parameters, self.plan
@@ -191,10 +212,10 @@ class Localiser:
         ):
             return None
         covariance = delays.covariance
-        if extra_s > 0.0:
-            covariance = covariance + extra_s**2 * (np.eye(len(covariance)) + 1.0)
+        if echoes is not None:
+            covariance = covariance + echoes
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
-        if parameters.method == "ml" and extra_s == 0.0:
+        if parameters.method == "ml" and echoes is None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length
             fix = (

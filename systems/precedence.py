@@ -56,8 +56,13 @@ class EchoMemory:
 
 @njit(cache=True)
 def _weigh(spectra, memory, decay, floor):  # pragma: no cover  (compiled)
-    """Weights spectra (n, instants, bins) in place; memory becomes the last one."""
+    """Weights spectra (n, instants, bins) in place; memory becomes the last one.
+
+    Returns:
+        Share of the energy that is news.
+    """
     channels, instants, bins = spectra.shape
+    kept, all_of_it = 0.0, 1e-30
     for m in range(channels):
         strongest = np.float32(0.0)
         for t in range(instants):
@@ -73,9 +78,12 @@ def _weigh(spectra, memory, decay, floor):  # pragma: no cover  (compiled)
                 power = a.real * a.real + a.imag * a.imag
                 past = memory[m, k]
                 news = max(power - past, np.float32(0.0))
+                kept += news
+                all_of_it += power
                 weight = news / ((power + np.float32(1e-30)) * math.sqrt(power + least))
                 spectra[m, t, k] = a * np.float32(weight)
                 memory[m, k] = max(past * decay, power)
+    return kept / all_of_it
 
 
 @njit(cache=True)
@@ -89,7 +97,7 @@ def _overlap_add(pieces, taper, hop, out):  # pragma: no cover  (compiled)
 
 def keep_first_wave_front(
     frame: NDArray[np.float32], memory: NDArray[np.float32], sizes: EchoMemory
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
     """A frame without what may be echoes.
 
     Args:
@@ -98,16 +106,17 @@ def keep_first_wave_front(
         sizes: Of window and memory.
 
     Returns:
-        (n, samples) weighted and whitened channels, and the new memory.
+        (n, samples) weighted and whitened channels, the new memory, and the share
+        of the frame's energy that is news, 0 to 1.
     """
     windows = np.lib.stride_tricks.sliding_window_view(frame, sizes.window, axis=1)
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)
     memory = memory.copy()
     decay = np.float32(sizes.decay_a_hop)
-    _weigh(spectra, memory, decay, np.float32(_WHITENING_FLOOR))
+    news = _weigh(spectra, memory, decay, np.float32(_WHITENING_FLOOR))
     pieces = fft.irfft(spectra, sizes.window, overwrite_x=True)
     out = np.zeros(frame.shape, dtype=np.float32)
     _overlap_add(pieces, sizes.taper, sizes.hop, out)
     # The last window ends before the frame does.
     rest = frame.shape[1] - sizes.hop * (spectra.shape[1] - 1)
-    return out, sizes.faded(memory, rest - sizes.hop)
+    return out, sizes.faded(memory, rest - sizes.hop), news
