@@ -271,17 +271,18 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
 @njit(cache=True)
 def _descend_within(problem, u, w, far):  # pragma: no cover  (compiled)
     """``_descend`` to a place that exists: w >= 0 and |u| = 1."""
-    bound, fixed = _is_bound(problem), True
-    u, w, cost = _descend(problem, u, w, bound, far)
-    if w < 0.0:
-        u, w, cost = _descend(problem, u, 0.0, bound, fixed)
-    length = math.sqrt(_dot(u, u))
-    if length > 1.0 and not bound:
-        # More than the array is long: in its line or plane.
-        bound = True
-        u, w, cost = _descend(problem, u / length, w, bound, far)
+    bound = _is_bound(problem)
+    cost = 0.0
+    for _ in range(4):
+        u, w, cost = _descend(problem, u, w, bound, far)
+        length = math.sqrt(_dot(u, u))
         if w < 0.0:
-            u, w, cost = _descend(problem, u, 0.0, bound, fixed)
+            w, far = 0.0, w < 0.0  # a literal True would be compiled anew
+        elif length > 1.0 and not bound:
+            # More than the array is long: in its line or plane.
+            u, bound = u / length, length > 1.0  # likewise
+        else:
+            break
     return u, w, cost
 
 
@@ -302,15 +303,18 @@ def _starts(problem):  # pragma: no cover  (compiled)
     A, far, half = np.zeros((m, rank + 1)), np.zeros(m), np.zeros(m)
     for a in range(m):
         for b in range(a + 1):
-            q = p[b + 1] - p[0]
-            for j in range(rank):
-                A[a, j] += root[a, b] * _dot(q, span[j])
+            for i in range(p.shape[1]):
+                q = p[b + 1, i] - p[0, i]
+                for j in range(rank):
+                    A[a, j] += root[a, b] * q * span[j, i]
+                half[a] += root[a, b] * 0.5 * q * q
             far[a] -= root[a, b] * d[b]
-            half[a] += root[a, b] * 0.5 * (_dot(q, q) - d[b] * d[b])
+            half[a] -= root[a, b] * 0.5 * d[b] * d[b]
         A[a, rank] = -half[a]
     components, inverse = np.zeros((3, rank)), np.zeros(3)
     v_far = _least_squares(A, far, rank, 0.0)
-    components[0] = v_far
+    for j in range(rank):
+        components[0, j] = v_far[j]
     count = 1
     if _is_bound(problem):
         # Direction as a function of w, of length 1: a quadratic in w.
@@ -365,10 +369,14 @@ def _search(problem):  # pragma: no cover  (compiled)
         u, w = _from_centroid(problem, components[s].copy(), inverse[s])
         u, w, cost = _descend_within(problem, u, w, far)
         place = 0 if cost < costs[0] else 1
+        if place == 1 and not cost < costs[1]:
+            continue
+        for i in range(dim):
+            us[1, i] = us[0, i] if place == 0 else us[1, i]
+            us[place, i] = u[i]
         if place == 0:
-            us[1], ws[1], costs[1] = us[0], ws[0], costs[0]
-        if cost < costs[place]:
-            us[place], ws[place], costs[place] = u, w, cost
+            ws[1], costs[1] = ws[0], costs[0]
+        ws[place], costs[place] = w, cost
     return us, ws, costs
 
 
@@ -460,7 +468,7 @@ def fit_delays(problem, prior_w):  # pragma: no cover  (compiled)
                     to_p[i, j] = by[i, j] / w
                 to_p[i, k] = -u[i] / (w * w)
             return u, w, C[k, k], of_u, _carried(to_p, C, k + 1), cost, twin
-    far = True
+    far = n > 0  # a literal True would be compiled anew
     u, _, cost_far = _descend_within(problem, u, 0.0, far)
     C, by, k = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
     of_u = _carried(by, C, k)
