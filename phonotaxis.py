@@ -311,9 +311,12 @@ def _localization(options: argparse.Namespace) -> None:
             directory = stack.enter_context(whole_directory(out))
         except ValueError as error:
             raise InputError.from_error(error) from None
-        with _Progress(experiment.measurements, "measurements") as progress:
-            cells = experiment.run(progress)
-        summary = localization_summary(experiment, cells, out)
+        try:
+            with _Progress(experiment.measurements, "measurements") as progress:
+                cells = experiment.run(progress)
+            summary = localization_summary(experiment, cells, out)
+        except ValueError as error:
+            raise RunError(str(error)) from error
         write_localization(experiment, cells, summary, directory)
     if options.json:
         print(json.dumps(summary))

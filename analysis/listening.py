@@ -101,9 +101,7 @@ class Listener:
         heard, ranged, bearings, ranges = np.asarray(rows[_LEAD:]).T
         heard, ranged = heard > 0.5, ranged > 0.5
         directions = np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
-        ends = FRAME_PERIOD_S * np.arange(
-            start + _LEAD, start + _LEAD + trials, dtype=float
-        )
+        ticks = start + _LEAD + np.arange(trials, dtype=float)
         return Heard(
             p_AS=p_AS,
             bearings=bearings[heard],

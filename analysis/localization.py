@@ -59,13 +59,15 @@ _MOST_TRIALS = 100_000
 ESTIMATORS: dict[str, dict[str, Any]] = {
     "paper": {
         "method": "amdf",
-        "minimum_correlation": 0.0,
-        "maximum_ambiguity": 1.0,
+        "false_alarm_rate": 1.0 - 1e-12,
+        "suppress_echoes": False,
         "maximum_closure_s": 1.0,
+        "maximum_ambiguity": 1.0,
         "maximum_bearing_std_deg": 1e9,
         "maximum_relative_range_std": 1e9,
     },
     "fast": {"method": "gcc"},
+    "ml": {"method": "ml"},
 }
 
 

@@ -16,9 +16,6 @@ from diagrams import dump_scenario
 
 __all__ = ["localization_summary", "localization_text", "write_localization"]
 
-#: Frames a row of the sensitivity table.
-_SENSITIVITY_TRIALS = 200
-
 _ERROR_NAMES = {
     "position_m": "1 mm",
     "delay_s": "1 us",
@@ -51,7 +48,12 @@ def localization_summary(
         },
         "cells": [cell.to_dict() for cell in cells],
         "sensitivity": sensitivity_table(
-            shape, c, estimate, trials=_SENSITIVITY_TRIALS, seed=scenario.seed
+            experiment.places,
+            shape,
+            c,
+            estimate,
+            trials=experiment.trials,
+            seed=scenario.seed,
         ),
         "versions": versions(),
         "out": str(out) if out is not None else None,
@@ -81,6 +83,9 @@ def localization_text(summary: dict[str, Any]) -> str:
         f"{cells[0]['trials']} frames a cell, {summary['sound']}, "
         f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
         + (_tolerances_text(tolerances) if drawn else "no errors of the array"),
+    ]
+    lines += [
+        "Han 2019: on hardware; paper: its estimator here; (n): frames without result"
     ]
     for name, unit in (("range", "m"), ("bearing", "deg")):
         lines += ["", *_table(cells, name, unit)]

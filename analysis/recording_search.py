@@ -27,8 +27,10 @@ __all__ = ["RecordingSearch", "Sighting"]
 # Least mean weight of a stretch's snapshots: the rest is silence or echo.
 _LEAST_WEIGHT = 0.02
 # A response counts above that of a diffuse field by this many deviations of
-# what independent noise would give.
+# what independent noise would give, and by this share of what direct sound
+# alone would: no real noise comes from all around quite alike.
 _DEVIATIONS = 5.0
+_LEAST_DIRECT = 0.1
 # To choose among the peaks of a stretch its neighbours help: how many on either
 # side, and by which share.
 _NEIGHBOURS, _HELP = 4, 0.5
@@ -169,7 +171,8 @@ class RecordingSearch:
         recording = self.recording
         first, last = recording.starts[[stretch.start, stretch.stop - 1]]
         return Sighting(
-            t_s=(first + last + recording.window.size) / (2 * recording.sample_rate_hz),
+            t_s=float(first + last + recording.window.size)
+            / (2.0 * recording.sample_rate_hz),
             tau=fit.tau,
             covariance=fit.covariance,
             coherence=fit.coherence,
@@ -181,7 +184,9 @@ class RecordingSearch:
         # many independent values; and few of the pairs are independent.
         values = self.recording.weights[stretch].sum() / 2.0
         deviation = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
-        return float(self.diffuse_response[place]) + _DEVIATIONS * deviation
+        diffuse = float(self.diffuse_response[place])
+        least = _LEAST_DIRECT * (1.0 - diffuse)
+        return diffuse + max(_DEVIATIONS * deviation, least)
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
         """Delays of the channels, aligned for a place of the grid first."""

@@ -8,6 +8,7 @@ by arrays with random errors, located as if there were none.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.cramer_rao import polar_gradients
 from analysis.free_field import Estimator, Loudspeaker
-from analysis.paper_tables import PAPER_CELLS
+from analysis.paper_tables import PaperCell
 from systems.array_shape import ArrayShape
 from systems.signals import FRAME_PERIOD_S
 
@@ -154,11 +155,18 @@ def _finite(value: float) -> float | None:
 
 
 def sensitivity_table(
-    shape: ArrayShape, c: float, estimate: Estimator, *, trials: int, seed: int
+    places: Sequence[PaperCell],
+    shape: ArrayShape,
+    c: float,
+    estimate: Estimator,
+    *,
+    trials: int,
+    seed: int,
 ) -> list[dict[str, Any]]:
-    """Rows of the JSON document: each unit error in each of the papers' cells.
+    """Rows of the JSON document: each unit error in each place.
 
     Args:
+        places: Of the source.
         shape: The microphones, in the plane.
         c: Speed of sound, m/s.
         estimate: From a frame to a fix.
@@ -168,7 +176,7 @@ def sensitivity_table(
     loudspeaker = Loudspeaker.of("chirp", seed)
     rows = []
     for number, (errors, cell) in enumerate(
-        (errors, cell) for cell in PAPER_CELLS for errors in UNIT_ERRORS
+        (errors, cell) for cell in places for errors in UNIT_ERRORS
     ):
         angle = math.radians(cell.bearing_deg)
         p_AS = cell.range_m * np.array([math.cos(angle), math.sin(angle)])

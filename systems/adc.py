@@ -6,10 +6,10 @@ from typing import Annotated
 
 import numpy as np
 from numba import njit
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.noise import tick_generator
+from systems.noise import standard_normals
 from systems.parameters import Fraction, Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
@@ -96,26 +96,28 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
     """White noise of unit variance that only the seed and the tick decide."""
-    return tick_generator(seed, tick).standard_normal(shape, dtype=np.float32)
+    return standard_normals(shape, seed, tick)
 
 
 @njit(cache=True)
-def _silent_counts(noise, sigmas, full_scale, out):  # pragma: no cover  (compiled)
+def _silent_counts(
+    noise, gains, sigma, full_scale, out
+):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
-        sigma = sigmas[m]
+        level = np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):
-            x = np.rint(sigma * noise[m, k])
+            x = np.rint(level * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
 
 
 @njit(cache=True)
 def _counts(
-    pressure, gains, noise, sigmas, full_scale, out
+    pressure, noise, gains, gain, sigma, full_scale, out
 ):  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
-        gain, sigma = gains[m], sigmas[m]
+        factor, level = np.float32(gains[m] * gain), np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):
-            x = np.rint(gain * pressure[m, k] + sigma * noise[m, k])
+            x = np.rint(factor * pressure[m, k] + level * noise[m, k])
             out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
 
 
@@ -124,7 +126,7 @@ def convert(
     noise: NDArray[np.float32],
     noise_pa: float,
     parameters: MicArrayParameters,
-    gains: ArrayLike = 1.0,
+    gains: NDArray[np.float64] | None = None,
 ) -> NDArray[np.int16]:
     """Counts of the converter, rounded to nearest and clipped.
 
@@ -133,19 +135,19 @@ def convert(
         noise: (m, n) noise of unit variance.
         noise_pa: RMS of the noise, Pa.
         parameters: Sensitivity, gain and resolution.
-        gains: True over stated gain of all channels, or (m,) of each.
+        gains: (m,) true over stated gain of each channel; 1 unless given.
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
     """
-    counts_per_pa = np.full(len(noise), parameters.counts_per_pa) * gains
-    sigmas = (counts_per_pa * noise_pa).astype(np.float32)
+    if gains is None:
+        gains = np.ones(len(noise))
+    gain = parameters.counts_per_pa
+    sigma = gain * noise_pa
     full_scale = np.float32(parameters.full_scale)
     out = np.empty(noise.shape, dtype=np.int16)
     if pressure is None:
-        _silent_counts(noise, sigmas, full_scale, out)
+        _silent_counts(noise, gains, sigma, full_scale, out)
     else:
-        _counts(
-            pressure, counts_per_pa.astype(np.float32), noise, sigmas, full_scale, out
-        )
+        _counts(pressure, noise, gains, gain, sigma, full_scale, out)
     return out

@@ -20,6 +20,10 @@ __all__ = ["AlignedDelays", "fit_aligned_delays"]
 _BANDS = 24
 _LEAST_BANDS = 4
 
+# Added to the power that whitens, as a share of the frequency's mean: what is
+# weak says little.
+_FLOOR = 1.0
+
 # Reflections move bands alike as well as apart: by how much the errors are
 # larger than the bands' disagreement, for each part that is not coherent.
 # From simulated rooms with reverberation times of 0.15-0.6 s.
@@ -61,11 +65,12 @@ def fit_aligned_delays(
     """
     first, second = np.triu_indices(len(spectra), 1)
     power = np.mean(np.abs(spectra) ** 2, axis=0)
-    flat = weights / np.maximum(power, np.finfo(np.float32).tiny)
+    floor = _FLOOR * power.mean(axis=0) + np.finfo(np.float32).tiny
+    flat = weights / (power + floor)
     cross = np.einsum(
         "pkf,pkf,kf->pf", spectra[first].conj(), spectra[second], flat, optimize=True
     ).astype(np.complex128)
-    total = weights.sum(axis=0, dtype=np.float64)
+    total = (flat * power).sum(axis=0).astype(np.float64)
     if not total.any():
         return None
     edges = _band_edges(total)

@@ -21,6 +21,7 @@ __all__ = [
     "INTERPOLATION_KERNEL",
     "KERNEL_REACH",
     "MINIMUM_RANGE_M",
+    "REORDER",
     "microphone_paths",
     "propagate",
     "retarded_delays",
@@ -36,24 +37,32 @@ MINIMUM_RANGE_M = 0.01
 # at 100 kHz the nearest image starts at 82 kHz, so the transition is wide.
 _TAPS = 2 * KERNEL_REACH
 _BETA = 10.0
-_PHASES = 256
 
-# Vectorised sums need licence to reorder; NaN must still mean NaN.
-_REORDER = {"reassoc", "contract", "nsz", "arcp"}
+#: Licence for compiled sums to reorder, so that they vectorise; NaN stays NaN.
+REORDER = {"reassoc", "contract", "nsz", "arcp"}
 
 
-def _kernel() -> NDArray[np.float32]:
-    """(phases + 1, taps) windowed sinc for delays of 0 ... 1 sample."""
-    fraction = np.arange(_PHASES + 1)[:, None] / _PHASES
-    x = np.arange(_TAPS) - (KERNEL_REACH - 1) - fraction
+def _interpolation_kernel() -> NDArray[np.float32]:
+    """Windowed sinc as polynomials of the fraction of a sample, right to 1e-6.
+
+    Returns:
+        (pairs, 2, 4) for the taps n and 11 - n: with u = fraction - 1/2 their
+        weights are E + O and E - O, E = sum_k e_k u^2k and O = u sum_k o_k u^2k.
+    """
+    u = np.linspace(-0.5, 0.5, 257)
+    x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
     fine = np.linspace(-KERNEL_REACH, KERNEL_REACH, 4801)
-    window = np.interp(x, fine, kaiser(4801, _BETA))
-    taps = np.sinc(x) * window
-    return (taps / taps.sum(axis=1, keepdims=True)).astype(np.float32)
+    weights = np.sinc(x) * np.interp(x, fine, kaiser(4801, _BETA))
+    weights /= weights.sum(axis=1, keepdims=True)
+    powers = np.vander(u * u, 4, increasing=True)
+    near, far = weights[:, :KERNEL_REACH], weights[:, : KERNEL_REACH - 1 : -1]
+    even = np.linalg.lstsq(powers, (near + far) / 2.0)[0]
+    odd = np.linalg.lstsq(u[:, None] * powers, (near - far) / 2.0)[0]
+    return np.stack([even.T, odd.T], axis=1).astype(np.float32)
 
 
-#: (phases + 1, taps) windowed sinc for delays of 0 ... 1 sample.
-INTERPOLATION_KERNEL = _kernel()
+#: See ``_interpolation_kernel``.
+INTERPOLATION_KERNEL = _interpolation_kernel()
 
 
 @njit(cache=True)
@@ -167,7 +176,25 @@ def retarded_delays(
     return delays, rates
 
 
-@njit(cache=True, fastmath=_REORDER)
+@njit(cache=True, fastmath=REORDER)
+def _delayed(samples, first, u, kernel, out):  # pragma: no cover  (compiled)
+    """Fills out (n,) with samples[first + i + 1/2 + u_i], interpolated."""
+    pairs = kernel.shape[0]
+    count = u.size
+    out[:] = np.float32(0.0)
+    for n in range(pairs):
+        e, o = kernel[n, 0], kernel[n, 1]
+        low = first + n - pairs + 1
+        high = first - n + pairs
+        left, right = samples[low : low + count], samples[high : high + count]
+        for i in range(count):
+            y = u[i] * u[i]
+            even = ((e[3] * y + e[2]) * y + e[1]) * y + e[0]
+            odd = u[i] * (((o[3] * y + o[2]) * y + o[1]) * y + o[0])
+            out[i] += (even + odd) * left[i] + (even - odd) * right[i]
+
+
+@njit(cache=True, fastmath=REORDER)
 def _interpolate(
     samples, kernel, first, delays, rates, c, nearest, out
 ):  # pragma: no cover  (compiled)
@@ -177,34 +204,34 @@ def _interpolate(
     channel's first instant, delays and rates (m, k) stand at evenly spaced
     knots, c is in m per sample and nearest the least distance in m.
     """
-    taps = kernel.shape[1]
-    phases = kernel.shape[0] - 1
     spans = delays.shape[1] - 1
     h = out.shape[1] // spans
+    u = np.empty(h, dtype=np.float32)
+    amplitude = np.empty(h, dtype=np.float32)
+    begin = np.empty(h, dtype=np.int32)
     for m in range(out.shape[0]):
         for k in range(spans):
+            a, b = delays[m, k], delays[m, k + 1]
+            da, db = h * rates[m, k], h * rates[m, k + 1]
             for i in range(h):
-                d, _ = _hermite(
-                    i / h,
-                    h,
-                    delays[m, k],
-                    delays[m, k + 1],
-                    rates[m, k],
-                    rates[m, k + 1],
-                )
-                j = k * h + i
-                position = first[m] + j - d
+                s = i / h
+                bend = 3.0 * (b - a) - 2.0 * da - db
+                d = a + s * (da + s * (bend + s * (2.0 * (a - b) + da + db)))
+                position = first[m] + k * h + i - d
                 whole = math.floor(position)
-                phase = (position - whole) * phases
-                row = int(phase)
-                part = np.float32(phase - row)
-                start = whole - taps // 2 + 1
-                total = np.float32(0.0)
-                for n in range(taps):
-                    low = kernel[row, n]
-                    weight = low + part * (kernel[row + 1, n] - low)
-                    total += weight * samples[start + n]
-                out[m, j] = total / np.float32(max(c * d, nearest))
+                u[i] = np.float32(position - whole - 0.5)
+                begin[i] = np.int32(whole - i)
+                amplitude[i] = np.float32(1.0) / np.float32(max(c * d, nearest))
+            span = out[m, k * h : (k + 1) * h]
+            # The delay passes a whole sample now and then: runs in between.
+            i = 0
+            while i < h:
+                end = i + 1
+                while end < h and begin[end] == begin[i]:
+                    end += 1
+                _delayed(samples, begin[i] + i, u[i:end], kernel, span[i:end])
+                i = end
+            span *= amplitude
 
 
 def propagate(

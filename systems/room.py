@@ -18,16 +18,18 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.parameters import Parameters, Point, Positive
-from systems.propagation import INTERPOLATION_KERNEL, MINIMUM_RANGE_M
+from systems.propagation import (
+    INTERPOLATION_KERNEL,
+    KERNEL_REACH,
+    MINIMUM_RANGE_M,
+    REORDER,
+)
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 
 __all__ = ["RoomImages", "RoomParameters", "room_images", "room_impulse_responses"]
 
 #: Higher orders of reflection are refused: four million images and more.
 GREATEST_ORDER = 150
-
-# Vectorised sums need licence to reorder; NaN must still mean NaN.
-_REORDER = {"reassoc", "contract", "nsz", "arcp"}
 
 
 class RoomParameters(Parameters):
@@ -186,11 +188,11 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
         signs,
         offsets,
         np.sqrt(1.0 - absorption) ** orders[kept].sum(axis=1),
-        math.ceil(last / c * SAMPLE_RATE_HZ) + INTERPOLATION_KERNEL.shape[1],
+        math.ceil(last / c * SAMPLE_RATE_HZ) + 2 * KERNEL_REACH,
     )
 
 
-@njit(cache=True, fastmath=_REORDER)
+@njit(cache=True, fastmath=REORDER)
 def _add_arrivals(
     images, p_S, p_M, early, per_m, nearest, kernel, out
 ):  # pragma: no cover  (compiled)
@@ -200,11 +202,10 @@ def _add_arrivals(
     m; early (m,) samples; per_m samples that sound takes for a metre.
     """
     signs, offsets, gains = images
-    taps = kernel.shape[1]
-    phases = kernel.shape[0] - 1
+    pairs = kernel.shape[0]
     length = out.shape[1]
     for m in range(out.shape[0]):
-        row_out = out[m]
+        row = out[m]
         for i in range(gains.size):
             dx = signs[i, 0] * p_S[0] + offsets[i, 0] - p_M[m, 0]
             dy = signs[i, 1] * p_S[1] + offsets[i, 1] - p_M[m, 1]
@@ -212,16 +213,19 @@ def _add_arrivals(
             r = math.sqrt(dx * dx + dy * dy + dz * dz)
             position = r * per_m - early[m]
             whole = math.floor(position)
-            start = int(whole) - taps // 2 + 1
-            if start >= length:
+            start = int(whole) - pairs + 1
+            # Too late; or within 2 cm, where nobody stands.
+            if start < 0 or start + 2 * pairs > length:
                 continue
-            phase = (position - whole) * phases
-            row = int(phase)
-            part = np.float32(phase - row)
+            u = np.float32(position - whole - 0.5)
+            y = u * u
             gain = np.float32(gains[i] / max(r, nearest))
-            for n in range(max(-start, 0), min(taps, length - start)):
-                low = kernel[row, n]
-                row_out[start + n] += gain * (low + part * (kernel[row + 1, n] - low))
+            for n in range(pairs):
+                e, o = kernel[n, 0], kernel[n, 1]
+                even = gain * (((e[3] * y + e[2]) * y + e[1]) * y + e[0])
+                odd = gain * u * (((o[3] * y + o[2]) * y + o[1]) * y + o[0])
+                row[start + n] += even + odd
+                row[start + 2 * pairs - 1 - n] += even - odd
 
 
 def room_impulse_responses(

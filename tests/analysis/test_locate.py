@@ -140,6 +140,146 @@ def test_three_dimensional_places_of_a_level_row(tmp_path):
     assert result.estimates[0].elevation_deg is None
 
 
+ARRAYS = {
+    "circle": [
+        [0.1 * math.cos(a), 0.1 * math.sin(a)] for a in 2 * np.pi * np.arange(6) / 6
+    ],
+    "unequal row": [[0.0, 0.0], [0.05, 0.0], [0.15, 0.0], [0.35, 0.0]],
+    "level square": [
+        [0.02, 0.02, 1],
+        [-0.02, 0.02, 1],
+        [-0.02, -0.02, 1],
+        [0.02, -0.02, 1],
+    ],
+    "tetrahedron": [[0.1, 0.1, 0.1], [0.1, 0, 0], [0, 0.1, 0], [0, 0, 0.1]],
+    "across a room": [
+        [0, 0, 0],
+        [1.2, 0, 0.1],
+        [1.1, 1, 0.5],
+        [0.1, 0.9, 1],
+        [0.6, 0.4, 1.3],
+    ],
+}
+
+
+def array(places):
+    return ArrayGeometry.model_validate(
+        {"microphones": [list(map(float, p)) for p in places]}
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "bearing", "elevation", "distance", "range_known"),
+    [
+        ("circle", -160.0, 0.0, 0.5, True),
+        ("circle", 75.0, 25.0, 5.0, False),
+        ("unequal row", 60.0, 0.0, 1.0, True),
+        ("level square", 175.0, 30.0, 2.0, False),
+        ("tetrahedron", -120.0, -35.0, 2.0, False),
+        ("across a room", 20.0, 10.0, 0.7, True),
+        ("across a room", 130.0, -20.0, 3.0, True),
+    ],
+)
+def test_arrays_of_any_shape(tmp_path, name, bearing, elevation, distance, range_known):
+    places = np.array(ARRAYS[name])
+    level = distance * math.cos(math.radians(elevation))
+    height = distance * math.sin(math.radians(elevation))
+    p_AS = np.array([*polar(bearing, level), height])
+    # Positions in the plane: the source's height is not in the geometry.
+    heard_by = np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
+    source = heard_by.mean(axis=0) + p_AS
+    path = record(tmp_path / "a.wav", heard_by, source, rate=16_000, high=6_000.0)
+    summary = locate(path, array(places)).summary()
+    assert summary["bearing_deg"] == pytest.approx(bearing, abs=0.3)
+    if places.shape[1] == 3:
+        assert summary["elevation_deg"] == pytest.approx(elevation, abs=0.5)
+    else:
+        assert summary["elevation_deg"] is None
+    if range_known:
+        assert summary["range_m"] == pytest.approx(distance, rel=0.05)
+    else:
+        assert summary["range_m"] is None
+    assert ("range" in summary["observable"]) == range_known
+
+
+def test_upright_row_tells_the_elevation_alone(tmp_path):
+    places = np.array([[0, 0, 0.0], [0, 0, 0.1], [0, 0, 0.25]])
+    source = places.mean(axis=0) + 3.0 * np.array([0.6, 0.0, 0.8])
+    path = record(tmp_path / "a.wav", places, source)
+    result = locate(path, array(places))
+    summary = result.summary()
+    assert summary["bearing_deg"] is None
+    assert summary["elevation_deg"] == pytest.approx(53.13, abs=0.5)
+    assert "bearing" not in summary["observable"]
+    json.dumps(result.to_dict(), allow_nan=False)
+    assert "elevation 53" in locate_text(result)
+
+
+def test_stated_errors_are_those_of_the_estimates(tmp_path):
+    """In the free field: scatter and error of many stretches, within a third."""
+    places = np.array(ARRAYS["circle"])
+    path = record(tmp_path / "a.wav", places, polar(40.0, 8.0), seconds=12.0, snr_db=10)
+    estimates = locate(path, array(places)).estimates
+    assert len(estimates) > 150
+    errors = np.array([e.bearing_deg for e in estimates]) - 40.0
+    stated = np.sqrt(
+        np.mean(np.square([e.bearing_std_deg or math.nan for e in estimates]))
+    )
+    assert stated == pytest.approx(np.sqrt(np.mean(errors**2)), rel=0.35)
+
+
+def test_source_on_the_move(tmp_path):
+    """30 deg/s round a circle of microphones, at 2 m."""
+    rate, rng = 16_000, np.random.default_rng(6)
+    places = np.array(ARRAYS["circle"])
+    time = np.arange(4 * rate) / rate
+    angle = np.radians(150.0 + 30.0 * time)
+    spectrum, _ = band_noise(rng, time.size, 500.0, 6_000.0, rate)
+    source = np.fft.irfft(spectrum, time.size)
+    p_AS = 2.0 * np.stack((np.cos(angle), np.sin(angle)), axis=1)
+    heard = np.array(
+        [
+            np.interp(time - np.linalg.norm(p_AS - p, axis=1) / C, time, source)
+            for p in places
+        ]
+    )
+    heard += 0.03 * rng.standard_normal(heard.shape)
+    soundfile.write(tmp_path / "a.wav", 0.1 * heard.T, rate, subtype="PCM_24")
+    estimates = locate(tmp_path / "a.wav", array(places)).estimates
+    assert len(estimates) > 40
+    for e in estimates:
+        # Sound takes 6 ms to come, in which the source moves by 0.2 deg.
+        assert e.bearing_deg is not None
+        off = e.bearing_deg - (150.0 + 30.0 * (e.t_s - 2.0 / C))
+        assert abs((off + 180.0) % 360.0 - 180.0) < 2.0
+
+
+def test_sound_from_all_around_has_no_bearing(tmp_path):
+    """Uncorrelated plane waves from 300 directions of space."""
+    rate, rng = 16_000, np.random.default_rng(8)
+    length = 4 * rate
+    places = np.array(ARRAYS["level square"])
+    f = np.fft.rfftfreq(length, 1.0 / rate)
+    heard = np.zeros((4, f.size), dtype=complex)
+    for _ in range(300):
+        u = rng.standard_normal(3)
+        u /= np.linalg.norm(u)
+        wave = np.fft.rfft(rng.standard_normal(length))
+        heard += wave * np.exp(2j * np.pi * f * (places @ u)[:, None] / C)
+    samples = 0.005 * np.fft.irfft(heard, length)
+    soundfile.write(tmp_path / "a.wav", samples.T, rate, subtype="PCM_24")
+    assert locate(tmp_path / "a.wav", array(places)).estimates == []
+
+
+def test_dead_channel_is_named(tmp_path):
+    path = record(tmp_path / "a.wav", ROBOT, polar(0.0, 1.0))
+    samples, rate = soundfile.read(path)
+    samples[:, 1] = 0.0
+    soundfile.write(path, samples, rate)
+    with pytest.raises(ValueError, match="dead channel: 1"):
+        locate(path)
+
+
 def test_far_source_has_no_range(tmp_path):
     """At 10 km the range's standard deviation exceeds the range."""
     path = record(tmp_path / "a.wav", ROBOT, polar(30.0, 1e4), snr_db=10.0)
