@@ -11,6 +11,9 @@ the inverse range as seen from microphone 0 (Smith and Abel, 1987): the start.
 Gauss-Newton steps on the whitened delays in (direction, w) follow. Along a row,
 or in the plane of a plane array in space, the direction has its components
 within the array as coordinates; elsewhere those across itself.
+
+All is written out in loops: for arrays this small they are the fastest, and
+numba compiles them in a tenth of the time.
 """
 
 from __future__ import annotations
@@ -40,7 +43,8 @@ class DelayProblem(NamedTuple):
     d: NDArray[np.float64]
     """(n - 1,) differences of range from that of microphone 0, m."""
     root: NDArray[np.float64]
-    """(n - 1, n - 1) that makes their errors independent, of variance 1."""
+    """(n - 1, n - 1) lower triangle that makes their errors independent, of
+    variance 1."""
     p: NDArray[np.float64]
     """(n, d) microphones from their centroid, m."""
     span: NDArray[np.float64]
@@ -50,84 +54,164 @@ class DelayProblem(NamedTuple):
 
 
 @njit(cache=True)
-def _excess(p, u, w):  # pragma: no cover  (compiled)
-    """Excess ranges g, and their slopes -dg/d(p . u) and dg/dw.
+def _whitened(problem, basis, k, u, w, r, J):  # pragma: no cover  (compiled)
+    """Fills in residuals r (m,) and slopes J (m, k + 1); returns the sum of r^2.
 
     Args:
-        p: (n, d) microphones.
+        problem: Delays and array.
+        basis: (d, k) what the coordinates of the direction do to it.
+        k: Number of these coordinates.
         u: (d,) direction.
         w: Inverse range.
-
-    Returns:
-        Three arrays (n,).
+        r: Output.
+        J: Output, by the direction's coordinates and by w.
     """
-    along = p @ u
-    square = (p * p).sum(axis=1)
-    ratio = np.sqrt(np.maximum(1.0 - 2.0 * w * along + w * w * square, 1e-24))
-    top = w * square - 2.0 * along
-    g = top / (ratio + 1.0)
-    slope = (w * square - along) / ratio
-    by_w = square / (ratio + 1.0) - top * slope / (ratio + 1.0) ** 2
-    return g, 1.0 / ratio, by_w
+    p, root = problem.p, problem.root
+    n, dim = p.shape
+    g = np.empty(n)
+    G = np.empty((n, k + 1))
+    for m in range(n):
+        along, square = 0.0, 0.0
+        for i in range(dim):
+            along += p[m, i] * u[i]
+            square += p[m, i] * p[m, i]
+        ratio = math.sqrt(max(1.0 - 2.0 * w * along + w * w * square, 1e-24))
+        top = w * square - 2.0 * along
+        g[m] = top / (ratio + 1.0)
+        slope = (w * square - along) / ratio
+        G[m, k] = (square - top * slope / (ratio + 1.0)) / (ratio + 1.0)
+        for j in range(k):
+            turned = 0.0
+            for i in range(dim):
+                turned += p[m, i] * basis[i, j]
+            G[m, j] = -turned / ratio
+    cost = 0.0
+    for a in range(n - 1):
+        r[a] = 0.0
+        for j in range(k + 1):
+            J[a, j] = 0.0
+        for b in range(a + 1):  # root is a lower triangle
+            r[a] += root[a, b] * (problem.d[b] - g[b + 1] + g[0])
+            for j in range(k + 1):
+                J[a, j] += root[a, b] * (G[b + 1, j] - G[0, j])
+        cost += r[a] * r[a]
+    return cost
 
 
 @njit(cache=True)
-def _system(problem, basis, u, w):  # pragma: no cover  (compiled)
-    """Whitened residuals (m,) and their slopes (m, k + 1) by direction and w."""
-    p = problem.p
-    g, by_u, by_w = _excess(p, u, w)
-    k = basis.shape[1]
-    slopes = np.empty((p.shape[0], k + 1))
-    slopes[:, :k] = -(p @ basis) * by_u.reshape((-1, 1))
-    slopes[:, k] = by_w
-    r = problem.root @ (problem.d - (g[1:] - g[0]))
-    return r, problem.root @ (slopes[1:] - slopes[0])
+def _factor(J, size, damping, prior):  # pragma: no cover  (compiled)
+    """Cholesky factor of J^T J, damped (Marquardt), with a prior on the last."""
+    N = np.zeros((size, size))
+    trace = 0.0
+    for i in range(size):
+        for j in range(i + 1):
+            for a in range(J.shape[0]):
+                N[i, j] += J[a, i] * J[a, j]
+        trace += N[i, i]
+    N[size - 1, size - 1] += prior
+    for i in range(size):
+        N[i, i] += damping * N[i, i] + 1e-14 * trace + 1e-300
+        for j in range(i + 1):
+            for b in range(j):
+                N[i, j] -= N[i, b] * N[j, b]
+            if i > j:
+                N[i, j] /= N[j, j]
+            else:
+                N[i, i] = math.sqrt(max(N[i, i], 1e-14 * trace + 1e-300))
+    return N
 
 
 @njit(cache=True)
-def _solve_least_squares(A, b, damping):  # pragma: no cover  (compiled)
-    """x of least |A x - b|, shortened by damping (Marquardt)."""
-    N = A.T @ A
-    floor = 1e-14 * np.trace(N) + 1e-300
-    for i in range(N.shape[0]):
-        N[i, i] += damping * N[i, i] + floor
-    return np.linalg.solve(N, A.T @ b)
+def _substitute(L, x):  # pragma: no cover  (compiled)
+    """x becomes (L L^T)^-1 x."""
+    size = L.shape[0]
+    for i in range(size):
+        for j in range(i):
+            x[i] -= L[i, j] * x[j]
+        x[i] /= L[i, i]
+    for i in range(size - 1, -1, -1):
+        for j in range(i + 1, size):
+            x[i] -= L[j, i] * x[j]
+        x[i] /= L[i, i]
 
 
 @njit(cache=True)
-def _tangent(u, span):  # pragma: no cover  (compiled)
-    """(d, r - 1) orthonormal directions across u within the span."""
-    d, r = u.size, span.shape[0]
-    basis = np.zeros((d, r - 1))
-    if r == 2:
-        a, b = span[0] @ u, span[1] @ u
-        basis[:, 0] = -b * span[0] + a * span[1]
-    elif r == 3:
-        least = np.argmin(np.abs(u))
-        e = -u[least] * u
-        e[least] += 1.0
-        e /= np.sqrt(e @ e)
-        basis[:, 0] = e
-        basis[:, 1] = np.cross(u, e)
-    return basis
+def _least_squares(J, r, size, damping):  # pragma: no cover  (compiled)
+    """x of least |J x - r| over the first columns of J."""
+    x = np.zeros(size)
+    for i in range(size):
+        for a in range(J.shape[0]):
+            x[i] += J[a, i] * r[a]
+    _substitute(_factor(J, size, damping, 0.0), x)
+    return x
+
+
+@njit(cache=True)
+def _dot(a, b):  # pragma: no cover  (compiled)
+    total = 0.0
+    for i in range(a.size):
+        total += a[i] * b[i]
+    return total
 
 
 @njit(cache=True)
 def _coordinates(problem, u, bound):  # pragma: no cover  (compiled)
-    """(d, k) what the coordinates of a direction do to it."""
-    if bound:
-        return _tangent(u, problem.span)
-    # Microphones a little off their plane hear the component off it too.
-    v = problem.span @ u
-    off = max(math.sqrt(max(1.0 - v @ v, 0.0)), _LEAST_COSINE)
-    return problem.span.T - np.outer(problem.side, v) / off
+    """(d, k) what the coordinates of a direction do to it, and k.
+
+    Where it is bound to unit length within the span, they are those across it,
+    else its components in the span.
+    """
+    span = problem.span
+    rank, dim = span.shape
+    basis = np.zeros((dim, 3))
+    if not bound:
+        # Microphones a little off their plane hear the component off it too.
+        off = 1.0
+        for j in range(rank):
+            off -= _dot(span[j], u) ** 2
+        off = max(math.sqrt(max(off, 0.0)), _LEAST_COSINE)
+        for j in range(rank):
+            v = _dot(span[j], u)
+            for i in range(dim):
+                basis[i, j] = span[j, i] - problem.side[i] * v / off
+        return basis, rank
+    if rank == 2:
+        a, b = _dot(span[0], u), _dot(span[1], u)
+        for i in range(dim):
+            basis[i, 0] = a * span[1, i] - b * span[0, i]
+    if rank == 3:
+        least = 0
+        for i in range(1, 3):
+            if abs(u[i]) < abs(u[least]):
+                least = i
+        size = math.sqrt(1.0 - u[least] ** 2)
+        for i in range(3):
+            basis[i, 0] = ((1.0 if i == least else 0.0) - u[least] * u[i]) / size
+        for i in range(3):
+            j, m = (i + 1) % 3, (i + 2) % 3
+            basis[i, 1] = u[j] * basis[m, 0] - u[m] * basis[j, 0]
+    return basis, rank - 1
 
 
 @njit(cache=True)
-def _lifted(v, span, side):  # pragma: no cover  (compiled)
+def _lifted(problem, v):  # pragma: no cover  (compiled)
     """Direction with components v in the span, completed to the side."""
-    u = v @ span
-    return u + math.sqrt(max(0.0, 1.0 - v @ v)) * side
+    off = math.sqrt(max(0.0, 1.0 - _dot(v, v)))
+    u = np.empty(problem.side.size)
+    for i in range(u.size):
+        u[i] = off * problem.side[i]
+        for j in range(v.size):
+            u[i] += v[j] * problem.span[j, i]
+    return u
+
+
+@njit(cache=True)
+def _within(problem, u):  # pragma: no cover  (compiled)
+    """Components of a direction in the span."""
+    v = np.empty(problem.span.shape[0])
+    for j in range(v.size):
+        v[j] = _dot(problem.span[j], u)
+    return v
 
 
 @njit(cache=True)
@@ -144,86 +228,156 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
     Returns:
         u, w and the sum of squares there.
     """
-    span = problem.span
-    basis = _coordinates(problem, u, bound)
-    r, J = _system(problem, basis, u, w)
-    cost, damping = r @ r, 0.0
+    m = problem.d.size
+    basis, k = _coordinates(problem, u, bound)
+    size = k if far else k + 1
+    r, J = np.empty(m), np.empty((m, k + 1))
+    r_next, J_next = np.empty(m), np.empty((m, k + 1))
+    cost = _whitened(problem, basis, k, u, w, r, J)
+    damping = 0.0
     for _ in range(_STEPS):
-        k = basis.shape[1]
-        size = k if far else k + 1
         if size == 0:
             break
-        step = np.zeros(k + 1)
-        step[:size] = _solve_least_squares(
-            np.ascontiguousarray(J[:, :size]), r, damping
-        )
+        step = _least_squares(J, r, size, damping)
+        w_next = w if far else w + step[k]
         if bound:
-            u_next = u + basis @ step[:k]
-            u_next /= np.sqrt(u_next @ u_next)
+            u_next = u.copy()
+            for i in range(u.size):
+                for j in range(k):
+                    u_next[i] += basis[i, j] * step[j]
+            u_next /= math.sqrt(_dot(u_next, u_next))
         else:
-            u_next = _lifted(span @ u + step[:k], span, problem.side)
-        basis_next = _coordinates(problem, u_next, bound)
-        r_next, J_next = _system(problem, basis_next, u_next, w + step[k])
-        cost_next = r_next @ r_next
+            v = _within(problem, u)
+            for j in range(k):
+                v[j] += step[j]
+            u_next = _lifted(problem, v)
+        basis_next, _ = _coordinates(problem, u_next, bound)
+        cost_next = _whitened(problem, basis_next, k, u_next, w_next, r_next, J_next)
         if cost_next <= cost:
-            u, w, basis, r, J = u_next, w + step[k], basis_next, r_next, J_next
-            cost = cost_next
+            u, w, basis, cost = u_next, w_next, basis_next, cost_next
+            r, r_next = r_next, r
+            J, J_next = J_next, J
             damping *= 0.1
         else:
             damping = max(10.0 * damping, 1e-3)
-        if np.abs(step).max() < _SETTLED:
+        largest = 0.0
+        for j in range(size):
+            largest = max(largest, abs(step[j]))
+        if largest < _SETTLED:
             break
     return u, w, cost
 
 
 @njit(cache=True)
-def _starts(problem, bound):  # pragma: no cover  (compiled)
-    """Directions (s, d) and inverse ranges (s,) to start from; far away first."""
+def _descend_within(problem, u, w, far):  # pragma: no cover  (compiled)
+    """``_descend`` to a place that exists: w >= 0 and |u| = 1."""
+    bound = _is_bound(problem)
+    cost = 0.0
+    for _ in range(4):
+        u, w, cost = _descend(problem, u, w, bound, far)
+        length = math.sqrt(_dot(u, u))
+        if w < 0.0:
+            w, far = 0.0, w < 0.0  # a literal True would be compiled anew
+        elif length > 1.0 and not bound:
+            # More than the array is long: in its line or plane.
+            u, bound = u / length, length > 1.0  # likewise
+        else:
+            break
+    return u, w, cost
+
+
+@njit(cache=True)
+def _is_bound(problem):  # pragma: no cover  (compiled)
+    """Whether the array has no side: all of a direction lies in its span."""
+    return _dot(problem.side, problem.side) == 0.0
+
+
+@njit(cache=True)
+def _starts(problem):  # pragma: no cover  (compiled)
+    """Components (s, r) and inverse ranges (s,) seen from microphone 0.
+
+    The first start is far away. The number of starts is returned too.
+    """
     d, root, p, span = problem.d, problem.root, problem.p, problem.span
-    n, dim = p.shape
-    r = span.shape[0]
-    q = p[1:] - p[0]
-    half = 0.5 * ((q * q).sum(axis=1) - d * d)
-    A = np.empty((n - 1, r + 1))
-    A[:, :r] = q @ span.T
-    A[:, r] = -half
-    A = root @ A
-    directions = np.zeros((3, dim))
-    inverse = np.zeros(3)
-    inner = np.ascontiguousarray(A[:, :r])
-    v_far = _solve_least_squares(inner, root @ -d, 0.0)
-    directions[0] = v_far @ span
+    m, rank = d.size, span.shape[0]
+    A, far, half = np.zeros((m, rank + 1)), np.zeros(m), np.zeros(m)
+    for a in range(m):
+        for b in range(a + 1):
+            for i in range(p.shape[1]):
+                q = p[b + 1, i] - p[0, i]
+                for j in range(rank):
+                    A[a, j] += root[a, b] * q * span[j, i]
+                half[a] += root[a, b] * 0.5 * q * q
+            far[a] -= root[a, b] * d[b]
+            half[a] -= root[a, b] * 0.5 * d[b] * d[b]
+        A[a, rank] = -half[a]
+    components, inverse = np.zeros((3, rank)), np.zeros(3)
+    v_far = _least_squares(A, far, rank, 0.0)
+    for j in range(rank):
+        components[0, j] = v_far[j]
     count = 1
-    if bound:
+    if _is_bound(problem):
         # Direction as a function of w, of length 1: a quadratic in w.
-        v_w = _solve_least_squares(inner, root @ half, 0.0)
-        a, b, c = v_w @ v_w, v_far @ v_w, v_far @ v_far - 1.0
+        v_w = _least_squares(A, half, rank, 0.0)
+        a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0
         reach = math.sqrt(max(0.0, b * b - a * c))
         for sign in (1.0, -1.0):
             w = (-b + sign * reach) / max(a, 1e-300)
             if w > 0.0:
-                directions[count] = (v_far + w * v_w) @ span
+                for j in range(rank):
+                    components[count, j] = v_far[j] + w * v_w[j]
                 inverse[count] = w
                 count += 1
-    elif n - 1 >= r + 1:
-        solution = _solve_least_squares(A, root @ -d, 0.0)
-        if solution[r] > 0.0:
-            directions[1] = solution[:r] @ span
-            inverse[1] = solution[r]
+    elif m >= rank + 1:
+        solution = _least_squares(A, far, rank + 1, 0.0)
+        if solution[rank] > 0.0:
+            for j in range(rank):
+                components[1, j] = solution[j]
+            inverse[1] = solution[rank]
             count = 2
-    return directions, inverse, count
+    return components, inverse, count
 
 
 @njit(cache=True)
-def _from_centroid(v, w, p_0, span, side):  # pragma: no cover  (compiled)
+def _from_centroid(problem, v, w):  # pragma: no cover  (compiled)
     """Direction and inverse range, given from microphone 0, from the centroid."""
-    inside = span @ v
-    u = _lifted(inside, span, side)
+    length = math.sqrt(_dot(v, v))
+    if length > 1.0 or (_is_bound(problem) and length > 0.0):
+        v = v / length
+    if length == 0.0 and _is_bound(problem):
+        v[0] = 1.0  # nothing points to a source amid the microphones
+    u = _lifted(problem, v)
     if w <= 0.0:
         return u, 0.0
-    x = p_0 + u / w
-    distance = max(np.sqrt(x @ x), 1e-12)
-    return x / distance, 1.0 / distance
+    for i in range(u.size):
+        u[i] = problem.p[0, i] + u[i] / w
+    distance = max(math.sqrt(_dot(u, u)), 1e-12)
+    return u / distance, 1.0 / distance
+
+
+@njit(cache=True)
+def _search(problem):  # pragma: no cover  (compiled)
+    """The two best places: u (2, d), w (2,) and chi-square (2,)."""
+    n, dim = problem.p.shape
+    unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
+    far = n - 1 < unknowns
+    components, inverse, count = _starts(problem)
+    us, ws, costs = np.zeros((2, dim)), np.zeros(2), np.array([np.inf, np.inf])
+    for s in range(count - 1, -1, -1):
+        if s == 0 and costs[0] < n + 25.0:
+            break  # a start from far away would end there as well
+        u, w = _from_centroid(problem, components[s].copy(), inverse[s])
+        u, w, cost = _descend_within(problem, u, w, far)
+        place = 0 if cost < costs[0] else 1
+        if place == 1 and not cost < costs[1]:
+            continue
+        for i in range(dim):
+            us[1, i] = us[0, i] if place == 0 else us[1, i]
+            us[place, i] = u[i]
+        if place == 0:
+            ws[1], costs[1] = ws[0], costs[0]
+        ws[place], costs[place] = w, cost
+    return us, ws, costs
 
 
 @njit(cache=True)
@@ -237,69 +391,46 @@ def _covariance(problem, u, w, prior):  # pragma: no cover  (compiled)
         prior: What is known of w beforehand: 1 over its variance.
 
     Returns:
-        (k + 1, k + 1) covariance of the coordinates of u and of w, and (d, k)
-        slopes of u by its coordinates.
+        (k + 1, k + 1) covariance of the coordinates of u and of w, (d, k)
+        slopes of u by its coordinates, and k.
     """
-    side = problem.side
-    ambiguous = side.any()
-    span = problem.span
-    basis = _coordinates(problem, u, bound=not ambiguous)
-    _, J = _system(problem, basis, u, w)
-    A = J.T @ J
-    k = basis.shape[1]
-    A[k, k] += prior
-    floor = 1e-14 * np.trace(A) + 1e-300
+    bound = _is_bound(problem)
+    basis, k = _coordinates(problem, u, bound)
+    r, J = np.empty(problem.d.size), np.empty((problem.d.size, k + 1))
+    _whitened(problem, basis, k, u, w, r, J)
+    L = _factor(J, k + 1, 0.0, prior)
+    C = np.zeros((k + 1, k + 1))
     for i in range(k + 1):
-        A[i, i] += floor
-    C = np.linalg.inv(A)
-    if ambiguous:
-        v = span @ u
+        C[i, i] = 1.0
+        _substitute(L, C[i])
+    if not bound:
+        v = _within(problem, u)
         # Near the line or plane the component off it is the root of a small
         # difference: its error stays below the root of that difference's.
-        inside = np.ascontiguousarray(C[:k, :k])
-        size = math.sqrt(max(v @ (inside @ v), 0.0))
-        off = max(math.sqrt(max(1.0 - v @ v, 0.0)), math.sqrt(size), 1e-6)
-        basis = span.T - np.outer(side, v) / off
-    return C, basis
+        size = 0.0
+        for i in range(k):
+            for j in range(k):
+                size += v[i] * C[i, j] * v[j]
+        off = max(1.0 - _dot(v, v), math.sqrt(max(size, 0.0)), 1e-12)
+        for i in range(u.size):
+            for j in range(k):
+                basis[i, j] = problem.span[j, i] - (
+                    problem.side[i] * v[j] / math.sqrt(off)
+                )
+    return C, basis, k
 
 
 @njit(cache=True)
-def _descend_within(problem, u, w, far):  # pragma: no cover  (compiled)
-    """``_descend`` to a place that exists: w >= 0 and |u| = 1."""
-    bound = not problem.side.any()
-    u, w, cost = _descend(problem, u, w, bound, far)
-    if w < 0.0:
-        u, w, cost = _descend(problem, u, 0.0, bound, far=True)
-    length = np.sqrt(u @ u)
-    if length > 1.0 and not bound:
-        # More than the array is long: in its line or plane.
-        u, w, cost = _descend(problem, u / length, w, bound=True, far=far)
-        if w < 0.0:
-            u, w, cost = _descend(problem, u, 0.0, bound=True, far=True)
-    return u, w, cost
-
-
-@njit(cache=True)
-def _search(problem):  # pragma: no cover  (compiled)
-    """Places that fit: u (s, d), w and chi-square (s,), the best one first."""
-    p, span, side = problem.p, problem.span, problem.side
-    bound = not side.any()
-    far = p.shape[0] < span.shape[0] + (1 if bound else 2)
-    directions, inverse, count = _starts(problem, bound)
-    us, ws = np.zeros((3, p.shape[1])), np.zeros(3)
-    costs = np.full(3, np.inf)
-    for s in range(count - 1, -1, -1):
-        if s == 0 and costs.min() < p.shape[0] + 25.0:
-            break  # a start from far away would end there as well
-        v = directions[s]
-        length = np.sqrt(v @ v)
-        if length > 1.0 or bound:
-            # Nothing at all points to a source amid the microphones.
-            v = v / length if length > 0.0 else span[0]
-        u, w = _from_centroid(v, inverse[s], p[0], span, side)
-        us[s], ws[s], costs[s] = _descend_within(problem, u, w, far)
-    order = np.argsort(costs)
-    return us[order], ws[order], costs[order]
+def _carried(T, C, size):  # pragma: no cover  (compiled)
+    """T C T^T over the first columns of T."""
+    dim = T.shape[0]
+    out = np.zeros((dim, dim))
+    for i in range(dim):
+        for j in range(dim):
+            for a in range(size):
+                for b in range(size):
+                    out[i, j] += T[i, a] * C[a, b] * T[j, b]
+    return out
 
 
 @njit(cache=True)
@@ -316,25 +447,29 @@ def fit_delays(problem, prior_w):  # pragma: no cover  (compiled)
         u and of the position, chi-square, and the twin's place (0: none).
     """
     us, ws, costs = _search(problem)
-    bound = not problem.side.any()
     n, dim = problem.p.shape
-    k = problem.span.shape[0] - (1 if bound else 0)
     main, twin = 0, np.zeros(dim)
     if costs[1] < costs[0] + _SAME_CHI_SQUARE and min(ws[0], ws[1]) > 0.0:
-        apart = np.abs(us[0] - us[1]).max()
-        if apart > 1e-6 or abs(ws[0] - ws[1]) > 1e-6 * ws[0]:
+        apart = abs(ws[0] - ws[1]) / ws[0]
+        for i in range(dim):
+            apart = max(apart, abs(us[0, i] - us[1, i]))
+        if apart > 1e-6:
             main = 0 if ws[0] < ws[1] else 1
-            twin = us[1 - main] / ws[1 - main]
-    u, w, cost = us[main], ws[main], costs[main]
-    if w > 0.0 and n - 1 >= k + 1:
-        C, by = _covariance(problem, u, w, 0.0)
-        if C[k, k] < w * w:
-            to_p = np.empty((dim, k + 1))
-            to_p[:, :k] = by / w
-            to_p[:, k] = -u / (w * w)
-            inside = np.ascontiguousarray(C[:k, :k])
-            return u, w, C[k, k], by @ inside @ by.T, to_p @ C @ to_p.T, cost, twin
-    u, _, cost_far = _descend_within(problem, u, 0.0, far=True)
-    C, by = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
-    of_u = by @ np.ascontiguousarray(C[:k, :k]) @ by.T
+            for i in range(dim):
+                twin[i] = us[1 - main, i] / ws[1 - main]
+    u, w, cost = us[main].copy(), ws[main], costs[main]
+    if w > 0.0:
+        C, by, k = _covariance(problem, u, w, 0.0)
+        if C[k, k] < w * w and n - 1 >= k + 1:
+            of_u = _carried(by, C, k)
+            to_p = np.empty((dim, 4))
+            for i in range(dim):
+                for j in range(k):
+                    to_p[i, j] = by[i, j] / w
+                to_p[i, k] = -u[i] / (w * w)
+            return u, w, C[k, k], of_u, _carried(to_p, C, k + 1), cost, twin
+    far = n > 0  # a literal True would be compiled anew
+    u, _, cost_far = _descend_within(problem, u, 0.0, far)
+    C, by, k = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
+    of_u = _carried(by, C, k)
     return u, 0.0, np.inf, of_u, of_u, min(cost, cost_far), twin
