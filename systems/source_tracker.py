@@ -340,11 +340,11 @@ def SourceTracker_(T):
         def _track(self, context):
             """The track with the present estimate folded in."""
             track = Track.unpack(context.get_discrete_state(0).CopyToVector())
-            if self._detected.Eval(context)[0] > 0.5:  # noqa: PLR2004
+            if self._detected.Eval(context)[0] > 0.5:
                 estimate = Estimate(
                     self._p_PS_B.Eval(context).tolist(),
                     self._covariance.Eval(context).tolist(),
-                    bool(self._range_valid.Eval(context)[0] > 0.5),  # noqa: PLR2004
+                    bool(self._range_valid.Eval(context)[0] > 0.5),
                 )
                 track = self._model.hear(track, estimate, self._pose.Eval(context))
             return track

@@ -333,7 +333,7 @@ def warm_memory(tracker, robot):
     rng = np.random.default_rng(5)
     for k in range(12):
         pose = [0.05 + 0.004 * k, 0.1 + 0.008 * k, 0.25 + 0.01 * k]
-        x, y = [1.7, 0.6] + rng.normal(0.0, 0.01, 2) if k != 11 else (3.4, 0.6)  # noqa: PLR2004
+        x, y = [1.7, 0.6] + rng.normal(0.0, 0.01, 2) if k != 11 else (3.4, 0.6)
         estimate = Estimate([x, y], [1e-4, 2e-5, 2e-5, 2e-4], ranged=True)
         track = model.older(model.hear(track, estimate, pose), pose)
     return model.older(track, pose).pack()
