@@ -25,8 +25,8 @@ from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S
 from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.source_fix import SourceFix
-from systems.source_tracker import Estimate, Track, TrackerModel
 from systems.tdoa_estimator import port_values, robot_localiser
+from systems.tracker_model import Estimate, Track, TrackerModel
 from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
 from systems.waveforms import make_waveform
 from systems.wheel_odometry import advance_pose, encoder_angle

@@ -28,8 +28,8 @@ from systems.paths import WaypointPath
 from systems.robot import RobotParameters
 from systems.room import RoomParameters
 from systems.source_robot import SourceRobotParameters
-from systems.source_tracker import TrackerParameters
 from systems.tdoa_estimator import TDOAParameters
+from systems.tracker_model import TrackerParameters
 from systems.ultrasonic_array import UltrasonicParameters
 from systems.waveforms import SoundParameters
 from systems.wheel_odometry import OdometryParameters

@@ -31,7 +31,7 @@ Layouts (m, s, in W):
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit

@@ -31,6 +31,19 @@ def test_a_source_beside_or_behind_the_start_is_reached(bearing_deg):
     assert np.max(result.columns["source_range_true"]) < 2.5 + 2.0
 
 
+@pytest.mark.parametrize("bearing_deg", [-120, 150, 180])
+def test_motion_tells_within_two_bursts(bearing_deg):
+    """At the end of the second one, or where it was reached before, the target
+    is the source."""
+    result = run(resting_source(bearing_deg), "duration_s=2.6")
+    columns = result.columns
+    error = np.hypot(
+        columns["p_WS_estimated_x"] - columns["p_WS_x"],
+        columns["p_WS_estimated_y"] - columns["p_WS_y"],
+    )
+    assert error[-1] < 0.1
+
+
 def test_default_follow_distance_does_not_run_away():
     """The source rests after 3 m; the robot overshoots nothing for a minute."""
     result = run("source.waypoints_m=[[1.6, 0], [4.6, 0]]", "duration_s=60")

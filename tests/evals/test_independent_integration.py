@@ -38,6 +38,7 @@ def scenario(law: str) -> Scenario:
             "obstacle_sensing": "ideal",
             "duration_s": DURATION,
             "odometry": {"rounding": False},
+            "tracker": {"hold": "world"},
             "integrator": {"scheme": "runge_kutta5", "step_s": 0.005},
             "source": {"waypoints_m": [SOURCE_START.tolist(), [9.0, 0.3]]},
             "obstacles": [

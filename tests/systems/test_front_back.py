@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 import pytest
@@ -56,7 +57,7 @@ def heard_ahead(source, pose, rng=None, *, ranged: bool = True):
     return np.array([*d, R[0, 0], R[0, 1], R[1, 1], *centre, *ahead, float(ranged)])
 
 
-def listen(frames: Iterable, memory=None, **kwargs):
+def listen(frames: Iterable[Any], memory=None, **kwargs):
     """Memory after (source, pose) or None for silence, one a tick."""
     memory = blank_memory(2) if memory is None else memory
     for frame in frames:

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
 
 from systems.robot import RobotParameters
-from systems.source_tracker import (
+from systems.source_tracker import SourceTracker
+from systems.tracker_model import (
     Estimate,
-    SourceTracker,
     Track,
     TrackerModel,
     TrackerParameters,
@@ -247,7 +247,7 @@ def test_exact_estimates_have_the_derivative_of_the_target(bench):
     at = moving_source(bench, "world")
     state = at.context.get_discrete_state(0).CopyToVector()
     block = at.block.ToAutoDiffXd()
-    x = [AutoDiffXd(2.0, [1.0, 0.0]), AutoDiffXd(0.31, [0.0, 1.0])]
+    x = [AutoDiffXd(2.0, 2, 0), AutoDiffXd(0.31, 2, 1)]
     signals = HEARD | {"p_PS_B": x, "covariance": [0.0] * 4}
     dual = bench(block, state=state, pose_WB_estimated=[0.0, 0.0, 0.0], **signals)
     gradient = ExtractGradient(dual.output("p_WS_estimated").reshape(-1, 1))
@@ -333,7 +333,7 @@ def warm_memory(tracker, robot):
     rng = np.random.default_rng(5)
     for k in range(12):
         pose = [0.05 + 0.004 * k, 0.1 + 0.008 * k, 0.25 + 0.01 * k]
-        x, y = [1.7, 0.6] + rng.normal(0.0, 0.01, 2) if k != 11 else (3.4, 0.6)
+        x, y = rng.normal([1.7, 0.6], 0.01) if k != 11 else (3.4, 0.6)
         estimate = Estimate([x, y], [1e-4, 2e-5, 2e-5, 2e-4], ranged=True)
         track = model.older(model.hear(track, estimate, pose), pose)
     return model.older(track, pose).pack()

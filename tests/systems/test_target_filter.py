@@ -301,3 +301,27 @@ def test_the_gate_widens_with_silence():
         memory += silence * ages(len(memory) // HYPOTHESIS)
         z = sighting([2.5, 0.0], 2.5e-5 * np.eye(2))
         assert fold(memory, z, SETTINGS) == believed
+
+
+@pytest.mark.parametrize(("true_std", "stated_std"), [(0.08, 0.02), (0.02, 0.02)])
+def test_scatter_is_learnt_where_it_exceeds_what_is_stated(true_std, stated_std):
+    """A resting source: 5 s of frames that err by more than they say, or not.
+
+    The factor finds 16 / 1.5, what is beyond the margin; honest frames leave it
+    at 1. Either way the normalised error stays in proportion.
+    """
+    rng = np.random.default_rng(6)
+    factors, errors = [], []
+    for _ in range(20):
+        memory = blank_memory(1)
+        for _ in range(200):
+            z = rng.normal([2.0, 0.0], true_std)
+            fold(memory, sighting(z, stated_std**2 * np.eye(2)), SETTINGS)
+            memory += T * ages(1)
+        x, P = matrices(chosen_track(memory))
+        factors.append(chosen_track(memory)[15])
+        e = x[:2] - [2.0, 0.0]
+        errors.append(e @ np.linalg.solve(P[:2, :2], e))
+    expected = max(1.0, (true_std / stated_std) ** 2 / 1.5)
+    assert np.median(factors) == pytest.approx(expected, rel=0.3)
+    assert np.mean(errors) < chi2.ppf(0.999, 40) / 20

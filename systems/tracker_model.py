@@ -1,0 +1,218 @@
+"""The target from burst to burst: estimates into W, and what is held between."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field
+
+from systems.array_shape import ArrayShape
+from systems.geometry import control_point, rotate
+from systems.parameters import NonNegative, Parameters, Positive
+from systems.robot import RobotParameters
+from systems.signals import FRAME_PERIOD_S
+from systems.target_filter import (
+    NEVER_HEARD_S,
+    FilterSettings,
+    ages,
+    blank_memory,
+    chosen_track,
+    fold,
+    predicted,
+)
+
+__all__ = [
+    "Estimate",
+    "Track",
+    "TrackerModel",
+    "TrackerParameters",
+    "past_pose",
+]
+
+
+class TrackerParameters(Parameters):
+    """How the target is tracked."""
+
+    hold: Literal["world", "robot", "motion"] = "motion"
+    """Between bursts the target rests in W, moves with the robot, or goes on
+    with its own velocity, which fades."""
+    maximum_age_s: Positive = 6.0
+    """An older target is lost: three periods of the sound, s."""
+    assumed_range_m: Positive = 3.0
+    """Range of the first target when only its bearing is known, m."""
+    resolve_front_back: bool = True
+    """Let the robot's motion tell the source from its mirror image behind a row
+    of microphones; off: every source is in front."""
+    source_top_speed_m_s: Positive = 0.7
+    """Speed of a fast source, m/s: two standard deviations of each component of
+    a velocity that is not known."""
+    velocity_fade_s: Positive = 5.0
+    """Time constant with which a source's velocity is forgotten, s."""
+    measurement_floor_m: NonNegative = 0.01
+    """Standard deviation of what the covariance of an estimate leaves out, m."""
+    gate_floor_m: Positive = 0.2
+    """Standard deviation that the gate allows for besides the covariances, m."""
+    believed_outliers: int = Field(default=3, ge=1)
+    """The outlier of this number in a row is believed, if they agree."""
+
+
+class Estimate(NamedTuple):
+    """What a hearing block says; floats or AutoDiffXd."""
+
+    p_PS_B: list[Any]
+    """Source from P, m; a unit vector where only the bearing is known."""
+    covariance: list[Any]
+    """Of p_PS_B, row by row, m^2."""
+    ranged: bool
+    """Whether the range is known."""
+
+
+class Track(NamedTuple):
+    """The tracker's memory; floats or AutoDiffXd."""
+
+    pose_1: Any
+    """Odometry pose one tick ago."""
+    pose_2: Any
+    """Odometry pose two ticks ago."""
+    pose_heard: Any
+    """Odometry pose of the moment of the last estimate."""
+    memory: NDArray[Any]
+    """The filter's, see ``systems.target_filter``."""
+
+    @classmethod
+    def unpack(cls, state: NDArray[Any]) -> Track:
+        """From the discrete state's vector, of which these are views."""
+        return cls(state[0:3], state[3:6], state[6:9], state[9:])
+
+    def pack(self) -> NDArray[Any]:
+        """To the discrete state's vector."""
+        return np.concatenate(self)
+
+    @property
+    def age(self) -> Any:
+        """Since the measurement behind the target, s."""
+        return chosen_track(self.memory)[0]
+
+
+def past_pose(pose_now, pose_1, pose_2, age):
+    """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line."""
+    ticks = age / FRAME_PERIOD_S
+    newer, older, part = (
+        (pose_now, pose_1, ticks) if ticks <= 1.0 else (pose_1, pose_2, ticks - 1.0)
+    )
+    return [a + part * (b - a) for a, b in zip(newer, older, strict=True)]
+
+
+class TrackerModel:
+    """The tracker's arithmetic for one robot and one kind of hearing.
+
+    Args:
+        tracker: Parameters.
+        robot: Place of P, and microphones.
+        measurement_age_s: From the moment an estimate is valid for to its
+            arrival, s.
+    """
+
+    def __init__(
+        self,
+        tracker: TrackerParameters,
+        robot: RobotParameters,
+        measurement_age_s: float,
+    ) -> None:
+        self._hold = tracker.hold
+        self._control_point_m = robot.control_point_m
+        self._centre_P = np.mean(robot.microphones_m, axis=0).tolist()
+        ahead = ArrayShape.of(robot.microphones_m).ahead
+        both = tracker.resolve_front_back and ahead is not None
+        self._hypotheses = 2 if both else 1
+        # Where there is no row its normal does not count.
+        self._ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
+        self._tick = FRAME_PERIOD_S * ages(self._hypotheses)
+        self._settings = FilterSettings(
+            speed_std=tracker.source_top_speed_m_s / 2.0,
+            velocity_fade=tracker.velocity_fade_s,
+            floor=tracker.measurement_floor_m,
+            gate_floor=tracker.gate_floor_m,
+            believed_outliers=tracker.believed_outliers,
+            assumed_range=tracker.assumed_range_m,
+            measurement_age=measurement_age_s,
+        )
+
+    def start(self, pose: Any) -> Track:
+        """Nothing heard yet; before time zero the robot was where it starts."""
+        return Track(pose, pose, pose, blank_memory(self._hypotheses))
+
+    def hear(self, track: Track, estimate: Estimate, pose: Any) -> Track:
+        """The track with an estimate folded in that arrives at ``pose``."""
+        age = self._settings.measurement_age
+        then = past_pose(pose, track.pose_1, track.pose_2, age)
+        sighting = self._sighting(estimate, then)
+        memory = track.memory.copy()
+        function = fold.py_func if memory.dtype == object else fold
+        believed = function(memory, sighting, self._settings)
+        heard = np.array(then) if believed else track.pose_heard
+        return track._replace(pose_heard=heard, memory=memory)
+
+    def older(self, track: Track, pose: Any) -> Track:
+        """The track a tick later, when ``pose`` has become the last one."""
+        memory = track.memory + self._tick
+        return Track(pose, track.pose_1, track.pose_heard, memory)
+
+    def position(self, track: Track, pose: Any) -> Any:
+        """The target in W for a robot at ``pose``, (2,) m."""
+        if self._hold == "motion":
+            return self._expected(track)[1:3]
+        held = chosen_track(track.memory)[1:3]
+        if self._hold == "world":
+            return held
+        x_B, y_B, theta = track.pose_heard
+        dx, dy = rotate(pose[2] - theta, held[0] - x_B, held[1] - y_B)
+        return [pose[0] + dx, pose[1] + dy]
+
+    def velocity(self, track: Track) -> Any:
+        """Expected velocity of the source in W, (2,) m/s."""
+        return self._expected(track)[3:5]
+
+    def covariance(self, track: Track, pose: Any) -> Any:
+        """Of the target in W, row by row, (4,) m^2.
+
+        A target that is held elsewhere than the source is expected is off by
+        that distance.
+        """
+        held = self.position(track, pose)
+        _, x, y, _, _, xx, xy, yy = self._expected(track)[:8]
+        dx, dy = held[0] - x, held[1] - y
+        mixed = xy + dx * dy
+        return [xx + dx * dx, mixed, mixed, yy + dy * dy]
+
+    def _expected(self, track: Track) -> Any:
+        """The track as it is expected to be now."""
+        last = chosen_track(track.memory)
+        if last[0] >= NEVER_HEARD_S:
+            return last
+        function = predicted.py_func if last.dtype == object else predicted
+        return function(last, last[0], self._settings)
+
+    def _sighting(self, estimate: Estimate, pose: Any) -> NDArray[Any]:
+        """An estimate in W, see ``systems.target_filter``."""
+        x_P, y_P = control_point(pose, self._control_point_m)
+        dx, dy = rotate(pose[2], *self._centre_P)
+        ahead = rotate(pose[2], *self._ahead_B)
+        x, y = rotate(pose[2], *estimate.p_PS_B)
+        if estimate.ranged:
+            x, y = x_P + x, y_P + y
+        covariance = _covariance_in_world(estimate.covariance, pose[2])
+        centre = x_P + dx, y_P + dy
+        ranged = float(estimate.ranged)
+        return np.array([x, y, *covariance, *centre, *ahead, ranged])
+
+
+def _covariance_in_world(covariance, theta):
+    """xx, xy and yy of R C R^T for a covariance given row by row."""
+    a = rotate(theta, covariance[0], covariance[2])
+    b = rotate(theta, covariance[1], covariance[3])
+    xx, xy = rotate(theta, a[0], b[0])
+    _, yy = rotate(theta, a[1], b[1])
+    return xx, xy, yy
