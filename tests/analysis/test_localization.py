@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -165,16 +166,20 @@ def test_tables_hold_the_numbers(summary, cells):
 def test_picture_states_its_exaggeration(cells):
     left, right = plot_localization(cells).axes
     assert left.get_aspect() == right.get_aspect() == 1.0
-    # True ellipses of a 2 m range are a few millimetres: drawn a hundredfold.
-    factors = [text.get_text() for text in right.texts]
-    assert [text.startswith("along x") for text in factors] == [True, True]
+    factors = [numbers(text.get_text()) for text in right.texts]
+    assert len(factors) == 2
+    # Half axes of two standard deviations: areas go with the determinant.
+    along, across = factors[-1]
     ellipse = right.patches[-1]
     assert isinstance(ellipse, Ellipse)
-    bound = cells[-1].heard.bound
-    along = float(factors[1].split("x")[1].split("\n")[0])
-    assert max(ellipse.width, ellipse.height) == pytest.approx(
-        4.0 * along * bound.range_std, rel=0.2
+    covariance = cells[-1].heard.bound.covariance
+    assert ellipse.width * ellipse.height == pytest.approx(
+        16.0 * along * across * math.sqrt(np.linalg.det(covariance))
     )
+
+
+def numbers(text: str) -> list[float]:
+    return [float(word) for word in re.findall(r"x([\d.]+)", text)]
 
 
 @pytest.mark.parametrize("trials", [-1, 0, 1, 10**7])
