@@ -24,6 +24,9 @@ def agrees_with(order):
     return agreement
 
 
+AS_GIVEN = agrees_with([0, 1, 2])
+
+
 @pytest.mark.parametrize("kind", ["nan", "dead"])
 def test_nothing_to_locate_with(kind):
     with pytest.raises(ValueError, match=rf"a.wav: {kind} \(1,\)"):
@@ -35,7 +38,7 @@ def test_nothing_to_locate_with(kind):
 def test_inverted_channel_is_turned_back_and_said():
     turned = SAMPLES * [[1.0], [1.0], [-1.0]]
     samples, faults = channels_without_faults(
-        turned, [fault("inverted", 2), fault("clipped", 0)], agrees_with([0, 1, 2]), ""
+        turned, [fault("inverted", 2), fault("clipped", 0)], AS_GIVEN, ""
     )
     np.testing.assert_array_equal(samples, SAMPLES)
     assert [f.kind for f in faults] == ["inverted", "clipped"]
