@@ -282,7 +282,7 @@ def _locate(options: argparse.Namespace) -> None:
             document["out"] = str(out)
             write_locate(result, document, directory)
     for fault in result.faults:
-        print(f"phonotaxis: {fault}", file=sys.stderr)
+        print(f"phonotaxis: {fault.message}", file=sys.stderr)
     if options.json:
         print(json.dumps(document, allow_nan=False))
         return

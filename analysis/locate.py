@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 
 from analysis.array_geometry import ArrayGeometry, load_geometry
 from analysis.locate_result import LocateResult, SourceEstimate
+from analysis.recording_faults import channels_without_faults
 from analysis.recording_search import RecordingSearch
 from analysis.recording_spectra import RecordingSpectra
 from analysis.source_placement import place_source
 from systems.array_shape import ArrayShape
+from systems.channel_faults import ChannelFault, find_channel_faults
 from systems.sound_file import read_sound
 
 __all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
@@ -53,17 +55,8 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     where = f"recording: {str(path)!r}"
     _check_recording(samples, rate, geometry, where)
     shape = ArrayShape.of(geometry.microphones)
-    low, high = geometry.band or (
-        _BAND_HZ[0],
-        min(_BAND_HZ[1], _TOP_OF_RATE * rate),
-    )
-    recording = RecordingSpectra(
-        channels=_equalised(samples[list(geometry.columns)], geometry, where),
-        sample_rate_hz=float(rate),
-        low_hz=low,
-        high_hz=high,
-        travel_s=shape.max_delay(geometry.c),
-    )
+    channels = samples[list(geometry.columns)]
+    recording, faults = _recording(channels, rate, shape, geometry, where)
     if not recording.starts.size:
         raise ValueError(
             f"{where} has {samples.shape[1]} samples, less than one frame of "
@@ -76,11 +69,40 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "kind": shape.kind,
         "aperture_m": shape.aperture_m,
         "sound_speed_m_s": geometry.c,
-        "band_hz": [low, high],
+        "band_hz": [recording.low_hz, recording.high_hz],
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
-    return LocateResult(array, shape, estimates, len(search.stretches))
+    return LocateResult(array, shape, estimates, len(search.stretches), faults)
+
+
+def _recording(
+    channels: NDArray[np.float64],
+    rate: int,
+    shape: ArrayShape,
+    geometry: ArrayGeometry,
+    where: str,
+) -> tuple[RecordingSpectra, list[ChannelFault]]:
+    """The channels that were chosen, mended where they can be; and their faults."""
+    low, high = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
+
+    def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
+        channels = channels - channels.mean(axis=1, keepdims=True)
+        level = np.sqrt(np.mean(channels**2, axis=1, keepdims=True))
+        equal = np.ascontiguousarray(channels / level, dtype=np.float32)
+        return RecordingSpectra(
+            equal, float(rate), low, high, shape.max_delay(geometry.c)
+        )
+
+    def agreement(channels: NDArray[np.float64]) -> float:
+        search = RecordingSearch(spectra(channels), shape, geometry.c, _SNAPSHOTS[0])
+        return search.mean_response()
+
+    faults = find_channel_faults(
+        channels, shape, geometry.c, sample_rate_hz=float(rate), band_hz=geometry.band
+    )
+    channels, faults = channels_without_faults(channels, faults, agreement, where)
+    return spectra(channels), faults
 
 
 def _estimates(
@@ -98,21 +120,6 @@ def _estimates(
             return search, found
     assert best is not None
     return best
-
-
-def _equalised(
-    samples: NDArray[np.float64], geometry: ArrayGeometry, where: str
-) -> NDArray[np.float32]:
-    """Channels without their means and of equal power."""
-    samples = samples - samples.mean(axis=1, keepdims=True)
-    level = np.sqrt(np.mean(samples**2, axis=1, keepdims=True))
-    for column, value in zip(geometry.columns, level[:, 0], strict=True):
-        if value == 0.0:
-            raise ValueError(
-                f"{where} has a dead channel: {column} (from 0) is silent; mend the "
-                "microphone, or leave it out by 'channels' in the geometry file"
-            )
-    return np.ascontiguousarray(samples / level, dtype=np.float32)
 
 
 def _check_recording(

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.array_shape import ArrayShape
+from systems.channel_faults import ChannelFault
 from systems.source_fix import SourceFix
 
 __all__ = ["LocateResult", "SourceEstimate"]
@@ -76,8 +77,8 @@ class LocateResult:
     """In order of time."""
     frames: int
     """Stretches of the recording, of which each may have an estimate."""
-    faults: list[str] = field(default_factory=list)
-    """Channels that are not as they should be, in words."""
+    faults: list[ChannelFault] = field(default_factory=list)
+    """Channels that are not as they should be."""
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.
@@ -110,7 +111,7 @@ class LocateResult:
             "frames": self.frames,
             "frames_heard": len(self.estimates),
             "frames_of_main_source": len(main),
-            "faults": self.faults,
+            "faults": [asdict(fault) for fault in self.faults],
         }
 
     def _alternatives(

@@ -19,7 +19,7 @@ _COLUMNS = (
 def locate_text(result: LocateResult) -> str:
     """A summary, and a row for each estimate."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
-    faults = [f"channels: {fault}" for fault in result.faults]
+    faults = [fault.message for fault in result.faults]
     if not result.estimates:
         return "\n".join([f"{heard}: nothing to locate", *faults])
     lines = [heard, *_direction(result), _range(result), *faults, ""]

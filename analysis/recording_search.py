@@ -112,6 +112,15 @@ class RecordingSearch:
         cross = np.sinc(phase / (math.pi * self.c)) * share
         return self._responses(cross.astype(np.complex64))
 
+    def mean_response(self) -> float:
+        """Greatest response of a stretch, on average: how well all pairs agree."""
+        weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
+        best = [
+            float(self._stretch_response(s, w).max())
+            for s, w in zip(self.stretches, weights, strict=True)
+        ]
+        return float(np.average(best, weights=np.array(weights) + 1e-30))
+
     def sightings(self) -> Iterator[Sighting]:
         """Stretches with a source, in order of time."""
         held: deque[tuple[slice, float, NDArray[np.float32]]] = deque()

@@ -271,13 +271,43 @@ def test_sound_from_all_around_has_no_bearing(tmp_path):
     assert locate(tmp_path / "a.wav", array(places)).estimates == []
 
 
-def test_dead_channel_is_named(tmp_path):
-    path = record(tmp_path / "a.wav", ROBOT, polar(0.0, 1.0))
+def altered(path, change):
+    """The recording with its (samples, channels) changed."""
     samples, rate = soundfile.read(path)
-    samples[:, 1] = 0.0
-    soundfile.write(path, samples, rate)
-    with pytest.raises(ValueError, match="dead channel: 1"):
-        locate(path)
+    soundfile.write(path, change(samples), rate, subtype="PCM_24")
+    return path
+
+
+def test_dead_and_exchanged_channels_are_refused(tmp_path):
+    places = np.array(ARRAYS["unequal row"])
+    path = record(tmp_path / "a.wav", places, polar(60.0, 2.0))
+    with pytest.raises(ValueError, match=r"recording: .*channel 2: dead"):
+        locate(altered(path, lambda x: x * [1, 0, 1, 1]), array(places))
+    record(path, places, polar(60.0, 2.0))
+    with pytest.raises(ValueError, match="channels 2 and 3: exchanged"):
+        locate(altered(path, lambda x: x[:, [0, 2, 1, 3]]), array(places))
+
+
+def test_inverted_channel_is_mended_and_named(tmp_path):
+    places = np.array(ARRAYS["circle"])
+    path = record(tmp_path / "a.wav", places, polar(60.0, 2.0))
+    summary = locate(
+        altered(path, lambda x: x * [1, 1, -1, 1, 1, 1]), array(places)
+    ).summary()
+    assert summary["bearing_deg"] == pytest.approx(60.0, abs=0.3)
+    (fault,) = summary["faults"]
+    assert (fault["kind"], fault["channels"]) == ("inverted", (2,))
+    assert "channel 3" in fault["message"]
+
+
+def test_clipped_channel_is_named(tmp_path):
+    places = np.array(ARRAYS["circle"])
+    path = record(tmp_path / "a.wav", places, polar(60.0, 2.0))
+    limit = [1, 1, 1, 1, 1, 0.02]
+    result = locate(altered(path, lambda x: np.clip(x, -1, limit)), array(places))
+    assert [f.kind for f in result.faults] == ["clipped"]
+    assert "channel 6: clipped" in locate_text(result)
+    assert result.summary()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
 
 
 def test_far_source_has_no_range(tmp_path):

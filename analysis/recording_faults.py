@@ -1,0 +1,71 @@
+"""Channels of a recording that are not as they should be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.channel_faults import ChannelFault
+
+__all__ = ["channels_without_faults"]
+
+# What leaves nothing to locate with.
+_FATAL = ("nan", "dead")
+
+
+def channels_without_faults(
+    samples: NDArray[np.float64],
+    faults: list[ChannelFault],
+    agreement: Callable[[NDArray[np.float64]], float],
+    where: str,
+) -> tuple[NDArray[np.float64], list[ChannelFault]]:
+    """Mends what can be mended, and refuses what would give wrong places.
+
+    An inverted channel is turned back. Exchanged channels are no guess to be
+    made here: whether the cables or the file's description are wrong is for the
+    user to say.
+
+    Args:
+        samples: (n, samples) one row a microphone.
+        faults: What seems wrong with them.
+        agreement: How well channels fit the geometry; the higher the better.
+        where: Begins a message.
+
+    Returns:
+        The channels, and the faults that remain worth saying.
+
+    Raises:
+        ValueError: Channels are dead, not finite, or exchanged.
+    """
+    for fault in faults:
+        if fault.kind in _FATAL:
+            raise ValueError(f"{where}: {fault.message}")
+    samples = samples.copy()
+    for fault in faults:
+        if fault.kind == "inverted":
+            samples[list(fault.channels)] *= -1.0
+    kept = []
+    for fault in faults:
+        if fault.kind != "swapped":
+            kept.append(fault)
+        elif _fits_better_exchanged(samples, fault.channels, agreement):
+            raise ValueError(f"{where}: {fault.message}")
+    return samples, kept
+
+
+def _fits_better_exchanged(
+    samples: NDArray[np.float64],
+    channels: tuple[int, ...],
+    agreement: Callable[[NDArray[np.float64]], float],
+) -> bool:
+    """Whether some exchange makes all delays fit better, not the peaks alone."""
+    as_given = agreement(samples)
+    for a, b in combinations(channels, 2):
+        order = np.arange(len(samples))
+        order[[a, b]] = b, a
+        if agreement(samples[order]) > as_given:
+            return True
+    return False
