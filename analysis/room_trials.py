@@ -175,7 +175,9 @@ def _tracked(
     )
     localiser, p_PA_B = robot_localiser(parameters, robot, _AIR)
     tracker = TrackerModel(
-        TrackerParameters(resolve_front_back=False, hold="world"), robot, 1.5 * FRAME_PERIOD_S
+        TrackerParameters(resolve_front_back=False, hold="world"),
+        robot,
+        1.5 * FRAME_PERIOD_S,
     )
     pose = layout.pose_WB
     track, memory, believed = tracker.start(pose), localiser.blank(), False
