@@ -18,7 +18,6 @@ from systems.active_impedance_controller import active_force
 from systems.array_tolerances import draw_tolerances, real_array
 from systems.collision_vector import collision_vectors, echo_points
 from systems.diff_drive_plant import body_twist, plant_derivatives
-from systems.front_back import Candidates
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
 from systems.mic_array import microphones_B, record_frame
@@ -26,14 +25,7 @@ from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.signals import FRAME_PERIOD_S
 from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.source_fix import SourceFix
-from systems.source_tracker import (
-    NEVER_HEARD_S,
-    Estimate,
-    Track,
-    fold_estimate,
-    held_target,
-    past_pose,
-)
+from systems.source_tracker import Estimate, Track, TrackerModel
 from systems.tdoa_estimator import port_values, robot_localiser
 from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
 from systems.waveforms import make_waveform
@@ -70,6 +62,7 @@ class PlainLoop:
         )
         p_BM = microphones_B(scenario.robot)
         self.array = real_array(p_BM, microphones, errors, c)
+        self.tracker = TrackerModel(scenario.tracker, scenario.robot, 1.5 * T)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.localiser, self.p_PA_B = robot_localiser(
             scenario.tdoa, scenario.robot, scenario.acoustics
@@ -81,8 +74,7 @@ class PlainLoop:
         self.memory = self.localiser.blank()
         state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
         odometry, angles = list(scenario.start.pose), [0.0, 0.0]
-        blank = [0.0] * 2, [0.0] * 4, NEVER_HEARD_S, 0.0, Candidates.none()
-        track = Track(odometry, odometry, *blank)
+        track = self.tracker.start(odometry)
         v_WP: tuple[float, float] = (0.0, 0.0)
         fix: SourceFix | None = None
         before: dict[int, list[float]] = {}
@@ -115,29 +107,13 @@ class PlainLoop:
         steps = (now[0] - angles[0], now[1] - angles[1])
         return list(advance_pose(pose, steps, self.scenario.robot)), now
 
-    def _track(self, track: Any, fix: Any, pose: Any) -> Any:
-        tracker = self.scenario.tracker
-        epsilon = self.scenario.robot.control_point_m
-        now = track
+    def _track(self, track: Track, fix: Any, pose: Any) -> Any:
         if fix is not None:
             ports = port_values(fix, self.p_PA_B)
             estimate = Estimate(ports[2].tolist(), ports[3].tolist(), fix.range_valid)
-            then = past_pose(pose, track.pose_1, track.pose_2, 1.5 * T)
-            folded = fold_estimate(track, estimate, then, tracker, epsilon)
-            if folded is None:
-                now = track._replace(outliers=track.outliers + 1.0)
-            else:
-                now = folded._replace(age=1.5 * T)
-        target = held_target(now, pose, tracker, epsilon)
-        return (
-            now._replace(
-                pose_1=pose,
-                pose_2=track.pose_1,
-                age=now.age + T if now.age < NEVER_HEARD_S else now.age,
-                candidates=Candidates.older(now.candidates, T),
-            ),
-            target,
-        )
+            track = self.tracker.hear(track, estimate, pose)
+        target = self.tracker.position(track, pose)
+        return self.tracker.older(track, pose), target
 
     def _obstacles(self, time: Any, tick: Any, state: Any, theta: Any) -> Any:
         scenario = self.scenario

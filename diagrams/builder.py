@@ -199,10 +199,14 @@ def _emitter(
 
 
 def _tracker(scenario: Scenario) -> Any:
-    """An ideal estimate is a tick old, one from audio half a frame more."""
+    """An ideal estimate is a tick old, one from audio half a frame more.
+
+    It also is what its covariance says, and tells front from back.
+    """
     tracker, age = scenario.tracker, 1.5 * FRAME_PERIOD_S
     if scenario.hearing == "ideal":
-        tracker = tracker.model_copy(update={"resolve_front_back": False})
+        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
+        tracker = tracker.model_copy(update=exact)
         age = FRAME_PERIOD_S
     return SourceTracker(robot=scenario.robot, tracker=tracker, measurement_age_s=age)
 

@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.noise import tick_generator
+from systems.noise import standard_normals
 from systems.parameters import Fraction, Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
@@ -96,7 +96,7 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
     """White noise of unit variance that only the seed and the tick decide."""
-    return tick_generator(seed, tick).standard_normal(shape, dtype=np.float32)
+    return standard_normals(shape, seed, tick)
 
 
 @njit(cache=True)

@@ -70,7 +70,7 @@ def fit_aligned_delays(
     cross = np.einsum(
         "pkf,pkf,kf->pf", spectra[first].conj(), spectra[second], flat, optimize=True
     ).astype(np.complex128)
-    total = np.sum(flat * power, axis=0, dtype=np.float64)
+    total = (flat * power).sum(axis=0).astype(np.float64)
     if not total.any():
         return None
     edges = _band_edges(total)

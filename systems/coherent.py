@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from systems.array_shape import ArrayShape
+from systems.delay_peaks import EDGE_SAMPLES, cut_to_overlap
 from systems.multilateration import locate_source
 from systems.source_fix import SourceFix
 
@@ -34,11 +35,6 @@ _SETTLED = 1e-4
 
 # The channels are cut again when a delay is off the cut by more than this, samples.
 _RECUT = 0.02
-
-# Raised-cosine edges of the cut channels, samples. They follow the delays below
-# the sample, so that all channels hold the same stretch of the sound: edges at
-# whole samples would pull the delays towards these.
-_EDGE = 16
 
 # Left of a frame after the cut, as a share.
 _LEAST_OVERLAP = 0.25
@@ -104,30 +100,13 @@ def refine_source(
 def _cut(
     frame: NDArray[np.float32], delays: NDArray[np.float64]
 ) -> NDArray[np.float32] | None:
-    """(n, m) the stretch that all channels share; None where too little is left.
-
-    Row k begins a whole number of samples into the frame: its delay, rounded.
-    """
+    """(n, m) the stretch that all channels share; None where too little is left."""
     arrivals = np.concatenate((np.zeros(1), delays))
-    starts = np.rint(arrivals).astype(np.int64)
-    rests = arrivals - starts
-    starts -= starts.min()
-    length = frame.shape[1] - int(starts.max())
-    if length < max(_LEAST_OVERLAP * frame.shape[1], 4 * _EDGE):
+    length = frame.shape[1] - np.ptp(np.rint(arrivals))
+    if length < max(_LEAST_OVERLAP * frame.shape[1], 4 * EDGE_SAMPLES):
         return None
-    cut = np.stack([frame[k, s : s + length] for k, s in enumerate(starts)])
     # An offset would show at the edges, in all channels alike.
-    cut -= cut.mean(axis=1, keepdims=True)
-    within = np.arange(_EDGE) - rests[:, np.newaxis]
-    cut[:, :_EDGE] *= _ramp(within)
-    cut[:, -_EDGE:] *= _ramp(_EDGE - 1.0 - within)
-    return cut
-
-
-def _ramp(place: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Raised cosine from 0 at place -1/2 to 1 at the edge's length."""
-    share = np.clip((place + 0.5) / _EDGE, 0.0, 1.0)
-    return 0.5 - 0.5 * np.cos(math.pi * share)
+    return cut_to_overlap(frame - frame.mean(axis=1, keepdims=True), arrivals)
 
 
 def _spectra(
@@ -142,8 +121,8 @@ def _spectra(
     last = min(length // 2, math.floor(band_hz[1] * length / sample_rate_hz))
     spectra = fft.rfft(cut, length)[:, first : last + 1]
     # Sums of the window's squares and fourth powers: 3/8 and 35/128 an edge.
-    flat = cut.shape[1] - 2 * _EDGE
-    squares, fourths = flat + 0.75 * _EDGE, flat + 35.0 / 64.0 * _EDGE
+    flat = cut.shape[1] - 2 * EDGE_SAMPLES
+    squares, fourths = flat + 0.75 * EDGE_SAMPLES, flat + 35.0 / 64.0 * EDGE_SAMPLES
     step = 2.0 * math.pi / length
     return spectra, first * step, step, length * fourths / squares**2
 

@@ -10,7 +10,14 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["PairTables", "Peaks", "cut_to_overlap", "find_peaks", "whitening"]
+__all__ = [
+    "EDGE_SAMPLES",
+    "PairTables",
+    "Peaks",
+    "cut_to_overlap",
+    "find_peaks",
+    "whitening",
+]
 
 # Weights of PHAT fall to zero where the cross-spectrum is below this share of
 # its mean: bins of noise would otherwise weigh as much as bins of sound.
@@ -20,10 +27,11 @@ _PHAT_FLOOR = 0.1
 _ITERATIONS = 10
 _TOLERANCE = 1e-6
 
-# Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
-# whole samples by one over the length and the squared bandwidth: 4e-3 samples of
-# a 25 ms frame, as much as the noise at 30 dB. These leave a twentieth of it.
-_EDGE = 16
+#: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
+#: whole samples by one over the length and the squared bandwidth: 4e-3 samples of
+#: a 25 ms frame, as much as the noise at 30 dB. These leave a twentieth of it, and
+#: nothing where they follow the delays below the sample.
+EDGE_SAMPLES = 16
 
 
 def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -33,29 +41,35 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
     return 1.0 / (size + floor + np.finfo(np.float32).tiny)
 
 
-def _edges() -> NDArray[np.float32]:
-    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(_EDGE) + 0.5) / _EDGE)
-    return ramp.astype(np.float32)
+def _ramp(rests: NDArray[np.float64] | float) -> NDArray[np.float32]:
+    """(..., EDGE_SAMPLES) rising edges that begin late by some part of a sample."""
+    place = np.arange(EDGE_SAMPLES) + 0.5 - np.asarray(rests)[..., np.newaxis]
+    share = np.clip(place / EDGE_SAMPLES, 0.0, 1.0)
+    return (0.5 - 0.5 * np.cos(np.pi * share)).astype(np.float32)
 
 
-_RAMP = _edges()
+_RAMP = _ramp(0.0)
 
 
 def cut_to_overlap(
-    frame: NDArray[np.float32], arrivals: NDArray[np.int64]
+    frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
     """(n, m) the stretch that all channels share, with soft edges.
 
     Args:
         frame: (n, samples) channels.
-        arrivals: (n,) arrival at each channel after channel 0, samples.
+        arrivals: (n,) arrival at each channel after channel 0, samples. Channels
+            are cut at whole samples; their edges follow what is left of it.
     """
-    starts = arrivals - arrivals.min()
+    starts = np.rint(arrivals).astype(np.int64)
+    rests = arrivals - starts
+    starts -= starts.min()
     length = frame.shape[1] - int(starts.max())
     cut = np.stack([frame[k, s : s + length] for k, s in enumerate(starts)])
-    if length >= 2 * _EDGE:
-        cut[:, :_EDGE] *= _RAMP
-        cut[:, -_EDGE:] *= _RAMP[::-1]
+    if length >= 2 * EDGE_SAMPLES:
+        broken = rests.any()
+        cut[:, :EDGE_SAMPLES] *= _ramp(rests) if broken else _RAMP
+        cut[:, -EDGE_SAMPLES:] *= (_ramp(-rests) if broken else _RAMP)[..., ::-1]
     return cut
 
 
@@ -211,7 +225,7 @@ def find_peaks(
     Returns:
         The peaks, or None where there is none.
     """
-    whole = np.rint(arrivals).astype(np.int64)
+    whole = np.rint(arrivals)
     cut = cut_to_overlap(frame, whole)
     spectra = fft.rfft(cut, length)[:, band]
     energy = np.asarray(np.sum(np.abs(spectra) ** 2, axis=1, dtype=np.float64))
@@ -229,7 +243,7 @@ def find_peaks(
     if not (r.min() > 0.0 and sums[:, 0].min() > 0.0):
         return None
     # The soft edges cost energy: the mean square of a raised cosine is 3/8.
-    padding = length / (cut.shape[1] - 1.25 * _EDGE)
+    padding = length / (cut.shape[1] - 1.25 * EDGE_SAMPLES)
     correlation = min(r.min(), agreement.min() if phat else 1.0, 1.0)
     return Peaks(
         tau=tau + (whole[second] - whole[first]),

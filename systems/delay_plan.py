@@ -18,6 +18,9 @@ __all__ = ["DelayPlan"]
 # Samples a period of the highest frequency on the grid of the first search.
 _GRID_DENSITY = 5.0
 
+# Divides the length of the transform.
+_TWOS = 256
+
 # Left of a frame after the cut, as a share; a longer delay cannot be measured.
 _LEAST_OVERLAP = 0.25
 
@@ -95,7 +98,8 @@ class DelayPlan:
     def length(self) -> int:
         """Samples of the Fourier transform, padded so that lags do not wrap."""
         least = self.frame_samples + int(self.edge_lags.max()) + 2
-        return int(fft.next_fast_len(least, real=True))
+        # Many factors of two make the fastest transforms.
+        return _TWOS * int(fft.next_fast_len(-(-least // _TWOS)))
 
     @cached_property
     def band(self) -> slice:

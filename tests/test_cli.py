@@ -158,6 +158,36 @@ def test_bad_recording_is_one_line_and_status_2(capsys, tmp_path):
     assert "mono.wav" in complaint
 
 
+def row_recording(path):
+    """Noise that three microphones 0.4 m apart hear at once: from ahead."""
+    noise = np.random.default_rng(1).standard_normal(16_000)
+    microphones = 0.1 * np.stack([noise] * 3, axis=1)
+    microphones += 1e-3 * np.random.default_rng(2).standard_normal(microphones.shape)
+    soundfile.write(path, microphones, 16_000)
+    return path
+
+
+def test_locate_writes_a_directory(capsys, tmp_path):
+    sound, out = row_recording(tmp_path / "row.wav"), tmp_path / "out"
+    status, printed, complaint = call(
+        capsys, "locate", str(sound), "--out", str(out), "--json"
+    )
+    assert (status, complaint) == (0, "")
+    document = json.loads(printed)
+    assert document["summary"]["bearing_deg"] == pytest.approx(0.0, abs=1.0)
+    assert document == json.loads((out / "locate.json").read_text())
+    assert {p.name for p in out.iterdir()} == {"locate.json", "locate.png"}
+    status, _, complaint = call(capsys, "locate", str(sound), "--out", str(out))
+    assert status == 2
+    assert "out: " in complaint
+
+
+def test_bad_recording_leaves_no_directory(capsys, tmp_path):
+    mono, out = write_wav(tmp_path / "mono.wav"), tmp_path / "out"
+    assert call(capsys, "locate", str(mono), "--out", str(out))[0] == 2
+    assert not out.exists()
+
+
 def test_json_document_and_result_directory(capsys, tmp_path):
     out = tmp_path / "out"
     words = ["simulate", "--set", "duration_s=2.5", "--seed", "5", "--out", str(out)]

@@ -14,6 +14,15 @@ W = 2 * math.pi * np.linspace(300.0, 7_000.0, BINS)
 TAU = np.array([2e-5, -1.5e-5, 0.7e-5])
 
 
+def fitted(spectra, weights=None, w=W, **options):
+    """The delays of spectra that have some."""
+    if weights is None:
+        weights = np.ones(spectra.shape[1:], np.float32)
+    fit = fit_aligned_delays(spectra, weights, w, **options)
+    assert fit is not None
+    return fit
+
+
 def snapshots(rng, tau=TAU, *, count=8, noise=0.0):
     """(n, k, f) of one white source, and white noise in each channel."""
     shape = (count, BINS)
@@ -27,8 +36,7 @@ def snapshots(rng, tau=TAU, *, count=8, noise=0.0):
 
 def test_delays_without_noise_are_exact():
     spectra = snapshots(np.random.default_rng(1))
-    fit = fit_aligned_delays(spectra, np.ones((8, BINS), np.float32), W)
-    assert fit is not None
+    fit = fitted(spectra)
     np.testing.assert_allclose(fit.tau, TAU, atol=1e-10)
     assert fit.coherence == pytest.approx(1.0, abs=1e-3)
 
@@ -37,12 +45,7 @@ def test_delays_without_noise_are_exact():
 def test_errors_are_those_of_many_trials_and_near_the_bound(noise):
     """Knapp and Carter's bound (1976), as for a pair, from k times f values."""
     rng = np.random.default_rng(2)
-    fits = [
-        fit_aligned_delays(
-            snapshots(rng, noise=noise), np.ones((8, BINS), np.float32), W
-        )
-        for _ in range(300)
-    ]
+    fits = [fitted(snapshots(rng, noise=noise)) for _ in range(300)]
     errors = np.array([f.tau - TAU for f in fits])
     actual = np.sqrt(np.mean(errors**2))
     stated = np.sqrt(np.mean([np.diag(f.covariance) for f in fits]))
@@ -59,16 +62,13 @@ def test_errors_are_those_of_many_trials_and_near_the_bound(noise):
 def test_bands_of_noise_do_not_count():
     """White noise in half of the bins costs no more than leaving them out."""
     rng = np.random.default_rng(3)
-    errors = {"with": [], "without": []}
+    errors: dict[str, list[np.ndarray]] = {"with": [], "without": []}
     for _ in range(100):
         spectra = snapshots(rng, noise=0.1)
         noisy = spectra.copy()
-        shape = (4, 8, BINS // 2)
-        noisy[:, :, BINS // 2 :] = rng.standard_normal(shape)
-        weights = np.ones((8, BINS), np.float32)
-        errors["with"].append(fit_aligned_delays(noisy, weights, W).tau - TAU)
-        half = np.s_[:, :, : BINS // 2]
-        fit = fit_aligned_delays(spectra[half], weights[:, : BINS // 2], W[: BINS // 2])
+        noisy[:, :, BINS // 2 :] = rng.standard_normal((4, 8, BINS // 2))
+        errors["with"].append(fitted(noisy).tau - TAU)
+        fit = fitted(spectra[:, :, : BINS // 2], w=W[: BINS // 2])
         errors["without"].append(fit.tau - TAU)
     rms = {name: np.sqrt(np.mean(np.square(e))) for name, e in errors.items()}
     assert rms["with"] < 1.1 * rms["without"]
@@ -78,9 +78,7 @@ def test_coarse_alignment_begins_at_low_frequencies():
     """0.2 ms is more than a period of the highest frequency."""
     tau = np.array([2e-4, 0.0, -1e-4])
     spectra = snapshots(np.random.default_rng(4), tau, noise=0.1)
-    weights = np.ones((8, BINS), np.float32)
-    fit = fit_aligned_delays(spectra, weights, W, coarseness=14.0)
-    assert fit is not None
+    fit = fitted(spectra, coarseness=14.0)
     np.testing.assert_allclose(fit.tau, tau, atol=1e-6)
 
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from systems.noise import BEFORE_THE_RUN, _scrambled, tick_generator
+from systems.noise import BEFORE_THE_RUN, _scrambled, standard_normals, tick_generator
 
 
 def test_scrambler_is_splitmix64():
@@ -36,3 +37,26 @@ def test_neighbouring_seeds_and_ticks_are_independent():
     assert np.abs(correlation).max() < 5.3 * 0.05
     assert np.mean(rows[:, 0]) == pytest.approx(0.0, abs=0.2)
     assert np.std(rows[:, 0]) == pytest.approx(1.0, abs=0.15)
+
+
+def test_standard_normals_are_normal():
+    """Kolmogorov and Smirnov, four moments, tails, no correlation from one to next."""
+    values = standard_normals((4, 500_000), 3, 5).astype(float).ravel()
+    assert stats.kstest(values, "norm").pvalue > 0.01
+    # Standard errors of mean, variance, skewness and kurtosis of 2e6 numbers.
+    n = values.size
+    assert abs(values.mean()) < 4.0 / np.sqrt(n)
+    assert abs(values.var() - 1.0) < 4.0 * np.sqrt(2.0 / n)
+    assert abs(stats.skew(values)) < 4.0 * np.sqrt(6.0 / n)
+    assert abs(stats.kurtosis(values)) < 4.0 * np.sqrt(24.0 / n)
+    beyond = np.sum(np.abs(values) > 4.0)
+    expected = 2.0 * n * stats.norm.sf(4.0)
+    assert abs(beyond - expected) < 4.0 * np.sqrt(expected)
+    assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 4.0 / np.sqrt(n)
+
+
+def test_standard_normals_depend_on_seed_and_tick_alone():
+    first = standard_normals((3, 7), 1, 2)
+    np.testing.assert_array_equal(first, standard_normals((3, 7), 1, 2))
+    assert not np.isin(first, standard_normals((3, 7), 1, 3)).any()
+    assert not np.isin(first, standard_normals((3, 7), 2, 2)).any()

@@ -18,7 +18,7 @@ from systems.steered_response import (
 
 C = 340.0
 HIGH = 4_000.0
-ARRAYS = {
+ARRAYS: dict[str, list[list[float]]] = {
     "row": [[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]],
     "unequal row": [[0.0, 0.0], [0.05, 0.0], [0.15, 0.0], [0.35, 0.0]],
     "square": [[0.05, 0.05], [-0.05, 0.05], [-0.05, -0.05], [0.05, -0.05]],

@@ -1,0 +1,207 @@
+"""How well a burst is located in reverberant rooms, over random layouts.
+
+Robot and source rest. A burst reaches the microphones through the room's
+response, frames go through the converter, ``systems.localise`` and the tracker,
+as they do in the diagram, and what the tracker holds when the burst is over is
+compared with the truth. No diagram is built, so that a layout costs little more
+than its response.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import oaconvolve
+
+from systems.acoustics import AcousticParameters
+from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.geometry import rotate
+from systems.mic_array import FRAME_SAMPLES, microphones_B
+from systems.noise import tick_generator
+from systems.robot import RobotParameters
+from systems.room import RoomImages, RoomParameters, room_images, room_impulse_responses
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.source_tracker import Estimate, TrackerModel, TrackerParameters
+from systems.tdoa_estimator import TDOAParameters, port_values, robot_localiser
+from systems.waveforms import SoundParameters, make_waveform
+
+__all__ = ["Layout", "RoomResult", "draw_layouts", "locate_bursts"]
+
+#: Least distance of source and microphones from a wall, m.
+WALL_M = 0.5
+#: Sources nearer than this are seen, not heard, m.
+LEAST_RANGE_M = 0.5
+#: Largest bearing to either side, deg.
+LARGEST_BEARING_DEG = 60.0
+#: What counts as located: largest error of the bearing, deg, and of the range,
+#: as a share of it.
+BEARING_WITHIN_DEG = 2.0
+RANGE_WITHIN = 0.1
+
+_AIR = AcousticParameters()
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A robot and a source at rest."""
+
+    pose_WB: NDArray[np.float64]
+    """(3,) x, y, theta."""
+    p_WS: NDArray[np.float64]
+    """(2,) m."""
+    range_m: float
+    """Of the source from M2, m."""
+    bearing_deg: float
+    """deg."""
+
+
+@dataclass(frozen=True)
+class RoomResult:
+    """Errors of the bursts in some layouts."""
+
+    layouts: list[Layout]
+    bearing_errors_deg: NDArray[np.float64]
+    """(n,); NaN where nothing was heard."""
+    range_errors: NDArray[np.float64]
+    """(n,) over the true range; NaN where nothing was heard."""
+
+    @property
+    def located(self) -> NDArray[np.bool_]:
+        """(n,) whether bearing and range are within their limits."""
+        return (np.abs(self.bearing_errors_deg) <= BEARING_WITHIN_DEG) & (
+            np.abs(self.range_errors) <= RANGE_WITHIN
+        )
+
+
+def draw_layouts(
+    room: RoomParameters, largest_range_m: float, count: int, seed: int
+) -> Iterator[Layout]:
+    """Layouts at random: robot anywhere in any heading, source within 60 deg.
+
+    Args:
+        room: Its floor bounds them.
+        largest_range_m: Farthest source, m; ranges are uniform up to it.
+        count: How many.
+        seed: Decides them.
+    """
+    generator = tick_generator(seed, 0)
+    robot = RobotParameters()
+    low = np.array(room.corner) + WALL_M
+    high = low + np.array(room.size_m[:2]) - 2.0 * WALL_M
+    found = 0
+    while found < count:
+        x, y = generator.uniform(low, high)
+        theta = generator.uniform(-math.pi, math.pi)
+        bearing = math.radians(LARGEST_BEARING_DEG) * generator.uniform(-1.0, 1.0)
+        distance = generator.uniform(LEAST_RANGE_M, largest_range_m)
+        ahead = rotate(theta, robot.control_point_m, 0.0)
+        away = rotate(theta + bearing, distance, 0.0)
+        p_WS = np.array([x + ahead[0] + away[0], y + ahead[1] + away[1]])
+        places = np.vstack((_microphones_W(np.array([x, y, theta]), robot), p_WS))
+        if ((places >= low) & (places <= high)).all():
+            found += 1
+            pose = np.array([x, y, theta])
+            yield Layout(pose, p_WS, distance, math.degrees(bearing))
+
+
+def _microphones_W(
+    pose: NDArray[np.float64], robot: RobotParameters
+) -> NDArray[np.float64]:
+    turned = [rotate(pose[2], x, y) for x, y in microphones_B(robot)]
+    return pose[:2] + np.array(turned)
+
+
+def locate_bursts(
+    room: RoomParameters,
+    sound: SoundParameters,
+    layouts: list[Layout],
+    *,
+    parameters: TDOAParameters | None = None,
+    snr_db_at_1m: float = 30.0,
+    seed: int = 0,
+) -> RoomResult:
+    """Locates one burst in each layout.
+
+    Args:
+        room: The walls.
+        sound: What is played, once.
+        layouts: Where robot and source stand.
+        parameters: Of the estimator.
+        snr_db_at_1m: As of ``MicArrayParameters``.
+        seed: Of sound and noise.
+    """
+    parameters = parameters or TDOAParameters()
+    microphones = MicArrayParameters(snr_db_at_1m=snr_db_at_1m)
+    images = room_images(room, _AIR.c)
+    waveform = make_waveform(sound, seed)
+    burst = waveform[: round(sound.on_s * SAMPLE_RATE_HZ)]
+    errors = [
+        _errors(
+            _tracked(layout, room, images, burst, parameters, microphones, seed + k),
+            layout,
+        )
+        for k, layout in enumerate(layouts)
+    ]
+    bearing, distance = np.array(errors).T
+    return RoomResult(layouts, bearing, distance)
+
+
+def _tracked(
+    layout: Layout,
+    room: RoomParameters,
+    images: RoomImages,
+    burst: NDArray[np.float32],
+    parameters: TDOAParameters,
+    microphones: MicArrayParameters,
+    seed: int,
+) -> NDArray[np.float64] | None:
+    """(2,) where the tracker has the source after the burst, in W, m."""
+    robot = RobotParameters()
+    p_WM = _microphones_W(layout.pose_WB, robot)
+    response = room_impulse_responses(room, layout.p_WS, p_WM, _AIR.c, images=images)
+    # Sound begins at any place of a frame, after some frames of noise alone.
+    lead = int(tick_generator(seed, 1).integers(4, 5 * FRAME_SAMPLES)) + FRAME_SAMPLES
+    frames = -(-(lead + len(burst)) // FRAME_SAMPLES)
+    pressure = np.zeros((len(p_WM), frames * FRAME_SAMPLES), dtype=np.float32)
+    heard = oaconvolve(response, burst[np.newaxis], axes=1)
+    length = min(heard.shape[1], pressure.shape[1] - lead)
+    pressure[:, lead : lead + length] = heard[:, :length]
+    noise_pa = float(
+        np.sqrt(np.mean(burst**2)) * 10.0 ** (-microphones.snr_db_at_1m / 20.0)
+    )
+    localiser, p_PA_B = robot_localiser(parameters, robot, _AIR)
+    tracker = TrackerModel(
+        TrackerParameters(resolve_front_back=False), robot, 1.5 * FRAME_PERIOD_S
+    )
+    pose = layout.pose_WB
+    track, memory, believed = tracker.start(pose), localiser.blank(), False
+    for k in range(frames):
+        part = pressure[:, k * FRAME_SAMPLES : (k + 1) * FRAME_SAMPLES]
+        noise = frame_noise(part.shape, seed, k)
+        counts = convert(np.ascontiguousarray(part), noise, noise_pa, microphones)
+        fix, memory = localiser.localise(counts.astype(np.float32), memory)
+        if fix is not None:
+            believed = True
+            ports = port_values(fix, p_PA_B)
+            estimate = Estimate(
+                ports[2].tolist(), ports[3].tolist(), ranged=fix.range_valid
+            )
+            track = tracker.hear(track, estimate, pose)
+        track = track.older(pose)
+    return np.array(tracker.position(track, pose)) if believed else None
+
+
+def _errors(p_WS: NDArray[np.float64] | None, layout: Layout) -> tuple[float, float]:
+    """Error of the bearing in deg, and of the range over the true one."""
+    if p_WS is None:
+        return math.nan, math.nan
+    robot = RobotParameters()
+    x, y, theta = layout.pose_WB
+    dx, dy = rotate(-theta, p_WS[0] - x, p_WS[1] - y)
+    dx -= robot.control_point_m
+    bearing = math.degrees(math.atan2(dy, dx)) - layout.bearing_deg
+    return bearing, math.hypot(dx, dy) / layout.range_m - 1.0
