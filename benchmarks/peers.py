@@ -11,7 +11,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-import os
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -24,6 +23,7 @@ from numpy.typing import NDArray
 from analysis.cramer_rao import LocalizationBound, position_bound
 from analysis.free_field import Loudspeaker
 from analysis.paper_tables import PAPER_CELLS
+from benchmarks.figures import stay_on_one_core
 from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 
@@ -180,8 +180,7 @@ def main() -> int:
     arguments = parser.parse_args()
     if arguments.trials < 1:
         parser.error(f"--trials {arguments.trials}: must be at least 1")
-    if hasattr(os, "sched_setaffinity"):
-        os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
+    stay_on_one_core()
     places = [(place.range_m, place.bearing_deg) for place in PAPER_CELLS]
     results = compare(arguments.sound, places, arguments.trials)
     if arguments.json:
