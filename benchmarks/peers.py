@@ -1,171 +1,206 @@
 """``python -m benchmarks.peers``: our estimators beside those of pyroomacoustics.
 
-The same frames for all: a chirp of 0.5-8 kHz, 20 dB over the noise at the array, in
-the cells of Han 2019. pyroomacoustics is used as its documentation shows: `tdoa`
-(PHAT, interpolated 16-fold) on the two neighbouring pairs with our closed form
-behind it, and SRP-PHAT and NormMUSIC in the far field over a grid of 0.1 deg. The
-last two give no range.
+The cells of Han 2019 (1-4 m; 0, 30 and 60 deg) in the free field, sound of
+0.5-8 kHz 20 dB above white noise at the array, 25 ms at 100 kHz; every
+estimator gets the same frames. Each trial's bearing lies within half a degree
+of its cell's, so that no search grid is favoured.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import math
-from collections.abc import Callable
-from time import perf_counter
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from time import process_time
 
 import numpy as np
 import pyroomacoustics as pra
 from numpy.typing import NDArray
-from pyroomacoustics.experimental import tdoa
 
-from analysis.free_field import Loudspeaker, frame_estimator, run_cell
+from analysis.cramer_rao import LocalizationBound, position_bound
+from analysis.free_field import Loudspeaker
 from analysis.paper_tables import PAPER_CELLS
-from systems.array_shape import ArrayShape
-from systems.localise import TDOAParameters
-from systems.multilateration import locate_source
-from systems.robot import RobotParameters
-from systems.signals import SAMPLE_RATE_HZ
+from benchmarks.figures import stay_on_one_core
+from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 
-C = 340.0
-SHAPE = ArrayShape.of(RobotParameters().microphones_m)
-BAND_HZ = [500.0, 8_000.0]
-#: Snapshots of a frame for SRP and MUSIC: long against the array's 2.4 ms.
-SNAPSHOT, HOP = 2048, 64
-#: A bearing or a range further off than this is an outlier, deg and share.
-OUTLIER_DEG, OUTLIER_SHARE = 5.0, 0.5
+SNR_DB = 20.0
 
-#: Bearing, rad, and range, m: infinite where a frame has none, None where the
-#: method never has.
-Place = tuple[float, float | None]
-Method = Callable[[NDArray[np.float32]], Place | None]
+#: Off by more is an outlier: the bearing, and the range as a share of itself.
+OUTLIER_DEG, OUTLIER_SHARE = 10.0, 0.5
 
 
-def ours(method: str) -> Method:
-    """One of our methods."""
-    parameters = TDOAParameters.model_validate({"method": method})
-    estimate = frame_estimator(parameters, SHAPE, C)
+@dataclass(frozen=True)
+class PeerCell:
+    """What an estimator did in one place."""
 
-    def locate(frame: NDArray[np.float32]) -> Place | None:
-        fix = estimate(frame)
-        return fix and (fix.bearing, fix.range if fix.range_valid else math.inf)
-
-    return locate
-
-
-def delays_of_pairs(frame: NDArray[np.float32]) -> Place:
-    """pyroomacoustics' delays, placed by our closed form."""
-    tau_21, tau_32 = (
-        tdoa(frame[k + 1], frame[k], interp=16, fs=SAMPLE_RATE_HZ, phat=True)
-        for k in range(2)
-    )
-    tau = np.array([tau_21, tau_21 + tau_32])
-    covariance = 1e-14 * np.array([[2.0, 1.0], [1.0, 2.0]])
-    fix = locate_source(tau, covariance, SHAPE, C)
-    return fix.bearing, fix.range if fix.range_valid else math.inf
+    range_m: float
+    bearing_deg: float
+    trials: int
+    outliers: int
+    bearing_rmse_deg: float | None
+    """Of the frames that are no outliers; None where all are."""
+    range_rmse_m: float | None
+    """The same; None too for those who give no range."""
 
 
-def far_field(name: str) -> Method:
-    """A direction finder over the half plane ahead."""
-    finder = pra.doa.algorithms[name](
-        SHAPE.p_AM.T,
-        SAMPLE_RATE_HZ,
-        SNAPSHOT,
-        c=C,
-        azimuth=np.radians(np.linspace(-90.0, 90.0, 1801)),
-    )
+@dataclass(frozen=True)
+class PeerResult:
+    """What an estimator did in all places."""
 
-    def locate(frame: NDArray[np.float32]) -> Place:
-        starts = range(0, frame.shape[1] - SNAPSHOT + 1, HOP)
-        window = np.hanning(SNAPSHOT)
-        cut = np.stack([frame[:, s : s + SNAPSHOT] * window for s in starts], axis=-1)
-        finder.locate_sources(np.fft.rfft(cut, axis=1), freq_range=BAND_HZ)
-        return float(finder.azimuth_recon[0]), None
-
-    return locate
+    name: str
+    time_ms: float
+    """Median processor time a frame, ms; 0 for the bound."""
+    cells: list[PeerCell]
 
 
-def methods() -> dict[str, Method]:
-    """All, by the name in the table."""
-    return {
-        "ours, fast": ours("gcc"),
-        "ours, maximum likelihood": ours("ml"),
-        "pyroomacoustics tdoa": delays_of_pairs,
-        "pyroomacoustics SRP": far_field("SRP"),
-        "pyroomacoustics NormMUSIC": far_field("NormMUSIC"),
-    }
-
-
-def wrapped_deg(angle: float) -> float:
-    """The angle in [-180, 180) deg."""
-    return (math.degrees(angle) + 180.0) % 360.0 - 180.0
-
-
-def main(trials: int) -> None:
-    """Prints the table."""
-    loudspeaker = Loudspeaker.of("chirp", seed=3)
-    found: dict[str, dict[float, list[tuple[float, float | None]]]] = {}
-    times: dict[str, list[float]] = {}
-
-    def listen(name: str, method: Method, distance: float, bearing_deg: float):
-        def estimate(frame: NDArray[np.float32]) -> None:
-            start = perf_counter()
-            place = method(frame)
-            times.setdefault(name, []).append(perf_counter() - start)
-            turned, reach = math.inf, place and place[1]
-            if place is not None:
-                turned = wrapped_deg(place[0]) - bearing_deg
-            error = None if reach is None else reach - distance
-            found.setdefault(name, {}).setdefault(distance, []).append((turned, error))
-
-        return estimate
-
-    everyone = methods()
-    for seed, cell in enumerate(PAPER_CELLS):
-        run_cell(
-            loudspeaker,
-            {
-                name: listen(name, method, cell.range_m, cell.bearing_deg)
-                for name, method in everyone.items()
-            },
-            cell.range_m,
-            cell.bearing_deg,
-            shape=SHAPE,
-            snr_db=20.0,
+def frames(
+    loudspeaker: Loudspeaker, range_m: float, bearing_deg: float, trials: int, seed: int
+) -> Iterator[tuple[Frame, float, LocalizationBound]]:
+    """Frames of one place, each with its bearing in rad and the bound."""
+    rng = np.random.default_rng(seed)
+    noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-SNR_DB / 20.0)
+    for _ in range(trials):
+        bearing = math.radians(bearing_deg + rng.uniform(-0.5, 0.5))
+        p_AS = range_m * np.array([math.cos(bearing), math.sin(bearing)])
+        begin = rng.uniform(0.1, loudspeaker.seconds - 0.1)
+        frame = loudspeaker.pressure(begin, p_AS, SHAPE.p_AM, C)
+        frame += noise_pa * rng.standard_normal(frame.shape, dtype=np.float32)
+        bound = position_bound(
+            loudspeaker.energy,
+            begin,
+            begin + FRAME_PERIOD_S,
+            p_AS,
+            SHAPE.p_AM,
+            noise_pa,
+            sample_rate_hz=SAMPLE_RATE_HZ,
             c=C,
-            trials=trials,
-            seed=seed,
         )
-    distances = sorted({cell.range_m for cell in PAPER_CELLS})
-    print(
-        "Bearing RMSE deg / range RMSE m (outliers) over 0, 30 and 60 deg; "
-        "RMSE without outliers\n"
-    )
-    print(f"| method | {' | '.join(f'{d:g} m' for d in distances)} | ms a frame |")
-    print("|---" * (len(distances) + 2) + "|")
-    for name in everyone:
-        cells = [summary(found[name][d], d) for d in distances]
-        milliseconds = 1e3 * float(np.median(times[name]))
-        print(f"| {name} | {' | '.join(cells)} | {milliseconds:.2f} |")
+        yield frame, bearing, bound
 
 
-def summary(errors: list[tuple[float, float | None]], distance: float) -> str:
-    """RMSEs of what is no outlier, and the share of outliers."""
-    good = [
-        (turned, error)
-        for turned, error in errors
-        if abs(turned) < OUTLIER_DEG and abs(error or 0.0) < OUTLIER_SHARE * distance
+def compare(
+    kind: str, places: list[tuple[float, float]], trials: int
+) -> list[PeerResult]:
+    """Runs all estimators on the same frames.
+
+    Args:
+        kind: Of sound, ``chirp`` or ``band_noise``.
+        places: Range in m and bearing in deg of each cell.
+        trials: Frames a cell.
+
+    Returns:
+        The Cramer-Rao bound, then the estimators.
+    """
+    loudspeaker, contenders = Loudspeaker.of(kind, seed=3), estimators()
+    times: dict[str, list[float]] = {name: [] for name in contenders}
+    cells: dict[str, list[PeerCell]] = {name: [] for name in ("bound", *contenders)}
+    for seed, (range_m, bearing_deg) in enumerate(places):
+        errors: dict[str, list[tuple[float, float]]] = {name: [] for name in cells}
+        for frame, bearing, bound in frames(
+            loudspeaker, range_m, bearing_deg, trials, seed
+        ):
+            errors["bound"].append((bound.bearing_std, bound.range_std))
+            for name, estimate in contenders.items():
+                if not times[name]:
+                    estimate(frame)  # compiles, fills caches
+                start = process_time()
+                found = estimate(frame)
+                times[name].append(process_time() - start)
+                errors[name].append((found[0] - bearing, found[1] - range_m))
+        for name, values in errors.items():
+            cells[name].append(_cell(np.array(values), range_m, bearing_deg))
+    return [
+        PeerResult(name, 1e3 * float(np.median(times.get(name, [0.0]))), found)
+        for name, found in cells.items()
     ]
-    share = 1.0 - len(good) / len(errors)
-    text = "-"
-    if good:
-        text = f"{math.sqrt(np.mean([t * t for t, _ in good])):.4f} / "
-        of_range = [e for _, e in good if e is not None]
-        text += f"{math.sqrt(np.mean(np.square(of_range))):.4f}" if of_range else "-"
-    return text + (f" ({100.0 * share:.0f} %)" if share else "")
+
+
+def _cell(errors: NDArray[np.float64], range_m: float, bearing_deg: float) -> PeerCell:
+    """Sums up (trials, 2) errors of bearing in rad and range in m."""
+    bearing, distance = np.rad2deg(errors[:, 0]), errors[:, 1]
+    good = np.abs(bearing) <= OUTLIER_DEG
+    ranged = np.isfinite(distance).any()
+    if ranged:
+        good &= np.abs(distance) <= OUTLIER_SHARE * range_m
+    return PeerCell(
+        range_m=range_m,
+        bearing_deg=bearing_deg,
+        trials=len(errors),
+        outliers=int(np.count_nonzero(~good)),
+        bearing_rmse_deg=_rms(bearing[good]),
+        range_rmse_m=_rms(distance[good]) if ranged else None,
+    )
+
+
+def _rms(values: NDArray[np.float64]) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if values.size else None
+
+
+def table(results: list[PeerResult]) -> str:
+    """All cells in Markdown: a row is an estimator at one bearing."""
+    distances = sorted({cell.range_m for cell in results[0].cells})
+    fastest = next(result.time_ms for result in results if result.name == "gcc")
+    header = ["estimator", "bearing", *(f"{r:g} m" for r in distances), "ms", "x gcc"]
+    rows = [header, ["---"] * len(header)]
+    for result in results:
+        title = [result.name]
+        times = [f"{result.time_ms:.2f}", f"{result.time_ms / fastest:.1f}"]
+        for bearing in sorted({cell.bearing_deg for cell in result.cells}):
+            cells = sorted(
+                (cell for cell in result.cells if cell.bearing_deg == bearing),
+                key=lambda cell: cell.range_m,
+            )
+            texts = [_cell_text(cell) for cell in cells]
+            rows.append([*title, f"{bearing:g} deg", *texts, *times])
+            title, times = [""], ["", ""]
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _cell_text(cell: PeerCell) -> str:
+    if cell.bearing_rmse_deg is None:
+        return "all outliers"
+    text = f"{cell.bearing_rmse_deg:.4f}"
+    if cell.range_rmse_m is not None:
+        text += f" / {cell.range_rmse_m:.4f}"
+    if cell.outliers:
+        text += f" ({100.0 * cell.outliers / cell.trials:.0f} %)"
+    return text
+
+
+def main() -> int:
+    """Prints the table or one JSON document."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=50, help="frames a cell")
+    parser.add_argument("--sound", choices=("chirp", "band_noise"), default="chirp")
+    parser.add_argument("--json", action="store_true", help="one JSON document")
+    arguments = parser.parse_args()
+    if arguments.trials < 1:
+        parser.error(f"--trials {arguments.trials}: must be at least 1")
+    stay_on_one_core()
+    places = [(place.range_m, place.bearing_deg) for place in PAPER_CELLS]
+    results = compare(arguments.sound, places, arguments.trials)
+    if arguments.json:
+        document = {
+            "schema_version": 1,
+            "sound": arguments.sound,
+            "snr_db": SNR_DB,
+            "pyroomacoustics": pra.__version__,
+            "estimators": [asdict(result) for result in results],
+        }
+        print(json.dumps(document, indent=2))
+    else:
+        print(
+            f"{arguments.trials} frames a cell, {arguments.sound}, {SNR_DB:g} dB at "
+            f"the array, pyroomacoustics {pra.__version__}\n"
+            "RMSE of bearing in deg / range in m; (n %): outliers, left out\n"
+        )
+        print(table(results))
+    return 0
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--trials", type=int, default=50, help="frames a cell")
-    main(parser.parse_args().trials)
+    sys.exit(main())
