@@ -25,8 +25,8 @@ from systems.noise import tick_generator
 from systems.robot import RobotParameters
 from systems.room import RoomImages, RoomParameters, room_images, room_impulse_responses
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
-from systems.source_tracker import Estimate, TrackerModel, TrackerParameters
 from systems.tdoa_estimator import TDOAParameters, port_values, robot_localiser
+from systems.tracker_model import Estimate, TrackerModel, TrackerParameters
 from systems.waveforms import SoundParameters, make_waveform
 
 __all__ = ["Layout", "RoomResult", "draw_layouts", "locate_bursts"]

@@ -145,12 +145,13 @@ class PairTables:
     def of(cls, pairs: NDArray[np.int64]) -> PairTables:
         """The tables of all pairs i < j of some channels."""
         rows = np.arange(len(pairs))
-        first, second = np.zeros((2, len(pairs), int(pairs.max()) + 1))
+        count = int(pairs.max()) + 1
+        first, second = np.zeros((2, len(pairs), count), dtype=np.float64)
         first[rows, pairs[:, 0]] = second[rows, pairs[:, 1]] = 1.0
         return cls(
             pairs,
-            np.linalg.pinv((second - first)[:, 1:]),
-            np.linalg.pinv(0.5 * (first + second)),
+            np.asarray(np.linalg.pinv((second - first)[:, 1:]), dtype=np.float64),
+            np.asarray(np.linalg.pinv(0.5 * (first + second)), dtype=np.float64),
         )
 
 

@@ -121,7 +121,7 @@ def estimate_delays(
     if seen is None:
         return None
     search, band = seen
-    arrivals, settled = search.arrivals, False
+    arrivals = search.arrivals
     for _ in range(_CUTS):
         if np.ptp(arrivals) > plan.max_lag + 1:
             return None
@@ -139,12 +139,11 @@ def estimate_delays(
         reconciled = plan.tables.to_delays @ peaks.tau
         moved = np.abs(reconciled - arrivals[1:]).max()
         arrivals = np.concatenate(([0.0], reconciled))
-        settled = moved < _SETTLED
-        if settled:
-            break
-    if not settled:
-        return None
-    return _estimate(peaks, arrivals, search, band, plan, rounded=chosen.by_amdf)
+        if moved < _SETTLED:
+            return _estimate(
+                peaks, arrivals, search, band, plan, rounded=chosen.by_amdf
+            )
+    return None
 
 
 def _estimate(

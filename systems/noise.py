@@ -49,7 +49,12 @@ def tick_generator(seed: int, tick: int) -> Generator:
     read twice, must see the same noise. SFC64 is numpy's fastest; its start
     from hashed words makes the streams of different ticks independent.
     """
-    return Generator(SFC64(_TickSeed(seed, tick)))
+    return Generator(_bits(seed, tick))
+
+
+def _bits(seed: int, tick: int) -> SFC64:
+    # numpy's stub forgets ISeedSequence, which its documentation names.
+    return SFC64(_TickSeed(seed, tick))  # type: ignore[arg-type]
 
 
 def _quantiles() -> NDArray[np.float32]:
@@ -76,6 +81,6 @@ def standard_normals(
     numpy's, and normal up to 5.9 standard deviations, where they end.
     """
     out = np.empty(shape, dtype=np.float32)
-    words = SFC64(_TickSeed(seed, tick)).random_raw((out.size + 1) // 2)
+    words = _bits(seed, tick).random_raw((out.size + 1) // 2)
     _add_quantiles(words.view(np.uint16), _QUANTILES, out.reshape(-1))
     return out

@@ -91,8 +91,8 @@ class TDOAEstimator(LeafSystem):
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
         blank = self._localiser.blank()
-        self._noise = self.DeclareDiscreteState([blank.noise_energy])
-        self._echoes = self.DeclareDiscreteState(blank.echoes.ravel())
+        self._noise = self.DeclareDiscreteState(1)
+        self._echoes = self.DeclareDiscreteState(blank.echoes.size)
         self._echo_shape = blank.echoes.shape
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
