@@ -112,8 +112,10 @@ class TDOAEstimator(LeafSystem):
             )
         frame = audio.counts.astype(np.float32)
         echoes = context.get_discrete_state(self._echoes).value()
+        energy, noise_energy = context.get_discrete_state(self._noise).value()
         before = HearingMemory(
-            *context.get_discrete_state(self._noise).value().tolist(),
+            float(energy),
+            float(noise_energy),
             echoes.astype(np.float32).reshape(self._echo_shape),
         )
         fix, after = self._localiser.localise(frame, before)
