@@ -137,7 +137,11 @@ class Localiser:
         Returns:
             The source on the side of ``ArrayShape.ahead``, or None where nothing
             is heard, and the new memory.
+
+        Raises:
+            ValueError: The frame is no frame of this array, or not finite.
         """
+        self._check(frame)
         seen = look(
             frame,
             self.plan,
@@ -164,6 +168,20 @@ class Localiser:
         ):
             return None, memory
         return self._fix(dry, delays, self._echo_errors(news)), memory
+
+    def _check(self, frame: NDArray[np.float32]) -> None:
+        expected = (self.plan.shape.count, self.plan.frame_samples)
+        if frame.shape != expected:
+            raise ValueError(
+                f"audio: a frame of shape {frame.shape}; give a channel for each of "
+                f"the {expected[0]} microphones, of {expected[1]} samples"
+            )
+        if not np.isfinite(frame).all():
+            channel, sample = np.argwhere(~np.isfinite(frame))[0]
+            raise ValueError(
+                f"audio: channel {channel + 1}: sample {sample} is "
+                f"{frame[channel, sample]}; give numbers"
+            )
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
