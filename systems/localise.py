@@ -161,8 +161,11 @@ class Localiser:
         Returns:
             The source on the side of ``ArrayShape.ahead``, or None where nothing
             is heard, and the new memory.
+
+        Raises:
+            ValueError: The frame is no frame of this array, or not finite.
         """
-        energy = float(np.vdot(frame, frame))
+        energy = self._checked_energy(frame)
         searched = 1.0
         if memory.energy > 0.0:
             if energy <= self._loud * memory.energy:
@@ -203,6 +206,22 @@ class Localiser:
         ):
             return None, memory
         return self._fix(dry, delays, self._echo_errors(news)), memory
+
+    def _checked_energy(self, frame: NDArray[np.float32]) -> float:
+        expected = (self.plan.shape.count, self.plan.frame_samples)
+        if frame.shape != expected:
+            raise ValueError(
+                f"audio: a frame of shape {frame.shape}; give a channel for each of "
+                f"the {expected[0]} microphones, of {expected[1]} samples"
+            )
+        energy = float(np.vdot(frame, frame))
+        if not math.isfinite(energy) and not np.isfinite(frame).all():
+            channel, sample = np.argwhere(~np.isfinite(frame))[0]
+            raise ValueError(
+                f"audio: channel {channel + 1}: sample {sample} is "
+                f"{frame[channel, sample]}; give numbers"
+            )
+        return energy
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
