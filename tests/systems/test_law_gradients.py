@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
-from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
+from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from systems import (
     ActiveImpedance2017Controller,
@@ -120,7 +120,8 @@ def test_autodiff_equals_the_derivatives_by_hand(law, data, c, s):
     gains = data.draw(any_gains)
     for value, kink in zip((c, s), kinks, strict=True):
         assume(kink is None or abs(value - getattr(gains, kink)) > KINK)
-    dual = force(*InitializeAutoDiff(np.array([c, s])).ravel(), gains)
+    point: Any = np.array([c, s])
+    dual = force(*InitializeAutoDiff(point).ravel(), gains)
     assert dual.value() == pytest.approx(force(c, s, gains), rel=1e-12)
     np.testing.assert_allclose(
         dual.derivatives(), slopes(c, s, gains), rtol=1e-9, atol=1e-12
