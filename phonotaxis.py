@@ -91,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
     simulate.add_argument("--seed", metavar="N", help="seed of all random numbers")
     simulate.add_argument(
-        "--law", help="none, conventional, active, or package.module:Name"
+        "--law", help="none, conventional, active, active2017, or package.module:Name"
     )
     simulate.add_argument(
         "--velocity-term",
