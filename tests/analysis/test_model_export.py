@@ -50,5 +50,5 @@ def test_csv_files_are_exact_and_named(tmp_path):
 
 
 def test_models_of_one_name_are_refused(tmp_path):
-    with pytest.raises(ValueError, match="models: .* rename one"):
+    with pytest.raises(ValueError, match=r"models: .* rename one"):
         write_models([MODEL, MODEL], tmp_path)
