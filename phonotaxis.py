@@ -14,7 +14,7 @@ from typing import Any, NoReturn
 __all__ = ["main"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-_LAWS = "none, conventional, active"
+_LAWS = "none, conventional, active, active2017"
 
 
 class InputError(ValueError):

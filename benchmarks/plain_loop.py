@@ -145,7 +145,7 @@ class PlainLoop:
         F_b, _ = repulsion_force(
             vectors,
             before,
-            lambda c, s: active_force(c, s, scenario.repulsion),
+            lambda c, s: active_force(c, s, scenario.repulsion.active),
             scenario.repulsion.velocity_term,
             T,
         )

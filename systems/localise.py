@@ -21,8 +21,10 @@ from systems.source_fix import SourceFix
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
-# From this correlation on, a frame holds hardly anything but the direct sound.
+# From this correlation on, a frame holds hardly anything but the direct sound; and
+# where the noise was not heard alone yet, so that it may be the rest.
 _DIRECT_CORRELATION = 0.98
+_FIRST_CORRELATION = 0.9
 
 # What channels do not share is noise as long as it is below this many times what
 # is heard between the sounds; beyond, it is echoes.
@@ -185,9 +187,10 @@ class Localiser:
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
         """Whether noise alone explains what the channels do not share."""
+        known = memory.noise_energy
+        least = _DIRECT_CORRELATION if known > 0.0 else _FIRST_CORRELATION
         return (
-            delays.correlation >= _DIRECT_CORRELATION
-            or delays.noise_energy <= _NOISE_MARGIN * memory.noise_energy
+            delays.correlation >= least or delays.noise_energy <= _NOISE_MARGIN * known
         )
 
     def _echo_errors(self, news: float) -> NDArray[np.float64]:
