@@ -18,30 +18,31 @@ __all__ = ["plain"]
 def plain(value: Any) -> Any:
     """Mappings, lists, strings, numbers, truth values and null only.
 
-    A dataclass becomes a mapping of its fields, those that begin with an
-    underscore left out; a complex number becomes [re, im]; what is not finite
-    becomes null, since JSON has no word for it.
+    An object with ``to_dict`` becomes what that says, another dataclass a mapping
+    of its fields, those that begin with an underscore left out. A complex number
+    becomes [re, im]; what is not finite becomes null, since JSON has no word for
+    it.
 
     Raises:
         TypeError: There is no plain form of it.
     """
-    if value is None or isinstance(value, str | bool):
-        return value
-    if is_dataclass(value) and not isinstance(value, type):
+    if hasattr(value, "to_dict"):
+        value = value.to_dict()
+    elif is_dataclass(value) and not isinstance(value, type):
         shown = (f.name for f in fields(value) if not f.name.startswith("_"))
-        return {name: plain(getattr(value, name)) for name in shown}
+        value = {name: getattr(value, name) for name in shown}
+    elif isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
     if isinstance(value, Mapping):
         return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray | np.generic):
-        return plain(value.tolist())
     if isinstance(value, list | tuple):
         return [plain(item) for item in value]
     return _leaf(value)
 
 
 def _leaf(value: Any) -> Any:
-    if isinstance(value, int):
-        return int(value)
+    if value is None or isinstance(value, str | int):
+        return value
     if isinstance(value, float):
         return float(value) if math.isfinite(value) else None
     if isinstance(value, complex):
