@@ -7,18 +7,20 @@ updates, nor the integration of the joined system.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from pydrake.systems.analysis import DiscreteTimeApproximation, SimulatorConfig
 
+from analysis.autodiff import seed, value_and_gradient
 from analysis.ideal_loop import IdealLoop
 from analysis.linear_models import LinearModel
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["join_blocks", "sampled_blocks"]
+__all__ = ["block_model", "join_blocks", "sampled_blocks", "sampled_twin"]
 
 #: Appended to the name of a signal as it is after the updates of its tick.
 AFTER = "_after"
@@ -49,10 +51,19 @@ def sampled_blocks(
     for role, block in loop.follower.blocks.items():
         if block.num_input_ports() == 0:
             continue
-        # What a continuous block reads is held from after the tick's updates.
-        seen = after if role in continuous else state
-        values = _input_values(loop, role, seen, time_s)
-        models.append(_linearised(loop, role, values, state, time_s, held))
+        flows = role in continuous
+        model = block_model(
+            sampled_twin(loop, role) if flows else loop.block(role, twin=True),
+            state[loop.indices(role)],
+            # What a continuous block reads is held from after the tick's updates.
+            _input_values(loop, role, after if flows else state, time_s),
+            ports=block,
+            time_s=time_s,
+            held=held,
+            read_after=flows,
+        )
+        names = tuple(loop.state_names[k] for k in loop.indices(role))
+        models.append(replace(model, state_names=names))
     return tuple(models)
 
 
@@ -76,47 +87,58 @@ def _input_values(
     return [port.Eval(own).copy() for port in _ports(block, "input")]
 
 
-def _linearised(
-    loop: IdealLoop,
-    role: str,
-    values: list[NDArray[np.float64]],
+def block_model(
+    twin: Any,
     state: NDArray[np.float64],
-    time_s: float,
-    held: set[str],
+    values: Sequence[NDArray[np.float64]],
+    *,
+    ports: Any = None,
+    time_s: float = 0.0,
+    held: Collection[str] = (),
+    read_after: bool = False,
 ) -> LinearModel:
-    """One block's map over a period, by the AutoDiff twin of that block alone."""
-    ports = _ports(loop.block(role), "output")
-    continuous = _is_continuous(loop, role)
-    block = sampled_twin(loop, role) if continuous else loop.block(role, twin=True)
-    own = state[loop.indices(role)]
-    seeded = InitializeAutoDiff(np.concatenate([own, *values])).ravel()
-    context = _context(block, time_s, seeded[: len(own)])
-    start = len(own)
-    for port, value in zip(_ports(block, "input"), values, strict=True):
+    """One sampled block about an operating point, by its AutoDiff twin alone.
+
+    Args:
+        twin: The block as LeafSystem_[AutoDiffXd], with one group of discrete
+            states or none.
+        state: Its state, just before its update.
+        values: Of its input ports, in order.
+        ports: The block whose ports have the names to use, if not ``twin``.
+        time_s: The time, s.
+        held: Output ports that continuous blocks read, after the update.
+        read_after: Whether it reads such signals itself.
+    """
+    ports = ports or twin
+    count = len(state)
+    seeded = seed(np.concatenate([state, *values]))
+    context = _context(twin, time_s, seeded[:count])
+    start = count
+    for port, value in zip(_ports(twin, "input"), values, strict=True):
         port.FixValue(context, seeded[start : start + len(value)])
         start += len(value)
-    outputs = [port.Eval(context) for port in _ports(block, "output")]
-    names = [name for port in ports for name in _elements(port)]
+    outputs = [port.Eval(context) for port in _ports(twin, "output")]
+    names = [name for port in _ports(ports, "output") for name in _elements(port)]
     updated = np.empty(0)
-    if len(own):
-        changed = block.EvalUniquePeriodicDiscreteUpdate(context)
+    if count:
+        changed = twin.EvalUniquePeriodicDiscreteUpdate(context)
         updated = changed.get_vector(0).CopyToVector()
-    later = _context(block, time_s, updated)
-    for index, port in enumerate(ports):
+    later = _context(twin, time_s, updated)
+    for index, port in enumerate(_ports(ports, "output")):
         if port.get_name() in held:
-            outputs.append(block.get_output_port(index).Eval(later))
+            outputs.append(twin.get_output_port(index).Eval(later))
             names += [f"{name}{AFTER}" for name in _elements(port)]
-    suffix = AFTER if continuous else ""
-    heard = [n for port in _ports(loop.block(role), "input") for n in _elements(port)]
-    by_all = _gradient(updated, start)
-    read = _gradient(np.concatenate(outputs), start)
+    suffix = AFTER if read_after else ""
+    heard = [name for port in _ports(ports, "input") for name in _elements(port)]
+    _, by_all = value_and_gradient(updated, start)
+    _, read = value_and_gradient(np.concatenate(outputs), start)
     return LinearModel(
-        name=role,
-        A=by_all[:, : len(own)],
-        B=by_all[:, len(own) :],
-        C=read[:, : len(own)],
-        D=read[:, len(own) :],
-        state_names=tuple(loop.state_names[k] for k in loop.indices(role)),
+        name=ports.get_name(),
+        A=by_all[:, :count],
+        B=by_all[:, count:],
+        C=read[:, :count],
+        D=read[:, count:],
+        state_names=tuple(f"{ports.get_name()}.{k}" for k in range(count)),
         input_names=tuple(f"{name}{suffix}" for name in heard),
         output_names=tuple(names),
         period_s=FRAME_PERIOD_S,
@@ -147,13 +169,6 @@ def sampled_twin(loop: IdealLoop, role: str) -> Any:
 
 def _elements(port: Any) -> list[str]:
     return [f"{port.get_name()}[{k}]" for k in range(port.size())]
-
-
-def _gradient(values: Any, count: int) -> NDArray[np.float64]:
-    if len(values) == 0:
-        return np.empty((0, count))
-    gradient = ExtractGradient(values.reshape(-1, 1))
-    return gradient if gradient.shape[1] else np.zeros((len(values), count))
 
 
 def join_blocks(

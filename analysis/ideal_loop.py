@@ -15,12 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.autodiffutils import (
-    AutoDiffXd,
-    ExtractGradient,
-    ExtractValue,
-    InitializeAutoDiff,
-)
+from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.analysis import (
     ApplySimulatorConfig,
     InitializeParams,
@@ -29,6 +24,7 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 
+from analysis.autodiff import seed, value_and_gradient
 from analysis.state_names import state_names
 from diagrams import build_sound_follower
 from diagrams.scenario import Scenario
@@ -167,7 +163,7 @@ class IdealLoop:
                 "as a function law(c, s, repulsion) with pydrake.math, or as a "
                 "TemplateSystem of float and AutoDiffXd"
             )
-        self.twin = twin
+        self.twin: Any = twin
         self.state_names: tuple[str, ...] = state_names(self.follower)
         self.sampled_twins: dict[str, Any] = {}
         """Continuous blocks as maps of one period, see ``analysis.block_models``."""
@@ -237,7 +233,7 @@ class IdealLoop:
         simulator = self._simulator(ports, twin=True)
         context = simulator.get_mutable_context()
         values = [np.asarray(value, dtype=float) for value in inputs.values()]
-        seeded = InitializeAutoDiff(np.concatenate([state, *values])).ravel()
+        seeded = seed(np.concatenate([state, *values]))
         start = count = len(state)
         for group, value in zip(inputs, values, strict=True):
             for port in group:
@@ -247,9 +243,11 @@ class IdealLoop:
         context.SetTime(time_s)
         _set_state(context, seeded[:count])
         read = [self._read(context, port) for port in outputs]
-        y, by_all = _split(np.concatenate(read) if read else np.empty(0), start)
+        y, by_all = value_and_gradient(
+            np.concatenate(read) if read else np.empty(0), start
+        )
         _run(simulator, seeded[:count], time_s, 1)
-        after, jacobian = _split(_get_state(context), start)
+        after, jacobian = value_and_gradient(_get_state(context), start)
         return PeriodDerivatives(
             next_state=after,
             A=jacobian[:, :count],
@@ -369,14 +367,3 @@ def _get_state(context: Any) -> Any:
     ]
     continuous = context.get_continuous_state_vector().CopyToVector()
     return np.concatenate([continuous, *groups])
-
-
-def _split(values: Any, count: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values and their gradients, (k,) and (k, count)."""
-    if len(values) == 0:
-        return np.empty(0), np.empty((0, count))
-    column = values.reshape(-1, 1)
-    gradient = ExtractGradient(column)
-    if gradient.shape[1] == 0:
-        gradient = np.zeros((len(values), count))
-    return ExtractValue(column).ravel(), gradient

@@ -61,7 +61,7 @@ def test_settled_state_rests_where_no_force_acts():
 
 
 def test_derivatives_are_those_of_finite_differences():
-    loop = rest("active")
+    loop = rest("active", tracker={"hold": "world"})
     state, time_s = loop.settled_state((0.5, 0.1, 0.2))
     port = (("tracker", "p_PS_B"),)
     value = [1.3, -0.2]
