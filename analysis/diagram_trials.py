@@ -181,7 +181,7 @@ def _run(
 def _mechanism(
     scenario: Scenario, pose: NDArray[np.float64], collision: Collision
 ) -> str:
-    """Where the contact lies as seen from P: in the cones' fan, beside, behind."""
+    """Where the contact lies: in the cones' fan before P, beside it, or behind."""
     body = scenario.bodies()[collision.object].rectangle(collision.time)
     point = touching_point(robot_rectangle(pose, scenario.robot), body)
     p_WP = control_point(pose, scenario.robot.control_point_m)
@@ -190,4 +190,6 @@ def _mechanism(
     fan += scenario.ultrasonic.beam_half_angle_deg
     if abs(math.degrees(math.atan2(y, x))) <= fan:
         return "ahead"
-    return "beside" if x > -0.5 * scenario.robot.length_m else "behind"
+    x_B = x + scenario.robot.control_point_m
+    at_an_end = abs(y) / scenario.robot.width_m >= -x_B / scenario.robot.length_m
+    return "beside" if at_an_end else "behind"
