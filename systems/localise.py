@@ -46,6 +46,24 @@ _ECHO_ERROR_S = 1.2e-6
 _ECHO_ERROR_RAD = 2e-3
 _ECHO_NEWS = 0.12
 
+# An echo shifts a peak by one over the square of the band, since it comes and goes
+# with frequency: the errors are those of this root mean square frequency, rad/s,
+# and above it.
+_ECHO_BAND = 2.0 * math.pi * 4.5e3
+
+# In the first frame of a sound it may not have reached all channels: noise alone
+# would seem to be heard there with more than this probability.
+_SHARED_CHANCE = 1e-3
+
+# A sound begins within a frame whose energy is spread over less than this share
+# of it.
+_WHOLE_FRAME = 0.8
+_FRAME_PARTS = 10
+
+# By how much a frame may surpass the known noise, to be averaged into it: sound
+# that reverberates too much to be heard is no noise.
+_NOISE_RISE = 1.5
+
 
 class TDOAParameters(Parameters):
     """How delays are measured, and when they are believed."""
@@ -91,6 +109,8 @@ class HearingMemory(NamedTuple):
     squared; 0 until such a frame was heard."""
     echoes: NDArray[np.float32]
     """(n, bins) see ``systems.precedence``."""
+    heard: bool
+    """Whether it held a sound."""
 
 
 class Localiser:
@@ -125,7 +145,7 @@ class Localiser:
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
-        return HearingMemory(0.0, self._sizes.silent())
+        return HearingMemory(0.0, self._sizes.silent(), False)
 
     def localise(
         self, frame: NDArray[np.float32], memory: HearingMemory
@@ -151,21 +171,29 @@ class Localiser:
         search = seen[0]
         if search.chance > self.parameters.false_alarm_rate:
             return None, self._after_noise(memory, search.energy)
-        if not self.parameters.suppress_echoes:
-            return self._fix(frame, self._delays(frame, seen)), memory
+        first, memory = not memory.heard, memory._replace(heard=True)
+        if first and search.weakest > _SHARED_CHANCE:
+            return None, memory
+        begins = first and _spread(frame) < _WHOLE_FRAME
         delays = self._delays(frame, seen)
-        if delays is not None and self._is_direct(delays, memory):
+        if not self.parameters.suppress_echoes:
+            return self._fix(frame, delays), memory
+        direct = delays is not None and self._is_direct(delays, memory)
+        if direct and not begins:
             return self._fix(frame, delays), memory
         dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
         memory = memory._replace(echoes=echoes)
-        delays = self._delays(dry)
+        if direct:
+            news = 1.0
+        else:
+            frame, delays = dry, self._delays(dry)
         if (
             delays is None
             or delays.correlation < _ECHO_CORRELATION
             or delays.ambiguity > _ECHO_AMBIGUITY
         ):
             return None, memory
-        return self._fix(dry, delays, self._echo_errors(news)), memory
+        return self._fix(frame, delays, self._echo_errors(news, delays)), memory
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
@@ -182,8 +210,9 @@ class Localiser:
         if echoes.any():
             echoes = self._sizes.faded(echoes, self.plan.frame_samples)
         if known > 0.0:
+            energy = min(energy, _NOISE_RISE * known)
             energy = known + (energy - known) / _NOISE_FRAMES
-        return HearingMemory(energy, echoes)
+        return HearingMemory(energy, echoes, False)
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
         """Whether noise alone explains what the channels do not share."""
@@ -193,12 +222,13 @@ class Localiser:
             delays.correlation >= least or delays.noise_energy <= _NOISE_MARGIN * known
         )
 
-    def _echo_errors(self, news: float) -> NDArray[np.float64]:
+    def _echo_errors(self, news: float, delays: DelayEstimate) -> NDArray[np.float64]:
         """(n - 1, n - 1) covariance of delays, for a share of news, s^2."""
+        narrow = max(1.0, _ECHO_BAND / delays.angular_frequency) ** 2
         places = self.plan.shape.p_AM
         turns = (places[1:] - places[0]) * (_ECHO_ERROR_RAD / self.plan.c)
         single = _ECHO_ERROR_S**2 * (np.eye(len(turns)) + 1.0)
-        return (single + turns @ turns.T) * max(1.0, _ECHO_NEWS / news) ** 2
+        return (single + turns @ turns.T) * (narrow * max(1.0, _ECHO_NEWS / news)) ** 2
 
     def _fix(
         self,
@@ -237,3 +267,10 @@ class Localiser:
         if fix.range_std > parameters.maximum_relative_range_std * fix.range:
             return fix.without_range()
         return fix
+
+
+def _spread(frame: NDArray[np.float32]) -> float:
+    """Share of a frame that its energy is spread over, at most 1."""
+    parts = np.array_split(frame, _FRAME_PARTS, axis=1)
+    energy = np.array([float(np.vdot(part, part)) for part in parts])
+    return float(energy.sum() ** 2 / (_FRAME_PARTS * (energy**2).sum()))
