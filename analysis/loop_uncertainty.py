@@ -34,12 +34,21 @@ def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    """The box of parameters of the loop that rests against an obstacle."""
+    """The box of parameters of the loop that rests against an obstacle.
+
+    Raises:
+        ValueError: The law has no spring to obstacles.
+    """
     stiffness = law_stiffness(scenario)
+    if stiffness <= 0.0:
+        raise ValueError(
+            f"law: {scenario.law!r} does not push harder as an obstacle comes nearer, "
+            "so that it has no contact mode; choose another law"
+        )
     law = _share(
         "law_stiffness_n_m", "K_law", "N/m", stiffness, 0.1, "largest slope -df/dc"
     )
-    return (*_common(scenario), law) if stiffness > 0.0 else _common(scenario)
+    return (*_common(scenario), law)
 
 
 def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:

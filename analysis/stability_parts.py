@@ -15,4 +15,4 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return (*robustness_parts(),)
+    return (*certificate_parts(full=full), *robustness_parts())
