@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from analysis.certificate_parts import certificate_parts
 from analysis.robustness_parts import robustness_parts
 from analysis.stability import Part
 
@@ -15,4 +14,4 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return (*certificate_parts(full=full), *robustness_parts())
+    return (*robustness_parts(),)
