@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from typing import Any
 
 import pytest
 
@@ -49,7 +48,7 @@ def test_facts_of_groups_stand_under_their_group():
 
 
 def test_rows_of_mappings():
-    rows: list[dict[str, Any]] = [
+    rows: list[dict[str, object]] = [
         {"speed_m_s": 0.3, "kind": "sink"},
         {"speed_m_s": None, "kind": "saddle"},
     ]
