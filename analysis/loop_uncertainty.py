@@ -10,14 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.contact_mode import contact_matrix
+from analysis.equilibria import nearest_equilibrium
+from analysis.force_field import ForceField
+from analysis.ideal_loop import ideal_loop
+from analysis.operating_points import OperatingPoint, resting_equilibrium
 from analysis.radial_law import DISTANCE_STEP_M, radial_law
 from analysis.robustness import PoleFunction, UncertainParameter
 from diagrams import Scenario
 from diagrams.loading import scenario_from_mapping
+from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
     "contact_poles",
     "contact_uncertainty",
+    "following_poles",
     "following_uncertainty",
     "law_stiffness",
     "range_slope",
@@ -30,7 +36,8 @@ _TEMPERATURES_C = (5.0, 35.0)
 
 def following_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     """The box of parameters of the loop that follows the source."""
-    return (*_common(scenario), _sound_speed(scenario))
+    common = (p for p in _common(scenario) if p.name != "extra_ticks")
+    return (*common, _sound_speed(scenario))
 
 
 def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
@@ -177,5 +184,30 @@ def contact_poles(scenario: Scenario) -> PoleFunction:
             changed, stiffness, latency_ticks=round(values["extra_ticks"])
         )
         return np.linalg.eigvals(matrix).astype(np.complex128)
+
+    return poles
+
+
+def following_poles(at: OperatingPoint) -> PoleFunction:
+    """Poles of P's motion about an equilibrium, as it moves with the parameters.
+
+    Those that are neutral are left out. A latency of hearing is no parameter
+    here: odometry places what is heard, so that it delays the source's motion
+    and not the loop's own.
+
+    Args:
+        at: The equilibrium at the nominal values.
+    """
+
+    def poles(values: Mapping[str, float]) -> NDArray[np.complex128]:
+        loop = ideal_loop(with_values(at.loop.scenario, values))
+        place = nearest_equilibrium(ForceField(loop), at.p_WP)
+        if place is None:
+            raise ValueError(
+                f"attraction: with {dict(values)} the equilibrium at ({at.p_WP[0]:.3f},"
+                f" {at.p_WP[1]:.3f}) m is gone; narrow the box"
+            )
+        moved = resting_equilibrium(loop, place)
+        return np.asarray(np.exp(moved.eigenvalues * FRAME_PERIOD_S))
 
     return poles

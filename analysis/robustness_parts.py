@@ -6,7 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from analysis.html_page import Cell, figure_html, paragraph, table
-from analysis.loop_uncertainty import contact_poles, contact_uncertainty
+from analysis.loop_uncertainty import (
+    contact_poles,
+    contact_uncertainty,
+    following_poles,
+    following_uncertainty,
+)
 from analysis.robustness import (
     PoleCloud,
     PoleFunction,
@@ -24,8 +29,8 @@ from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
 
-#: Random points of the box.
-SAMPLES = 200
+#: Random points of the box, in a short and in a full report.
+_SAMPLES = (25, 200)
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ def loop_robustness(
     poles: PoleFunction,
     parameters: tuple[UncertainParameter, ...],
     *,
-    samples: int = SAMPLES,
+    samples: int,
 ) -> LoopRobustness:
     """Pole cloud, worst case and sensitivities of a loop of 25 ms periods."""
     return LoopRobustness(
@@ -80,22 +85,43 @@ def loop_robustness(
     )
 
 
-def robustness_parts() -> tuple[Part, ...]:
-    """Robustness of the contact mode."""
+def robustness_parts(*, full: bool) -> tuple[Part, ...]:
+    """Robustness about the operating point, and before an obstacle."""
+    samples = _SAMPLES[full]
     return (
         Part(
+            "robustness",
+            "Robustness at the operating point",
+            lambda study: _following(study, samples),
+            _render,
+            fresh=True,
+        ),
+        Part(
             "contact_robustness",
-            "Robustness of the contact mode",
-            _contact,
+            "Robustness before an obstacle",
+            lambda study: _contact(study, samples),
             _render,
         ),
     )
 
 
-def _contact(study: Study) -> LoopRobustness:
+def _following(study: Study, samples: int) -> LoopRobustness:
+    at = study.found["equilibria"].at
+    return loop_robustness(
+        study.scenario,
+        following_poles(at),
+        following_uncertainty(study.scenario),
+        samples=samples,
+    )
+
+
+def _contact(study: Study, samples: int) -> LoopRobustness:
     scenario = study.scenario
     return loop_robustness(
-        scenario, contact_poles(scenario), contact_uncertainty(scenario)
+        scenario,
+        contact_poles(scenario),
+        contact_uncertainty(scenario),
+        samples=4 * samples,
     )
 
 

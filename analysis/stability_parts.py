@@ -15,4 +15,4 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return (*linear_parts(), *robustness_parts())
+    return (*linear_parts(), *robustness_parts(full=full))

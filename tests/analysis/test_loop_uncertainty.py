@@ -10,9 +10,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.contact_mode import contact_spectral_radius
+from analysis.equilibria import follow_equilibrium
 from analysis.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
+    following_poles,
     following_uncertainty,
     law_stiffness,
     range_slope,
@@ -104,3 +106,16 @@ def test_box_of_the_following_loop_has_the_speed_of_sound():
 def test_a_law_without_a_spring_has_no_contact_mode():
     with pytest.raises(ValueError, match=r"law: 'none' .* choose another law"):
         contact_uncertainty(scenario("none"))
+
+
+def test_following_poles_move_with_their_equilibrium():
+    # The master robot's push moves the equilibrium when K_r changes; the poles are
+    # those that the whole search finds in the changed scenario.
+    base = scenario("active", "obstacles=[]", "source.waypoints_m=[[2, 0]]")
+    at = follow_equilibrium(base)
+    values = {"attraction.stiffness_n_m": 2.2, "plant.motor_lag_s": 0.07}
+    moved = follow_equilibrium(with_values(base, values))
+    assert np.linalg.norm(moved.p_WP - at.p_WP) > 1e-3
+    expected = np.exp(moved.eigenvalues * 0.025)
+    found = following_poles(at)(values)
+    np.testing.assert_allclose(np.sort(abs(found)), np.sort(abs(expected)), rtol=1e-6)
