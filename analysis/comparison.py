@@ -37,6 +37,8 @@ __all__ = [
     "compare_runs",
 ]
 
+ExampleKind = Literal["worst", "typical", "best"]
+EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
 #: Causes of a run that did what it should.
 SUCCESSFUL = ("reached", "completed")
 #: Figures that any run has, however it ended.
@@ -89,7 +91,7 @@ class Median:
 class ExampleRun:
     """A run to look at."""
 
-    kind: Literal["worst", "typical", "best"]
+    kind: ExampleKind
     """Its place among the cell's runs, ordered by success, then by clearance."""
     index: int
     """Its number in the sweep."""
@@ -223,14 +225,16 @@ def _examples(
 ) -> tuple[ExampleRun, ...]:
     """First, middle and last of the runs by success, then by clearance."""
     clearance = _column(rows, "minimum_clearance_m")
+    order = np.lexsort((clearance, success))
     # A run that raised an error has no clearance, and nothing to look at.
-    order = np.lexsort((clearance, success))[: np.count_nonzero(np.isfinite(clearance))]
+    order = order[np.isfinite(clearance[order])]
     if len(order) == 0:
         return ()
-    places = {"worst": 0, "typical": len(order) // 2, "best": -1}
     return tuple(
-        ExampleRun(kind, int(rows["index"].iloc[k]), str(rows["cause"].iloc[k]))  # type: ignore[arg-type]
-        for kind, k in ((kind, order[place]) for kind, place in places.items())
+        ExampleRun(kind, int(rows["index"].iloc[k]), str(rows["cause"].iloc[k]))
+        for kind, k in zip(
+            EXAMPLES, (order[0], order[len(order) // 2], order[-1]), strict=True
+        )
     )
 
 
