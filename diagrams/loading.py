@@ -195,7 +195,7 @@ def _index(node: list[Any], part: str, key: str) -> int:
     )
 
 
-def explain(error: ValidationError, model: type[BaseModel], kind: str) -> ScenarioError:
+def explain(error: ValidationError, model: type[BaseModel], what: str) -> ScenarioError:
     """The first complaint, as field, value and remedy on one line.
 
     Args:
