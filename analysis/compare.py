@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import shutil
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+from pydantic import ValidationError
 
 import diagrams
 from analysis.comparison import Comparison, compare_runs
@@ -14,7 +18,7 @@ from analysis.sweep import PreparedSweep, prepare_sweep
 from analysis.sweep_plan import SweepPlan, load_sweep
 from diagrams import ScenarioError, load_scenario
 from diagrams.laws import LAWS
-from diagrams.loading import read_mapping
+from diagrams.loading import explain, read_mapping
 
 __all__ = [
     "EXPERIMENTS",
@@ -58,10 +62,13 @@ class PreparedComparison:
             progress: Called a few times a second with the number of runs done.
         """
         comparisons, before = {}, 0
+
+        def report(before: int, done: int) -> None:
+            if progress is not None:
+                progress(before + done)
+
         for name, sweep in self.sweeps.items():
-            table = sweep.run(
-                progress and (lambda done, before=before: progress(before + done))
-            )
+            table = sweep.run(partial(report, before))
             comparisons[name] = compare_runs(sweep.plan, table, name)
             before += len(sweep.points)
         return comparisons
@@ -79,7 +86,7 @@ def comparison_plan(
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
-    grid: dict[str, Sequence[Any]] | None = None,
+    grid: Mapping[str, Sequence[Any]] | None = None,
 ) -> SweepPlan:
     """The paired sweep that compares laws on one experiment's layouts.
 
@@ -97,15 +104,54 @@ def comparison_plan(
         ScenarioError: Something of that is unknown or no good; names the field.
     """
     plan = _layouts(scenario)
-    data = plan.model_dump() | {
-        "folder": plan.folder,
+    fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
+    fields |= {
         "set": plan.set | (settings or {}),
         "grid": {"law": tuple(laws), **{k: tuple(v) for k, v in (grid or {}).items()}},
         "runs": runs,
         "seed": seed,
         "pair": True,
     }
-    return _validated(data)
+    try:
+        return SweepPlan.model_validate(fields)
+    except ValidationError as error:
+        raise explain(error, SweepPlan, "a comparison") from None
+
+
+def prepare_comparison(
+    plans: dict[str, SweepPlan],
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    resume: bool = False,
+) -> PreparedComparison:
+    """Draws and checks all layouts, and opens the directories of the runs.
+
+    Args:
+        plans: By name of the scenario; see ``comparison_plan``.
+        out: The directory; none: the next number under results/.
+        workers: Number of processes; none: one a core.
+        resume: Whether ``out`` may hold runs of the same comparison.
+
+    Raises:
+        ValueError: Something of that is no good; says what, and the remedy.
+    """
+    if resume and out is None:
+        raise ValueError("out: --resume needs the directory to go on with; name it")
+    directory = Path(out) if resume and out is not None else choose_directory(out)
+    fresh, sweeps = not directory.exists(), {}
+    try:
+        for name, plan in plans.items():
+            sweeps[name] = prepare_sweep(
+                plan, directory / name, workers=workers, resume=resume
+            )
+    except BaseException:
+        for sweep in sweeps.values():
+            sweep.store.close()
+        if fresh:
+            shutil.rmtree(directory, ignore_errors=True)
+        raise
+    return PreparedComparison(directory, sweeps)
 
 
 def _layouts(scenario: str) -> SweepPlan:

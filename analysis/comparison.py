@@ -108,7 +108,7 @@ class Cell:
     """Further fields of the grid, with their values."""
     runs: int
     causes: dict[str, int]
-    """How many runs ended so; collisions parted by fault."""
+    """How many runs ended so; collisions with whose fault it was in brackets."""
     success: Estimate
     collision: Estimate
     spl: Estimate | None
@@ -174,9 +174,7 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
     return Comparison(cells, pairs)
 
 
-def _cell(
-    scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int
-) -> Cell:
+def _cell(scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int) -> Cell:
     others = {key: value for key, value in fields.items() if key != "law"}
     success, collision = _success(rows), _collision(rows)
     spl = _column(rows, "spl")
@@ -220,9 +218,7 @@ def _compare(
     return rates, {name: m for name, m in medians.items() if m.pairs}
 
 
-def _examples(
-    rows: pd.DataFrame, success: NDArray[np.bool_]
-) -> tuple[ExampleRun, ...]:
+def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:
     """First, middle and last of the runs by success, then by clearance."""
     clearance = _column(rows, "minimum_clearance_m")
     order = np.lexsort((clearance, success))
@@ -249,7 +245,7 @@ def _collision(rows: pd.DataFrame) -> NDArray[np.bool_]:
 def _causes(rows: pd.DataFrame) -> dict[str, int]:
     fault = rows["collision_fault"]
     names = rows["cause"].where(
-        rows["cause"] != "collision", "collision, fault of " + fault.astype(str)
+        rows["cause"] != "collision", "collision (" + fault.astype(str) + ")"
     )
     counts = names.value_counts()
     return {str(name): int(count) for name, count in sorted(counts.items())}

@@ -107,8 +107,6 @@ def paired_median(
     )
 
 
-def _differences(
-    a: NDArray[np.float64], b: NDArray[np.float64]
-) -> NDArray[np.float64]:
+def _differences(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
     both = np.isfinite(a) & np.isfinite(b)
     return a[both] - b[both]
