@@ -166,7 +166,7 @@ def test_noise_between_sounds_becomes_the_memory():
 
 def test_a_sound_leaves_the_level_of_the_noise_alone():
     localiser = listener()
-    before = HearingMemory(123.0, localiser.blank().echoes)
+    before = HearingMemory(456.0, 123.0, localiser.blank().echoes)
     fix, after = localiser.localise(heard(ROW, [polar(10.0, 1.0)]), before)
     assert fix is not None
     assert after.noise_energy == 123.0
