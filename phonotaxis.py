@@ -135,6 +135,53 @@ def _parser() -> argparse.ArgumentParser:
     )
     localization.set_defaults(run=_localization)
 
+    compare = commands.add_parser(
+        "compare", help="laws side by side on the same random layouts"
+    )
+    compare.add_argument(
+        "scenario",
+        nargs="*",
+        help="library name, YAML file of layouts, or YAML file of a scenario "
+        "(default: the papers' four experiments)",
+    )
+    compare.add_argument(
+        "--laws", metavar="LAW,...", help="laws to compare (default: all of ours)"
+    )
+    compare.add_argument(
+        "--velocity-term",
+        metavar="TERM,...",
+        help="printed, closing, or both (default: the scenario's)",
+    )
+    compare.add_argument(
+        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+    )
+    compare.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
+    compare.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as hearing=ideal; may be repeated",
+    )
+    compare.add_argument(
+        "--grid",
+        metavar="KEY=[VALUE,...]",
+        action="append",
+        default=[],
+        help="compare values of a further field, as hearing=[audio,ideal]",
+    )
+    compare.add_argument(
+        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+    )
+    compare.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    compare.add_argument(
+        "--resume", action="store_true", help="go on with the runs in --out"
+    )
+    compare.add_argument("--json", action="store_true", help="print one JSON document")
+    compare.set_defaults(run=_compare)
+
     stability = commands.add_parser(
         "stability", help="stability of a scenario's loop: report, models, numbers"
     )
@@ -398,6 +445,49 @@ def _stability(options: argparse.Namespace) -> None:
     else:
         print(stability_text(document))
         print(f"\nreport in {out / 'report.html'}")
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from analysis.compare import prepare_comparison
+    from analysis.compare_options import comparison_plans
+    from analysis.compare_report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+
+    try:
+        plans = comparison_plans(
+            options.scenario,
+            laws=options.laws,
+            velocity_terms=options.velocity_term,
+            runs=options.runs,
+            seed=options.seed,
+            settings=options.set,
+            grid=options.grid,
+        )
+        prepared = prepare_comparison(
+            plans, options.out, workers=options.workers, resume=options.resume
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    try:
+        with _Progress(prepared.runs, "runs") as progress:
+            comparisons = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons)
+        write_comparison(prepared, comparisons, summary)
+    except RuntimeError as error:
+        raise RunError(str(error)) from error
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
+            "--resume"
+        ) from None
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(compare_text(summary, comparisons))
+        print(f"\nresults in {prepared.out}")
 
 
 if __name__ == "__main__":
