@@ -11,6 +11,7 @@ from typing import Any
 from diagrams.loading import ScenarioError
 from diagrams.scenario import Scenario
 from systems import (
+    ActiveImpedance2017Controller,
     ActiveImpedanceController,
     ConventionalImpedanceController,
     RadialLawController,
@@ -18,8 +19,14 @@ from systems import (
 
 __all__ = ["LAWS", "make_controller"]
 
+_CONTROLLERS = {
+    "none": RadialLawController,
+    "conventional": ConventionalImpedanceController,
+    "active": ActiveImpedanceController,
+    "active2017": ActiveImpedance2017Controller,
+}
 #: The laws that come with the package.
-LAWS = ("none", "conventional", "active")
+LAWS = tuple(_CONTROLLERS)
 
 
 def make_controller(scenario: Scenario) -> Any:
@@ -38,12 +45,8 @@ def make_controller(scenario: Scenario) -> Any:
         "attraction": scenario.attraction,
         "repulsion": scenario.repulsion,
     }
-    if scenario.law == "none":
-        return RadialLawController(**parts)
-    if scenario.law == "conventional":
-        return ConventionalImpedanceController(**parts)
-    if scenario.law == "active":
-        return ActiveImpedanceController(**parts)
+    if scenario.law in _CONTROLLERS:
+        return _CONTROLLERS[scenario.law](**parts)
     law = _import_law(scenario.law)
     if inspect.isfunction(law):
         return RadialLawController(**parts, law=law)

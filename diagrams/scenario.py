@@ -19,12 +19,13 @@ from systems.collision_vector import CollisionVectorParameters
 from systems.diff_drive_plant import PlantParameters
 from systems.geometry import rectangle_clearance, rotate
 from systems.ideal_source_sensor import IdealHearingParameters
-from systems.impedance import AttractionParameters, RepulsionParameters
+from systems.impedance import AttractionParameters
 from systems.interferers import InterfererParameters
 from systems.mic_array import microphones_B
 from systems.obstacles import ObstacleParameters
 from systems.parameters import NonNegative, Parameters, Point, Positive
 from systems.paths import WaypointPath
+from systems.repulsion import RepulsionParameters
 from systems.robot import RobotParameters
 from systems.room import RoomParameters
 from systems.source_robot import SourceRobotParameters
@@ -90,6 +91,11 @@ class Body(NamedTuple):
         """(5,) x, y, theta, length, width in W at a time in s."""
         return np.array([*self.path.pose(time), *self.size])
 
+    def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 5) rectangles at many times at once."""
+        poses = self.path.poses(times)
+        return np.hstack([poses, np.tile(np.array(self.size), (len(poses), 1))])
+
 
 class Scenario(Parameters):
     """One run. Every field has a default: the default scenario is complete."""
@@ -105,7 +111,8 @@ class Scenario(Parameters):
     arena_m: Annotated[tuple[Positive, Positive], Strict(False)] = (7.0, 7.0)
     """Extents of the floor in pictures, m; it has no walls."""
     law: str = Field(default="active", min_length=1)
-    """``none``, ``conventional``, ``active``, or ``package.module:Name``."""
+    """``none``, ``conventional``, ``active`` (2019), ``active2017``, or
+    ``package.module:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """Sound waves and microphones, or exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"

@@ -4,6 +4,10 @@ Templated blocks (float, AutoDiffXd) also have a name that ends in an
 underscore, as in Drake: ``DiffDrivePlant`` is ``DiffDrivePlant_[float]``.
 """
 
+from systems.active_impedance_2017_controller import (
+    ActiveImpedance2017Controller,
+    ActiveImpedance2017Controller_,
+)
 from systems.active_impedance_controller import (
     ActiveImpedanceController,
     ActiveImpedanceController_,
@@ -28,6 +32,8 @@ from systems.wheel_odometry import WheelOdometry, WheelOdometry_
 from systems.wheel_speed_command import WheelSpeedCommand, WheelSpeedCommand_
 
 __all__ = [
+    "ActiveImpedance2017Controller",
+    "ActiveImpedance2017Controller_",
     "ActiveImpedanceController",
     "ActiveImpedanceController_",
     "CollisionVector",

@@ -7,7 +7,8 @@ from pydrake.math import exp
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from systems.impedance import ImpedanceLoop, RepulsionParameters
+from systems.impedance import ImpedanceLoop
+from systems.repulsion import ActiveParameters
 
 __all__ = [
     "ActiveImpedanceController",
@@ -16,13 +17,13 @@ __all__ = [
 ]
 
 
-def active_force(c, s, repulsion: RepulsionParameters):
+def active_force(c, s, gains: ActiveParameters):
     """k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s) (Han 2019, eq. 20).
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
         s: Its speed, m/s; from mu_0 on the second term is 0 (table 4).
-        repulsion: k_ref, d_ref, mu_0, and K_0, D_0, rho_0 through alpha, beta.
+        gains: k_ref, d_ref, mu_0, and K_0, D_0, rho_0 through alpha, beta.
 
     Returns:
         Force away from the obstacle, N. The first term is bounded, largest at
@@ -30,11 +31,11 @@ def active_force(c, s, repulsion: RepulsionParameters):
         any distance. Eq. 19-b multiplies K_0(c) by (rho_0 - c) once more; eq.
         20 and table 4 are the consistent reading.
     """
-    spring = repulsion.reference_stiffness_n_m * exp(-c / repulsion.alpha_m) * c
-    if s >= repulsion.speed_limit_m_s:
+    spring = gains.reference_stiffness_n_m * exp(-c / gains.alpha_m) * c
+    if s >= gains.speed_limit_m_s:
         return spring
-    damper = repulsion.reference_damping_n_s_m * exp(s / repulsion.beta_m_s)
-    return spring + damper * (repulsion.speed_limit_m_s - s)
+    damper = gains.reference_damping_n_s_m * exp(s / gains.beta_m_s)
+    return spring + damper * (gains.speed_limit_m_s - s)
 
 
 @TemplateSystem.define("ActiveImpedanceController_", T_list=[float, AutoDiffXd])
@@ -63,7 +64,7 @@ def ActiveImpedanceController_(T):
         Args:
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``; uses all.
+            repulsion: ``RepulsionParameters``; uses ``active``.
 
         Reference: Han 2019, eq. 18 (F_m), 20-22 and table 4.
         """
@@ -85,7 +86,7 @@ def ActiveImpedanceController_(T):
             )
 
         def _radial_force(self, c, s):
-            return active_force(c, s, self._repulsion)
+            return active_force(c, s, self._repulsion.active)
 
     return Impl
 

@@ -6,7 +6,8 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from systems.impedance import ImpedanceLoop, RepulsionParameters
+from systems.impedance import ImpedanceLoop
+from systems.repulsion import ConventionalParameters
 
 __all__ = [
     "ConventionalImpedanceController",
@@ -15,22 +16,19 @@ __all__ = [
 ]
 
 
-def conventional_force(c, s, repulsion: RepulsionParameters):
+def conventional_force(c, s, gains: ConventionalParameters):
     """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
 
     Args:
         c: Distance of the obstacle, m; float or AutoDiffXd.
         s: Its speed, m/s.
-        repulsion: K_0, D_0, rho_0.
+        gains: K_0, D_0, rho_0.
 
     Returns:
         Force away from the obstacle, N. It steps by D_0 s at rho_0.
     """
-    if c < repulsion.reach_m:
-        return (
-            repulsion.stiffness_n_m * (repulsion.reach_m - c)
-            + repulsion.damping_n_s_m * s
-        )
+    if c < gains.reach_m:
+        return gains.stiffness_n_m * (gains.reach_m - c) + gains.damping_n_s_m * s
     return 0.0 * c
 
 
@@ -60,7 +58,7 @@ def ConventionalImpedanceController_(T):
         Args:
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``; uses K_0, D_0 and rho_0.
+            repulsion: ``RepulsionParameters``; uses ``conventional``.
 
         Reference: Han 2019, eq. 18 (F_m) and 19-a.
         """
@@ -82,7 +80,7 @@ def ConventionalImpedanceController_(T):
             )
 
         def _radial_force(self, c, s):
-            return conventional_force(c, s, self._repulsion)
+            return conventional_force(c, s, self._repulsion.conventional)
 
     return Impl
 

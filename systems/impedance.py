@@ -8,29 +8,21 @@ that grow with distance; eq. 19 replaces them. See docs/errata.md.
 
 from __future__ import annotations
 
-from typing import Literal
-
-from pydantic import model_validator
-from pydrake.math import log
-
 from systems.cache import declare_cache
 from systems.collision_vector import SLOTS
 from systems.geometry import control_point, rotate, safe_norm
 from systems.parameters import NonNegative, Parameters, Positive
+from systems.repulsion import RepulsionParameters, VelocityTerm
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
     "AttractionParameters",
     "ImpedanceLoop",
-    "RepulsionParameters",
     "attraction_force",
-    "matched_decay",
     "obstacle_speed",
     "repulsion_force",
 ]
-
-VelocityTerm = Literal["printed", "closing"]
 
 
 class AttractionParameters(Parameters):
@@ -45,62 +37,6 @@ class AttractionParameters(Parameters):
     0 is as printed: P is pulled onto the source itself."""
     brake_time_s: Positive = 0.5
     """Time constant of the stop when there is no target, s; ours."""
-
-
-class RepulsionParameters(Parameters):
-    """The springs and dampers to obstacles (Han 2019, eq. 19-22, table 4).
-
-    K_0, k_ref, D_0 and d_ref are not printed; these defaults are ours and
-    provisional, see docs/model.md.
-    """
-
-    stiffness_n_m: Positive = 16.0
-    """K_0 of the conventional law, N/m."""
-    damping_n_s_m: Positive = 0.8
-    """D_0 of the conventional law, N s/m."""
-    reach_m: Positive = 0.8
-    """rho_0: the conventional law acts below this distance, m (Han 2019, 5.2)."""
-    reference_stiffness_n_m: Positive = 64.0
-    """k_ref of the active law, N/m, above K_0."""
-    reference_damping_n_s_m: Positive = 0.2
-    """d_ref of the active law, N s/m, below D_0."""
-    speed_limit_m_s: Positive = 0.72
-    """mu_0: the active velocity term acts below this speed, m/s (5.3)."""
-    velocity_term: VelocityTerm = "printed"
-    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
-
-    @model_validator(mode="after")
-    def _check(self) -> RepulsionParameters:
-        if self.reference_stiffness_n_m <= self.stiffness_n_m:
-            raise ValueError(
-                f"reference_stiffness_n_m: {self.reference_stiffness_n_m} (k_ref) is "
-                f"not above stiffness_n_m {self.stiffness_n_m} (K_0), and alpha = "
-                "rho_0 / (2 ln(k_ref/K_0)) must be positive; raise it"
-            )
-        if self.reference_damping_n_s_m >= self.damping_n_s_m:
-            raise ValueError(
-                f"reference_damping_n_s_m: {self.reference_damping_n_s_m} (d_ref) is "
-                f"not below damping_n_s_m {self.damping_n_s_m} (D_0), and beta = "
-                "mu_0 / (2 ln(D_0/d_ref)) must be positive; lower it"
-            )
-        return self
-
-    @property
-    def alpha_m(self) -> float:
-        """Decay length of the active spring, m (Han 2019, eq. 21)."""
-        ratio = self.reference_stiffness_n_m / self.stiffness_n_m
-        return matched_decay(self.reach_m, ratio)
-
-    @property
-    def beta_m_s(self) -> float:
-        """Growth speed of the active damper, m/s (eq. 22, misprinted)."""
-        ratio = self.damping_n_s_m / self.reference_damping_n_s_m
-        return matched_decay(self.speed_limit_m_s, ratio)
-
-
-def matched_decay(limit: float, ratio: float) -> float:
-    """limit / (2 ln ratio): both laws are equal at half the limit."""
-    return limit / (2.0 * log(ratio))
 
 
 def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):

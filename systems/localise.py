@@ -8,16 +8,20 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
+from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
-from systems.coherent import refine_source
+from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
+from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
+from systems.echo_errors import echo_errors, energy_spread
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
+from systems.steered_response import NEAREST_M
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
@@ -33,23 +37,19 @@ _NOISE_MARGIN = 3.0
 # Frames over which the level of the noise is averaged.
 _NOISE_FRAMES = 8.0
 
+# A knock, or a sound that reverberates too much to be heard, may raise that level no
+# more than a noise of so many times it.
+_LOUDEST_NOISE = 1.5
+
+# Share of frames of steady white noise that are loud enough to be searched for a
+# sound; frames that are no louder than the noise are not. A sound 15 dB below it
+# would still be searched for, while none is found below 12 dB.
+_SEARCHED_SHARE = 0.1
+
 # Frames whose echoes were suppressed are believed from this correlation on, and up
 # to this ambiguity.
 _ECHO_CORRELATION = 0.4
 _ECHO_AMBIGUITY = 0.7
-
-# Echoes that slip through, those off the floor above all, shift each arrival by
-# itself (standard deviation, s) and the whole direction (rad). The less of a
-# frame is news, the more: from this share on they count fully. All from the
-# trials in rooms, docs/localization.md.
-_ECHO_ERROR_S = 1.2e-6
-_ECHO_ERROR_RAD = 2e-3
-_ECHO_NEWS = 0.12
-
-# An echo shifts a peak by one over the square of the band, since it comes and goes
-# with frequency: the errors are those of this root mean square frequency, rad/s,
-# and above it.
-_ECHO_BAND = 2.0 * math.pi * 4.5e3
 
 # In the first frame of a sound it may not have reached all channels: noise alone
 # would seem to be heard there with more than this probability.
@@ -58,11 +58,6 @@ _SHARED_CHANCE = 1e-3
 # A sound begins within a frame whose energy is spread over less than this share
 # of it.
 _WHOLE_FRAME = 0.8
-_FRAME_PARTS = 10
-
-# By how much a frame may surpass the known noise, to be averaged into it: sound
-# that reverberates too much to be heard is no noise.
-_NOISE_RISE = 1.5
 
 
 class TDOAParameters(Parameters):
@@ -80,11 +75,15 @@ class TDOAParameters(Parameters):
     sound_speed_m_s: Positive | None = None
     """Speed of sound that the estimator believes in, m/s; unset: the true one."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
-    """Share of frames of noise alone in which a sound is heard."""
+    """Share of frames of steady noise in which a sound is heard, at most."""
     suppress_echoes: bool = True
     """Weigh frames with echoes by the precedence of the first wave front."""
     maximum_closure_s: Positive = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
+    maximum_misfit: Fraction = 0.05
+    """Largest disagreement of a delay with that of the place beyond
+    ``maximum_closure_s``, as a share of the longest that sound can take across the
+    array. It shows with four microphones or more."""
     maximum_ambiguity: Fraction = 0.8
     """Largest second peak over the first one."""
     maximum_bearing_std_deg: Positive = 3.0
@@ -104,13 +103,20 @@ class TDOAParameters(Parameters):
 class HearingMemory(NamedTuple):
     """What a frame leaves behind for the next one."""
 
+    energy: float
+    """Of a frame between the sounds, units of the frame squared; 0 until such a
+    frame was heard."""
     noise_energy: float
-    """Of the mean channel within the band between the sounds, units of the frame
-    squared; 0 until such a frame was heard."""
+    """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
     """(n, bins) see ``systems.precedence``."""
-    heard: bool
+    heard: bool = False
     """Whether it held a sound."""
+
+
+def _averaged(known: float, new: float) -> float:
+    """The level of the noise after one more frame."""
+    return known + (min(new, _LOUDEST_NOISE * known) - known) / _NOISE_FRAMES
 
 
 class Localiser:
@@ -125,6 +131,11 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+        # The energy of white noise scatters by the root of 2 over its samples, and
+        # what it is compared with is known as well as an average can be.
+        variance = 2.0 / (plan.shape.count * plan.frame_samples)
+        variance *= 1.0 + 1.0 / (2.0 * _NOISE_FRAMES - 1.0)
+        self._loud = 1.0 - float(ndtri(_SEARCHED_SHARE)) * math.sqrt(variance)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -145,7 +156,7 @@ class Localiser:
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
-        return HearingMemory(0.0, self._sizes.silent(), False)
+        return HearingMemory(0.0, 0.0, self._sizes.silent())
 
     def localise(
         self, frame: NDArray[np.float32], memory: HearingMemory
@@ -159,7 +170,16 @@ class Localiser:
         Returns:
             The source on the side of ``ArrayShape.ahead``, or None where nothing
             is heard, and the new memory.
+
+        Raises:
+            ValueError: The frame is no frame of this array, or not finite.
         """
+        energy = self._checked_energy(frame)
+        searched = 1.0
+        if memory.energy > 0.0:
+            if energy <= self._loud * memory.energy:
+                return None, self._after_noise(memory, energy)
+            searched = _SEARCHED_SHARE
         seen = look(
             frame,
             self.plan,
@@ -169,15 +189,30 @@ class Localiser:
         if seen is None:
             return None, memory
         search = seen[0]
-        if search.chance > self.parameters.false_alarm_rate:
-            return None, self._after_noise(memory, search.energy)
-        first, memory = not memory.heard, memory._replace(heard=True)
-        if first and search.weakest > _SHARED_CHANCE:
-            return None, memory
-        begins = first and _spread(frame) < _WHOLE_FRAME
-        delays = self._delays(frame, seen)
+        if searched * search.chance > self.parameters.false_alarm_rate:
+            return None, self._after_noise(memory, energy, search.energy)
+        after = memory._replace(heard=True)
+        if not memory.heard and search.weakest > _SHARED_CHANCE:
+            return None, after
         if not self.parameters.suppress_echoes:
-            return self._fix(frame, delays), memory
+            return self._fix(frame, self._delays(frame, seen)), after
+        begins = not memory.heard and energy_spread(frame) < _WHOLE_FRAME
+        return self._locate(frame, seen, after, begins=begins)
+
+    def _locate(
+        self,
+        frame: NDArray[np.float32],
+        seen: tuple[DelaySearch, slice],
+        memory: HearingMemory,
+        *,
+        begins: bool,
+    ) -> tuple[SourceFix | None, HearingMemory]:
+        """Where the sound comes from that ``look`` has seen in a frame.
+
+        A sound that begins within the frame may have met the floor, which shows in
+        no channel alone: it is never taken to be free of echoes.
+        """
+        delays = self._delays(frame, seen)
         direct = delays is not None and self._is_direct(delays, memory)
         if direct and not begins:
             return self._fix(frame, delays), memory
@@ -193,7 +228,36 @@ class Localiser:
             or delays.ambiguity > _ECHO_AMBIGUITY
         ):
             return None, memory
-        return self._fix(frame, delays, self._echo_errors(news, delays)), memory
+        plan = self.plan
+        errors = echo_errors(plan.shape, plan.c, news, delays.angular_frequency)
+        return self._fix(frame, delays, errors), memory
+
+    def _checked_energy(self, frame: NDArray[np.float32]) -> float:
+        expected = (self.plan.shape.count, self.plan.frame_samples)
+        if frame.shape != expected:
+            raise ValueError(
+                f"audio: a frame of shape {frame.shape}; give a channel for each of "
+                f"the {expected[0]} microphones, of {expected[1]} samples"
+            )
+        energy = float(np.vdot(frame, frame))
+        if not math.isfinite(energy) and not np.isfinite(frame).all():
+            channel, sample = np.argwhere(~np.isfinite(frame))[0]
+            raise ValueError(
+                f"audio: channel {channel + 1}: sample {sample} is "
+                f"{frame[channel, sample]}; give numbers"
+            )
+        return energy
+
+    def _is_place(self, fix: SourceFix, tau: NDArray[np.float64]) -> bool:
+        """Whether a source could be there, and the delays be those from there."""
+        shape, c = self.plan.shape, self.plan.c
+        if fix.range_valid and fix.range < NEAREST_M:
+            return False
+        if shape.freedom <= 0:
+            return True
+        limit = self.parameters.maximum_closure_s
+        limit += self.parameters.maximum_misfit * shape.max_delay(c)
+        return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
@@ -204,15 +268,22 @@ class Localiser:
             seen=seen,
         )
 
-    def _after_noise(self, memory: HearingMemory, energy: float) -> HearingMemory:
-        known = memory.noise_energy
+    def _after_noise(
+        self, memory: HearingMemory, energy: float, noise_energy: float | None = None
+    ) -> HearingMemory:
+        """Noise of a frame's energy, and of that within the band if it is known."""
         echoes = memory.echoes
         if echoes.any():
             echoes = self._sizes.faded(echoes, self.plan.frame_samples)
-        if known > 0.0:
-            energy = min(energy, _NOISE_RISE * known)
-            energy = known + (energy - known) / _NOISE_FRAMES
-        return HearingMemory(energy, echoes, False)
+        if not memory.energy > 0.0:
+            return HearingMemory(energy, noise_energy or 0.0, echoes)
+        if noise_energy is None:
+            noise_energy = memory.noise_energy * energy / memory.energy
+        return HearingMemory(
+            _averaged(memory.energy, energy),
+            _averaged(memory.noise_energy, noise_energy),
+            echoes,
+        )
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
         """Whether noise alone explains what the channels do not share."""
@@ -221,14 +292,6 @@ class Localiser:
         return (
             delays.correlation >= least or delays.noise_energy <= _NOISE_MARGIN * known
         )
-
-    def _echo_errors(self, news: float, delays: DelayEstimate) -> NDArray[np.float64]:
-        """(n - 1, n - 1) covariance of delays, for a share of news, s^2."""
-        narrow = max(1.0, _ECHO_BAND / delays.angular_frequency) ** 2
-        places = self.plan.shape.p_AM
-        turns = (places[1:] - places[0]) * (_ECHO_ERROR_RAD / self.plan.c)
-        single = _ECHO_ERROR_S**2 * (np.eye(len(turns)) + 1.0)
-        return (single + turns @ turns.T) * (narrow * max(1.0, _ECHO_NEWS / news)) ** 2
 
     def _fix(
         self,
@@ -248,6 +311,8 @@ class Localiser:
         if echoes is not None:
             covariance = covariance + echoes
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if not self._is_place(fix, delays.tau):
+            return None
         if parameters.method == "ml" and echoes is None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length
@@ -267,10 +332,3 @@ class Localiser:
         if fix.range_std > parameters.maximum_relative_range_std * fix.range:
             return fix.without_range()
         return fix
-
-
-def _spread(frame: NDArray[np.float32]) -> float:
-    """Share of a frame that its energy is spread over, at most 1."""
-    parts = np.array_split(frame, _FRAME_PARTS, axis=1)
-    energy = np.array([float(np.vdot(part, part)) for part in parts])
-    return float(energy.sum() ** 2 / (_FRAME_PARTS * (energy**2).sum()))

@@ -6,7 +6,8 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from systems.impedance import ImpedanceLoop, RepulsionParameters
+from systems.impedance import ImpedanceLoop
+from systems.repulsion import RepulsionParameters
 
 __all__ = ["RadialLawController", "RadialLawController_", "no_force"]
 

@@ -17,26 +17,30 @@ from systems.active_impedance_controller import active_force
 from systems.collision_vector import echo_point, foot_on_segment
 from systems.conventional_impedance_controller import conventional_force
 from systems.geometry import rotate
-from systems.impedance import RepulsionParameters, repulsion_force
+from systems.impedance import repulsion_force
+from systems.repulsion import ActiveParameters, ConventionalParameters
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 
 #: K_0 = 16 N/m, k_ref = 64 N/m, rho_0 = 0.8 m: alpha = 0.4 / ln 4 m.
-LAW = RepulsionParameters(
-    stiffness_n_m=16.0,
-    damping_n_s_m=0.8,
+LAW = ActiveParameters(
+    matched_stiffness_n_m=16.0,
+    matched_damping_n_s_m=0.8,
     reach_m=0.8,
     reference_stiffness_n_m=64.0,
     reference_damping_n_s_m=0.2,
     speed_limit_m_s=0.6,
 )
+CONVENTIONAL = ConventionalParameters(
+    stiffness_n_m=16.0, damping_n_s_m=0.8, reach_m=0.8
+)
 
 laws = st.builds(
-    lambda K_0, r, rho_0, D_0, q, mu_0: RepulsionParameters(
-        stiffness_n_m=K_0,
+    lambda K_0, r, rho_0, D_0, q, mu_0: ActiveParameters(
+        matched_stiffness_n_m=K_0,
         reference_stiffness_n_m=r * K_0,
         reach_m=rho_0,
-        damping_n_s_m=D_0,
+        matched_damping_n_s_m=D_0,
         reference_damping_n_s_m=D_0 / q,
         speed_limit_m_s=mu_0,
     ),
@@ -48,6 +52,15 @@ laws = st.builds(
 angles = st.floats(-math.pi, math.pi)
 ranges = st.floats(0.03, 3.0)
 small = st.floats(-0.3, 0.3)
+
+
+def matched(law: ActiveParameters) -> ConventionalParameters:
+    """The conventional law that an active one is matched to."""
+    return ConventionalParameters(
+        stiffness_n_m=law.matched_stiffness_n_m,
+        damping_n_s_m=law.matched_damping_n_s_m,
+        reach_m=law.reach_m,
+    )
 
 
 @given(range_=ranges, axis=angles, x=small, y=small)
@@ -142,12 +155,12 @@ def test_han_eq_16_measures_from_the_origin_of_the_world() -> None:
     corrected = math.hypot(x_0 + x_w, y_0 + y_w)
     assert printed == pytest.approx(5.701, abs=1e-3)
     assert corrected == pytest.approx(5.315, abs=1e-3)
-    assert conventional_force(printed, 0.0, LAW) == 0.0
-    assert conventional_force(corrected, 0.0, LAW) == 0.0
+    assert conventional_force(printed, 0.0, CONVENTIONAL) == 0.0
+    assert conventional_force(corrected, 0.0, CONVENTIONAL) == 0.0
     force, _ = repulsion_force(
         [(1.0, x_w, y_w)],
         {},
-        lambda c, s: conventional_force(c, s, LAW),
+        lambda c, s: conventional_force(c, s, CONVENTIONAL),
         "printed",
         FRAME_PERIOD_S,
     )
@@ -162,8 +175,8 @@ def test_han_eq_18_grows_with_distance() -> None:
     """Doubling the distance doubles the force; eq. 19-a lowers it."""
     near, far = printed_F_os(-0.3, 0.0, 0.0, 0.0), printed_F_os(-0.6, 0.0, 0.0, 0.0)
     assert (near, far) == pytest.approx((-4.8, -9.6))
-    assert conventional_force(0.3, 0.0, LAW) == pytest.approx(8.0)
-    assert conventional_force(0.6, 0.0, LAW) == pytest.approx(3.2)
+    assert conventional_force(0.3, 0.0, CONVENTIONAL) == pytest.approx(8.0)
+    assert conventional_force(0.6, 0.0, CONVENTIONAL) == pytest.approx(3.2)
 
 
 def test_han_eq_18_drives_the_velocity() -> None:
@@ -179,8 +192,8 @@ def test_han_eq_17_pulls_into_the_obstacle() -> None:
     M, K, D = RobotParameters().mass_kg, 16.0, 0.8
     assert -printed_F_os(-0.3, 0.0, 0.0, 0.0) == pytest.approx(4.8)
     assert max(np.roots([M, D, K]).real) == pytest.approx(-0.1015, abs=1e-4)
-    approach = conventional_force(0.3, 0.4, LAW) - conventional_force(0.3, 0.0, LAW)
-    assert approach == pytest.approx(D * 0.4)
+    rest, approach = (conventional_force(0.3, s, CONVENTIONAL) for s in (0.0, 0.4))
+    assert approach - rest == pytest.approx(D * 0.4)
 
 
 def printed_eq_19b(c, s, law):
@@ -220,18 +233,19 @@ def test_active_force_is_han_eq_20(law, c, part) -> None:
 @given(law=laws)
 def test_han_eq_21_makes_the_springs_equal_at_half_rho_0(law) -> None:
     c = law.reach_m / 2.0
-    wanted = law.stiffness_n_m * law.reach_m / 2.0
-    assert conventional_force(c, 0.0, law) == pytest.approx(wanted)
+    wanted = law.matched_stiffness_n_m * law.reach_m / 2.0
+    assert conventional_force(c, 0.0, matched(law)) == pytest.approx(wanted)
     assert active_force(c, law.speed_limit_m_s, law) == pytest.approx(wanted)
 
 
 @given(law=laws)
 def test_han_eq_22_for_beta_makes_the_dampers_equal_at_half_mu_0(law) -> None:
     s, far = law.speed_limit_m_s / 2.0, 1e3
-    wanted = law.damping_n_s_m * s
+    wanted = law.matched_damping_n_s_m * s
     assert active_force(far, s, law) == pytest.approx(wanted, rel=1e-6)
     c = law.reach_m / 2.0
-    assert active_force(c, s, law) == pytest.approx(conventional_force(c, s, law))
+    conventional = conventional_force(c, s, matched(law))
+    assert active_force(c, s, law) == pytest.approx(conventional)
 
 
 def test_han_eq_22_as_printed_misses_the_matching_point() -> None:
@@ -248,8 +262,9 @@ def test_han_eq_22_as_printed_misses_the_matching_point() -> None:
 def test_han_3_3_force_is_bounded(law, c) -> None:
     at_mu_0 = law.speed_limit_m_s
     peak = law.reference_stiffness_n_m * law.alpha_m / math.e
-    ratio = law.reference_stiffness_n_m / law.stiffness_n_m
-    by_ratio = law.stiffness_n_m * law.reach_m * ratio / (2 * math.e * math.log(ratio))
+    K_0 = law.matched_stiffness_n_m
+    ratio = law.reference_stiffness_n_m / K_0
+    by_ratio = K_0 * law.reach_m * ratio / (2 * math.e * math.log(ratio))
     assert by_ratio == pytest.approx(peak)
     assert active_force(law.alpha_m, at_mu_0, law) == pytest.approx(peak)
     assert active_force(c, at_mu_0, law) <= peak * (1.0 + 1e-12)
@@ -257,7 +272,7 @@ def test_han_3_3_force_is_bounded(law, c) -> None:
 
 def test_han_3_3_force_vanishes_at_contact() -> None:
     """Conventional 12.8 N there, active at most 6.79 N, at c = 0.289 m."""
-    assert conventional_force(0.0, 0.0, LAW) == pytest.approx(12.8)
+    assert conventional_force(0.0, 0.0, CONVENTIONAL) == pytest.approx(12.8)
     assert active_force(0.0, LAW.speed_limit_m_s, LAW) == 0.0
     peak = active_force(LAW.alpha_m, LAW.speed_limit_m_s, LAW)
     assert peak == pytest.approx(6.794, abs=1e-3)

@@ -15,6 +15,7 @@ import systems
 from systems.wheel_odometry import OdometryParameters
 
 BLOCKS = {
+    "ActiveImpedance2017Controller",
     "ActiveImpedanceController",
     "CollisionVector",
     "ConventionalImpedanceController",
@@ -32,6 +33,7 @@ BLOCKS = {
     "WheelSpeedCommand",
 }
 TEMPLATED = {
+    "ActiveImpedance2017Controller",
     "ActiveImpedanceController",
     "CollisionVector",
     "ConventionalImpedanceController",

@@ -38,11 +38,11 @@ def microphones(layout: Layout) -> np.ndarray:
 def test_layouts_are_what_is_stated(seed, corner):
     room = RoomParameters(size_m=(6.0, 8.0, 3.0), corner_m=corner)
     low = np.array((-3.0, -4.0) if corner is None else corner) + 0.5
-    high = low + (5.0, 7.0)
+    high = low + np.array([5.0, 7.0])
     for layout in layouts(5, seed, room):
         M1, M2, M3 = microphones(layout)
         for place in (M1, M2, M3, layout.p_WS):
-            assert np.all(place >= low) and np.all(place <= high)
+            assert np.all((place >= low) & (place <= high))
         assert 0.5 <= layout.range_m <= 3.0
         assert abs(layout.bearing_deg) <= 60.0
         away = layout.p_WS - M2

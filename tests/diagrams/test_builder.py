@@ -18,6 +18,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from diagrams import build_sound_follower, make_simulator
 from diagrams.builder import LOGGED_PORTS, SoundFollower, _connect_by_name, block_seed
+from diagrams.laws import LAWS
 from diagrams.scenario import Scenario
 from systems import DiffDrivePlant, WheelOdometry, WheelSpeedCommand
 
@@ -101,7 +102,7 @@ def test_blocks_of_the_ideal_build():
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])
 @pytest.mark.parametrize("obstacle_sensing", ["ultrasonic", "ideal"])
-@pytest.mark.parametrize("law", ["none", "conventional", "active"])
+@pytest.mark.parametrize("law", LAWS)
 def test_every_input_is_connected_to_the_output_of_its_name(
     hearing, obstacle_sensing, law
 ):
@@ -307,7 +308,7 @@ class Step:
         return self._stacked(context)
 
 
-@pytest.mark.parametrize("law", ["none", "conventional", "active"])
+@pytest.mark.parametrize("law", LAWS)
 def test_jacobian_of_a_step_agrees_with_finite_differences(law):
     scenario = {
         "law": law,

@@ -15,7 +15,7 @@ from diagrams.scenario import Scenario
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
-from systems.impedance import RepulsionParameters
+from systems.repulsion import RepulsionParameters
 
 number = 5
 
@@ -57,17 +57,26 @@ def repulsion_of(controller) -> float:
 
 @pytest.mark.parametrize(
     ("law", "force"),
-    [("none", 0.0), ("conventional", -6.4), ("active", -6.4 - 0.2 * 0.72)],
+    [
+        ("none", 0.0),
+        ("conventional", -15.0 * 0.4),
+        ("active", -16.0 * 0.4 - 0.2 * 0.72),
+        ("active2017", -1.2 / 0.4),
+    ],
 )
-def test_laws_of_the_package(law, force):
-    """Half the reach: K_0 rho_0 / 2 = 6.4 N with K_0 = 16 N/m, and d_ref mu_0."""
+def test_laws_of_the_package_read_their_own_gains(law, force):
+    """At rho_0/2, at rest: K_0 rho_0/2; the same and d_ref mu_0; K_0/c."""
     data = {
         "law": law,
         "repulsion": {
-            "stiffness_n_m": 16.0,
-            "reference_stiffness_n_m": 64.0,
-            "reference_damping_n_s_m": 0.2,
-            "speed_limit_m_s": 0.72,
+            "conventional": {"stiffness_n_m": 15.0},
+            "active": {
+                "matched_stiffness_n_m": 16.0,
+                "reference_stiffness_n_m": 64.0,
+                "reference_damping_n_s_m": 0.2,
+                "speed_limit_m_s": 0.72,
+            },
+            "active2017": {"distance_gain_j": 1.2},
         },
     }
     controller = make_controller(Scenario.model_validate(data))
@@ -89,7 +98,10 @@ def test_own_law_is_built_into_the_diagram(own_laws):
 @pytest.mark.parametrize(
     ("law", "message"),
     [
-        ("activ", "'activ' is not known; use none, conventional, active, or package"),
+        (
+            "activ",
+            "use none, conventional, active, active2017, or package",
+        ),
         (":inverse", "is not known"),
         ("own_laws_for_test:", "is not known"),
         ("no_such_module_anywhere:law", "cannot be imported: No module named"),

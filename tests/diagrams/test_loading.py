@@ -211,8 +211,8 @@ def test_unknown_scenarios_name_the_known(source):
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
         ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
         (
-            "repulsion.reference_stiffness_n_m=1",
-            "repulsion.reference_stiffness_n_m",
+            "repulsion.active.reference_stiffness_n_m=1",
+            "repulsion.active.reference_stiffness_n_m",
             "above",
         ),
         ("acoustics.temperature_c=99", "acoustics.temperature_c", "60"),

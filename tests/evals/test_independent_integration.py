@@ -1,17 +1,32 @@
-"""Drake's closed loop against scipy, written from the equations alone.
+"""The laws and the closed loop against an implementation of their own.
 
-Nothing here comes from ``systems``: the laws, the sensors, the virtual mass
-and the plant are written again from docs/model.md.
+Nothing here that computes comes from ``systems``: the laws, the sensors, the
+virtual mass and the plant are written again from docs/model.md.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario import Scenario
+from systems import (
+    ActiveImpedance2017Controller,
+    ActiveImpedanceController,
+    ConventionalImpedanceController,
+)
+from systems.active_impedance_2017_controller import active_2017_force
+from systems.active_impedance_controller import active_force
+from systems.conventional_impedance_controller import conventional_force
+from systems.impedance import (
+    AttractionParameters,
+    attraction_force,
+    repulsion_force,
+)
+from systems.repulsion import RepulsionParameters
 
 T = 0.025
 EPSILON, MASS, RADIUS, SEPARATION, TOP = 0.175, 3.94, 0.06, 0.41, 0.72
@@ -21,16 +36,45 @@ K_0, D_0, RHO_0 = 16.0, 0.8, 0.8
 K_REF, D_REF, MU_0 = 64.0, 0.2, 0.72
 ALPHA = RHO_0 / (2 * np.log(K_REF / K_0))
 BETA = MU_0 / (2 * np.log(D_0 / D_REF))
+K_2017, RHO_1, D_2017, MU_1 = 1.1, 0.1, 0.7, 0.6
+
+ATTRACTION = {
+    "stiffness_n_m": K_R, "damping_n_s_m": D_R, "follow_distance_m": FOLLOW
+}  # fmt: skip
+REPULSION: dict[str, Any] = {
+    "conventional": {"stiffness_n_m": K_0, "damping_n_s_m": D_0, "reach_m": RHO_0},
+    "active": {
+        "reference_stiffness_n_m": K_REF,
+        "matched_stiffness_n_m": K_0,
+        "reach_m": RHO_0,
+        "reference_damping_n_s_m": D_REF,
+        "matched_damping_n_s_m": D_0,
+        "speed_limit_m_s": MU_0,
+    },
+    "active2017": {
+        "distance_gain_j": K_2017,
+        "saturation_distance_m": RHO_1,
+        "damping_n_s_m": D_2017,
+        "saturation_speed_m_s": MU_1,
+    },
+}
+LAWS = tuple(REPULSION)
+TERMS = ("printed", "closing")
 
 SOURCE_START, SOURCE_VELOCITY = np.array([1.6, 0.3]), np.array([0.3, 0.0])
+SOURCE_STOPS = 7.4 / 0.3
 SOURCE_SIZE = (0.326, 0.352)
 BOX, BOX_SIZE = np.array([2.8, 0.9]), (0.2, 0.1)
 MOVING_START, MOVING_VELOCITY = np.array([4.4, -2.0]), np.array([0.0, 0.2])
+MOVING_STOPS = 5.0 / 0.2
 MOVING_SIZE = (0.3, 0.2)
-DURATION = 20.0
+DURATION = 40.0
+#: Nodes and weights on [0, 1]: exact to 1e-15 over a tick.
+NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
+NODES, WEIGHTS = (NODES + 1.0) / 2.0, WEIGHTS / 2.0
 
 
-def scenario(law: str) -> Scenario:
+def scenario(law: str, velocity_term: str = "printed") -> Scenario:
     return Scenario.model_validate(
         {
             "law": law,
@@ -39,6 +83,8 @@ def scenario(law: str) -> Scenario:
             "duration_s": DURATION,
             "odometry": {"rounding": False},
             "tracker": {"hold": "world"},
+            "attraction": ATTRACTION,
+            "repulsion": {"velocity_term": velocity_term, **REPULSION},
             "integrator": {"scheme": "runge_kutta5", "step_s": 0.005},
             "source": {"waypoints_m": [SOURCE_START.tolist(), [9.0, 0.3]]},
             "obstacles": [
@@ -58,12 +104,20 @@ def rotation(theta: float) -> np.ndarray:
     return np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
 
 
+def source_position(time: float) -> np.ndarray:
+    return SOURCE_START + SOURCE_VELOCITY * min(time, SOURCE_STOPS)
+
+
 def nearest_vector(p: np.ndarray, time: float) -> tuple[int, np.ndarray] | None:
     """(body, vector to its nearest point) of the nearest body within 3 m."""
     bodies = [
         (BOX, 0.0, BOX_SIZE),
-        (MOVING_START + MOVING_VELOCITY * time, np.pi / 2, MOVING_SIZE),
-        (SOURCE_START + SOURCE_VELOCITY * time, 0.0, SOURCE_SIZE),
+        (
+            MOVING_START + MOVING_VELOCITY * min(time, MOVING_STOPS),
+            np.pi / 2,
+            MOVING_SIZE,
+        ),
+        (source_position(time), 0.0, SOURCE_SIZE),
     ]
     vectors = []
     for centre, heading, size in bodies:
@@ -76,28 +130,59 @@ def nearest_vector(p: np.ndarray, time: float) -> tuple[int, np.ndarray] | None:
     return (index, vectors[index]) if distances[index] <= 3.0 else None
 
 
-def law_force(law: str, c: float, s: float) -> float:
+def law_force(law: str, c: Any, s: Any) -> Any:
+    """(n,) force away from the obstacle, N, at (n,) distances and speeds."""
     if law == "conventional":
-        return K_0 * (RHO_0 - c) + D_0 * s if c < RHO_0 else 0.0
-    damper = D_REF * np.exp(s / BETA) * (MU_0 - s) if s < MU_0 else 0.0
-    return K_REF * np.exp(-c / ALPHA) * c + damper
+        return np.where(c < RHO_0, K_0 * (RHO_0 - c) + D_0 * s, 0.0)
+    if law == "active":
+        slow = np.minimum(s, MU_0)
+        damper = D_REF * np.exp(slow / BETA) * (MU_0 - slow)
+        return K_REF * np.exp(-c / ALPHA) * c + damper
+    K_a = np.where(c >= RHO_1, K_2017, K_2017 * c / RHO_1)
+    D_a = np.where(s <= MU_1, D_2017, D_2017 * MU_1 / np.maximum(s, MU_1))
+    return K_a / c + D_a * s
 
 
-def plant(_, x, command):
-    left, right = x[5], x[6]
-    v = RADIUS * (left + right) / 2
-    return [
-        v * np.cos(x[2]),
-        v * np.sin(x[2]),
-        RADIUS * (right - left) / SEPARATION,
-        left,
-        right,
-        (command[0] - left) / LAG,
-        (command[1] - right) / LAG,
-    ]
+def law_speed(velocity_term: str, C: np.ndarray, before: np.ndarray) -> Any:
+    """(n,) s in m/s of (n, 2) collision vectors a period apart."""
+    if velocity_term == "printed":
+        return np.linalg.norm(C - before, axis=-1) / T
+    nearer = np.linalg.norm(before, axis=-1) - np.linalg.norm(C, axis=-1)
+    return np.maximum(0.0, nearer / T)
 
 
-def integrate_independently(law: str) -> tuple[np.ndarray, np.ndarray]:
+def move(x: np.ndarray, command: np.ndarray) -> np.ndarray:
+    """Plant state a tick later: wheels and heading exact, position by quadrature.
+
+    Wheel speeds decay to the command: w(t) = command + (w_0 - command) e^(-t/lag).
+    """
+    excess = x[5:7] - command
+
+    def turned(t):
+        """(2, ...) angles by which the wheels have turned after t."""
+        decayed = LAG * -np.expm1(-t / LAG)
+        return np.multiply.outer(command, t) + np.multiply.outer(excess, decayed)
+
+    t = T * NODES
+    wheels = command[:, None] + np.multiply.outer(excess, np.exp(-t / LAG))
+    left, right = turned(t)
+    heading = x[2] + RADIUS * (right - left) / SEPARATION
+    v = RADIUS * wheels.mean(axis=0) * T * WEIGHTS
+    angles = turned(T)
+    return np.array(
+        [
+            x[0] + v @ np.cos(heading),
+            x[1] + v @ np.sin(heading),
+            x[2] + RADIUS * (angles[1] - angles[0]) / SEPARATION,
+            *(x[3:5] + angles),
+            *(command + excess * np.exp(-T / LAG)),
+        ]
+    )
+
+
+def integrate_independently(
+    law: str, velocity_term: str
+) -> tuple[np.ndarray, np.ndarray]:
     """Plant state (7) and virtual velocity (2) at the end."""
     x = np.zeros(7)
     odometry, angles = np.zeros(3), np.zeros(2)
@@ -133,7 +218,7 @@ def integrate_independently(law: str) -> tuple[np.ndarray, np.ndarray]:
             C = rotation(odometry[2]) @ rotation(x[2]).T @ C
             s: float = 0.0
             if remembered is not None and remembered[0] == body:
-                s = float(np.linalg.norm(C - remembered[1])) / T
+                s = float(law_speed(velocity_term, C, remembered[1]))
             c = float(np.linalg.norm(C))
             force = force - law_force(law, c, s) * C / c
             remembered = (body, C)
@@ -152,26 +237,129 @@ def integrate_independently(law: str) -> tuple[np.ndarray, np.ndarray]:
         command /= max(1.0, np.abs(command).max() / (TOP / RADIUS))
 
         sounding = (time - T / 2) % 2.0 < 0.5 and time > T / 2
-        source = SOURCE_START + SOURCE_VELOCITY * time
-        heard = rotation(x[2]).T @ (source - p_true) if sounding else None
+        offset = source_position(time) - p_true
+        heard = rotation(x[2]).T @ offset if sounding else None
         pose_then = odometry.copy()
-        x = solve_ivp(
-            plant, (0, T), x, "DOP853", args=(command,), rtol=1e-12, atol=1e-13
-        ).y[:, -1]
+        x = move(x, command)
     return x, velocity
 
 
+def random_states(count: int, seed: int) -> dict[str, np.ndarray]:
+    """Targets, robots and obstacles; s on both sides of mu_0 and mu_1."""
+    rng = np.random.default_rng(seed)
+    direction = rng.uniform(-np.pi, np.pi, (2, count))
+    c, s = rng.uniform(0.01, 3.0, count), rng.uniform(0.0, 2.0, count)
+    C = c * np.array([np.cos(direction[0]), np.sin(direction[0])])
+    change = s * T * np.array([np.cos(direction[1]), np.sin(direction[1])])
+    return {
+        "p_WS": rng.uniform(-5.0, 5.0, (count, 2)),
+        "p_WP": rng.uniform(-5.0, 5.0, (count, 2)),
+        "v_WP": rng.uniform(-0.72, 0.72, (count, 2)),
+        "C": C.T,
+        "before": (C - change).T,
+    }
+
+
+def total_force(law: str, velocity_term: str, state: dict[str, np.ndarray]) -> Any:
+    """(n, 2) F_m + F_b in W, N."""
+    d, C = state["p_WS"] - state["p_WP"], state["C"]
+    reach = np.linalg.norm(d, axis=1, keepdims=True)
+    F_m = K_R * d * (1.0 - FOLLOW / reach) - D_R * state["v_WP"]
+    c = np.linalg.norm(C, axis=1)
+    f = law_force(law, c, law_speed(velocity_term, C, state["before"]))
+    return F_m - (f / c)[:, None] * C
+
+
+FUNCTIONS: dict[str, Any] = {
+    "conventional": conventional_force,
+    "active": active_force,
+    "active2017": active_2017_force,
+}
+BLOCKS: dict[str, Any] = {
+    "conventional": ConventionalImpedanceController,
+    "active": ActiveImpedanceController,
+    "active2017": ActiveImpedance2017Controller,
+}
+
+
+def parameters(velocity_term: str) -> dict[str, Any]:
+    repulsion = {"velocity_term": velocity_term, **REPULSION}
+    return {
+        "attraction": AttractionParameters.model_validate(ATTRACTION),
+        "repulsion": RepulsionParameters.model_validate(repulsion),
+    }
+
+
 @pytest.mark.slow
-@pytest.mark.parametrize("law", ["conventional", "active"])
-def test_drake_agrees_with_scipy_to_1e_6_over_20_s(law):
-    follower = build_sound_follower(scenario(law))
+@pytest.mark.parametrize("velocity_term", TERMS)
+@pytest.mark.parametrize("law", LAWS)
+def test_force_is_the_same_to_1e_9_at_1e5_states(law, velocity_term):
+    state = random_states(100_000, seed=1)
+    both = parameters(velocity_term)
+    gains = getattr(both["repulsion"], law)
+    force = FUNCTIONS[law]
+
+    def law_of_c_and_s(c, s):
+        return force(c, s, gains)
+
+    found = []
+    for p_WS, p_WP, v_WP, C, before in zip(
+        *(values.tolist() for values in state.values()), strict=True
+    ):
+        F_m = attraction_force(p_WP, v_WP, p_WS, True, both["attraction"], MASS)
+        F_b, _ = repulsion_force(
+            [(1.0, *C)], {1: before}, law_of_c_and_s, velocity_term, T
+        )
+        found.append((F_m[0] + F_b[0], F_m[1] + F_b[1]))
+    expected = total_force(law, velocity_term, state)
+    np.testing.assert_allclose(found, expected, atol=1e-9, rtol=0)
+    speeds = law_speed(velocity_term, state["C"], state["before"])
+    assert 0.1 < np.mean(speeds < MU_1) < 0.9, "both sides of the limits"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("velocity_term", TERMS)
+@pytest.mark.parametrize("law", LAWS)
+def test_block_s_acceleration_is_the_force_over_the_mass(law, velocity_term):
+    """The state seen by a robot with a heading of its own, through the ports."""
+    state = random_states(2000, seed=2)
+    block: Any = BLOCKS[law](**parameters(velocity_term))
+    context = block.CreateDefaultContext()
+    theta = np.random.default_rng(3).uniform(-np.pi, np.pi, 2000)
+    block.GetInputPort("target_valid").FixValue(context, np.ones(1))
+    block.GetInputPort("features").FixValue(context, np.array([2.0, 0.0, 0.0]))
+    accelerations = []
+    for k, heading in enumerate(theta):
+        R = rotation(heading)
+        inputs = {
+            "p_WS_estimated": state["p_WS"][k],
+            "collision_vectors_B": np.append(R.T @ state["C"][k], np.zeros(4)),
+            "pose_WB_estimated": np.append(
+                state["p_WP"][k] - R @ [EPSILON, 0.0], heading
+            ),
+            "v_WP": state["v_WP"][k],
+        }
+        for name, value in inputs.items():
+            block.GetInputPort(name).FixValue(context, value)
+        remembered = np.array([2.0, *state["before"][k], 0, 0, 0, 0, 0, 0])
+        context.SetDiscreteState(remembered)
+        accelerations.append(block.GetOutputPort("acceleration_W").Eval(context))
+    expected = total_force(law, velocity_term, state) / MASS
+    np.testing.assert_allclose(accelerations, expected, atol=1e-9, rtol=0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("velocity_term", TERMS)
+@pytest.mark.parametrize("law", LAWS)
+def test_closed_loop_agrees_to_1e_6_over_40_s(law, velocity_term):
+    follower = build_sound_follower(scenario(law, velocity_term))
     simulator = make_simulator(follower)
     simulator.Initialize()
     simulator.AdvanceTo(DURATION)
     context = simulator.get_context()
     command = follower.blocks["command"].GetMyContextFromRoot(context)
 
-    state, velocity = integrate_independently(law)
+    state, velocity = integrate_independently(law, velocity_term)
 
     drake_state = context.get_continuous_state_vector().CopyToVector()
     np.testing.assert_allclose(drake_state, state, atol=1e-6, rtol=0)
@@ -189,7 +377,7 @@ def test_default_step_is_within_20_um_of_a_fine_one():
         follower = build_sound_follower(Scenario.model_validate(data))
         simulator = make_simulator(follower)
         simulator.Initialize()
-        simulator.AdvanceTo(DURATION)
+        simulator.AdvanceTo(20.0)
         context = simulator.get_context()
         ends.append(context.get_continuous_state_vector().CopyToVector()[:3])
     np.testing.assert_allclose(ends[0], ends[1], atol=20e-6, rtol=0)

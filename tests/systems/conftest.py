@@ -88,7 +88,7 @@ def _check_gradient(
     np.testing.assert_allclose(gradient, differences, rtol=tolerance, atol=tolerance)
 
 
-@pytest.fixture
+@pytest.fixture(scope="session")
 def bench() -> type[Bench]:
     """The class, to be called with a block and its inputs."""
     return Bench

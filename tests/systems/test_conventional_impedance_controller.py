@@ -10,10 +10,12 @@ from systems.conventional_impedance_controller import (
     ConventionalImpedanceController,
     conventional_force,
 )
-from systems.impedance import AttractionParameters, RepulsionParameters
+from systems.impedance import AttractionParameters
+from systems.repulsion import ConventionalParameters, RepulsionParameters
 from systems.robot import RobotParameters
 
-REPULSION = RepulsionParameters(stiffness_n_m=10.0, damping_n_s_m=3.0)
+GAINS = ConventionalParameters(stiffness_n_m=10.0, damping_n_s_m=3.0)
+REPULSION = RepulsionParameters(conventional=GAINS)
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 
 
@@ -31,11 +33,11 @@ POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 )
 def test_force(c, s, force):
     """K_0 = 10 N/m, D_0 = 3 N s/m, rho_0 = 0.8 m (Han 2019, eq. 19-a)."""
-    assert conventional_force(c, s, REPULSION) == pytest.approx(force)
+    assert conventional_force(c, s, GAINS) == pytest.approx(force)
 
 
 def test_barrier_is_the_spring_s_energy():
-    energy, _ = quad(lambda c: conventional_force(c, 0.0, REPULSION), 0.0, 0.8)
+    energy, _ = quad(lambda c: conventional_force(c, 0.0, GAINS), 0.0, 0.8)
     assert energy == pytest.approx(10.0 * 0.8**2 / 2)
 
 

@@ -8,17 +8,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from pydantic import ValidationError
 
 from systems.impedance import (
     AttractionParameters,
-    RepulsionParameters,
     attraction_force,
-    matched_decay,
     obstacle_speed,
     repulsion_force,
 )
 from systems.radial_law_controller import RadialLawController
+from systems.repulsion import RepulsionParameters
 
 T = 0.025
 PRINTED = AttractionParameters(follow_distance_m=0.0)
@@ -93,41 +91,6 @@ def test_forces_of_several_vectors_add():
     force, speeds = repulsion_force(vectors, {}, lambda c, s: 1 / c, "printed", T)
     assert force == pytest.approx((-1.0, -2.0))
     assert speeds == [0.0, 0.0]
-
-
-def test_matched_decay_of_a_ratio_of_e():
-    assert matched_decay(0.8, math.e) == pytest.approx(0.4)
-
-
-def test_alpha_and_beta_of_the_papers_numbers():
-    """Han 2019, eq. 21; 22 with D_0 and d_ref."""
-    repulsion = RepulsionParameters(
-        stiffness_n_m=10.0,
-        reference_stiffness_n_m=40.0,
-        damping_n_s_m=3.0,
-        reference_damping_n_s_m=1.0,
-        speed_limit_m_s=0.6,
-    )
-    assert repulsion.alpha_m == pytest.approx(0.8 / (2 * math.log(4)))
-    assert repulsion.beta_m_s == pytest.approx(0.6 / (2 * math.log(3)))
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        (
-            {"reference_stiffness_n_m": 16.0},
-            r"reference_stiffness_n_m: 16.0 \(k_ref\) is not above .* raise it",
-        ),
-        (
-            {"reference_damping_n_s_m": 0.8},
-            r"reference_damping_n_s_m: 0.8 \(d_ref\) is not below .* lower it",
-        ),
-    ],
-)
-def test_laws_that_cannot_match_are_refused(settings, message):
-    with pytest.raises(ValidationError, match=message):
-        RepulsionParameters(**settings)
 
 
 def make_bench(bench, velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):

@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from pydrake.math import exp
 
-from systems.impedance import RepulsionParameters
 from systems.radial_law_controller import RadialLawController, no_force
+from systems.repulsion import ConventionalParameters, RepulsionParameters
 from systems.robot import RobotParameters
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
-REPULSION = RepulsionParameters(stiffness_n_m=7.0)
+REPULSION = RepulsionParameters(conventional=ConventionalParameters(stiffness_n_m=7.0))
 
 
 def exponential_law(c, s, repulsion):
-    return repulsion.stiffness_n_m * exp(-c) + 0.5 * s
+    return repulsion.conventional.stiffness_n_m * exp(-c) + 0.5 * s
 
 
 def test_own_law_gets_distance_speed_and_parameters(controller_bench):

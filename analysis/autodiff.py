@@ -1,0 +1,30 @@
+"""Seeds and gradients of vectors of AutoDiffXd."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
+
+__all__ = ["seed", "value_and_gradient"]
+
+
+def seed(values: Any) -> Any:
+    """The values as AutoDiffXd, each its own variable; (n,)."""
+    column: Any = np.asarray(values, dtype=float)
+    return InitializeAutoDiff(column).ravel()
+
+
+def value_and_gradient(
+    values: Any, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Values (k,) and their derivatives by ``count`` variables (k, count)."""
+    if len(values) == 0:
+        return np.empty(0), np.empty((0, count))
+    column = np.asarray(values).reshape(-1, 1)
+    gradient = np.asarray(ExtractGradient(column), dtype=float)
+    if gradient.shape[1] == 0:
+        gradient = np.zeros((len(values), count))
+    return np.asarray(ExtractValue(column), dtype=float).ravel(), gradient

@@ -1,0 +1,369 @@
+"""The all-ideal build as a map of one period, with its derivatives.
+
+The diagram is the one that simulates: its builder, its blocks, its integrator.
+Only hearing and obstacle sensing are exact, and wheel angles are not rounded,
+so that every block converts to AutoDiffXd.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.analysis import (
+    ApplySimulatorConfig,
+    InitializeParams,
+    Simulator,
+    Simulator_,
+    SimulatorConfig,
+)
+
+from analysis.autodiff import seed, value_and_gradient
+from analysis.state_names import state_names
+from diagrams import build_sound_follower
+from diagrams.scenario import Scenario
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "IdealLoop",
+    "PeriodDerivatives",
+    "Port",
+    "frozen_scenario",
+    "ideal_loop",
+    "ideal_scenario",
+    "require_ideal",
+]
+
+#: A port of a block: (role in ``SoundFollower.blocks``, name of the port).
+Port = tuple[str, str]
+
+#: The tracker's slowest mode decays as 0.27 a tick where hearing is exact.
+SETTLING_TICKS = 40
+
+_ALL_IDEAL: dict[str, Any] = {
+    "hearing": "ideal",
+    "obstacle_sensing": "ideal",
+    "ideal_hearing": {
+        "burst_gaps": False,
+        "bearing_noise_deg": 0.0,
+        "range_noise_fraction": 0.0,
+    },
+    "odometry": {"rounding": False},
+}
+
+
+def ideal_scenario(scenario: Scenario) -> Scenario:
+    """The same scenario with exact sensors and a sound that never stops."""
+    return _updated(scenario, _ALL_IDEAL)
+
+
+def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
+    """The same scenario with source and obstacles at rest, where they are then.
+
+    Args:
+        scenario: Any scenario.
+        time_s: The moment, s.
+    """
+    x, y, theta = scenario.source.path().pose(time_s)
+    source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
+    obstacles = []
+    for obstacle in scenario.obstacles:
+        x, y, theta = obstacle.path().pose(time_s)
+        rest = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
+        obstacles.append(obstacle.model_dump() | rest)
+    return _updated(scenario, {"source": source, "obstacles": obstacles})
+
+
+def _updated(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    data = scenario.model_dump()
+    for key, value in changes.items():
+        data[key] = data[key] | value if isinstance(value, dict) else value
+    return Scenario.model_validate(data)
+
+
+def require_ideal(scenario: Scenario) -> None:
+    """Raises what to do instead where a scenario has no linear model.
+
+    Raises:
+        ValueError: Some block has no derivative.
+    """
+    hearing = scenario.ideal_hearing
+    checks = (
+        (
+            scenario.hearing == "ideal",
+            "hearing: 'audio' has no linear model, for a waveform has no equilibrium",
+        ),
+        (
+            scenario.obstacle_sensing == "ideal",
+            "obstacle_sensing: 'ultrasonic' has no linear model, for cones jump",
+        ),
+        (
+            not scenario.odometry.rounding,
+            "odometry.rounding: a rounded wheel angle has no derivative",
+        ),
+        (
+            hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
+            "ideal_hearing: noise has no derivative",
+        ),
+    )
+    for holds, reason in checks:
+        if not holds:
+            raise ValueError(
+                f"{reason}; linearise ideal_scenario(scenario), which differs in "
+                "sensing alone"
+            )
+
+
+@dataclass(frozen=True)
+class PeriodDerivatives:
+    """One period about a state: x+ = f(x, u), y = g(x, u) at its first tick."""
+
+    next_state: NDArray[np.float64]
+    """(n,) state a period later."""
+    A: NDArray[np.float64]
+    """(n, n) its derivative by the state."""
+    B: NDArray[np.float64]
+    """(n, m) its derivative by the inputs that are held over the period."""
+    y: NDArray[np.float64]
+    """(p,) outputs at the tick that begins the period, before its updates."""
+    C: NDArray[np.float64]
+    """(p, n) their derivative by the state."""
+    D: NDArray[np.float64]
+    """(p, m) their derivative by the inputs."""
+
+
+class IdealLoop:
+    """The all-ideal build, and its AutoDiff twin: converted once, used again.
+
+    The state is the diagram's, in the order of ``state_names``: continuous
+    first, then the discrete groups. A period begins just before the updates of
+    a tick and ends just before those of the next.
+
+    Args:
+        scenario: All ideal, see ``ideal_scenario``.
+
+    Raises:
+        ValueError: The scenario, or a law of the user's, has no derivative.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        require_ideal(scenario)
+        self.scenario = scenario
+        self.follower = build_sound_follower(scenario)
+        twin = self.follower.diagram.ToAutoDiffXdMaybe()
+        if twin is None:
+            raise ValueError(
+                f"law: the block of {scenario.law!r} has no AutoDiffXd form; write it "
+                "as a function law(c, s, repulsion) with pydrake.math, or as a "
+                "TemplateSystem of float and AutoDiffXd"
+            )
+        self.twin: Any = twin
+        self.state_names: tuple[str, ...] = state_names(self.follower)
+        self.sampled_twins: dict[str, Any] = {}
+        """Continuous blocks as maps of one period, see ``analysis.block_models``."""
+        self._simulators: dict[Any, Any] = {}
+
+    def block(self, role: str, *, twin: bool = False) -> Any:
+        """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd."""
+        block = self.follower.blocks[role]
+        return self.twin.GetSubsystemByName(block.get_name()) if twin else block
+
+    def indices(self, role: str) -> list[int]:
+        """Where a block's state stands in the state vector."""
+        prefix = f"{role}."
+        return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
+
+    def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
+        """The float diagram's context at a state; valid until the next call."""
+        simulator = self._simulator(frozenset(), twin=False)
+        context = simulator.get_mutable_context()
+        context.SetTime(time_s)
+        _set_state(context, state)
+        return context
+
+    def period_map(
+        self,
+        state: NDArray[np.float64],
+        time_s: float = 0.0,
+        *,
+        fixed: Mapping[Port, Sequence[float]] | None = None,
+        periods: int = 1,
+    ) -> NDArray[np.float64]:
+        """The state some periods later.
+
+        Args:
+            state: (n,) just before the updates of the tick at ``time_s``.
+            time_s: A multiple of the period, s.
+            fixed: Values of input ports that are cut off from their source.
+            periods: Number of periods.
+        """
+        fixed = fixed or {}
+        simulator = self._simulator(frozenset(fixed), twin=False)
+        context = simulator.get_mutable_context()
+        for port, value in fixed.items():
+            self._fix(context, port, np.asarray(value, dtype=float), twin=False)
+        _run(simulator, state, time_s, periods)
+        return _get_state(context)
+
+    def period_derivatives(
+        self,
+        state: NDArray[np.float64],
+        time_s: float = 0.0,
+        *,
+        inputs: Mapping[tuple[Port, ...], Sequence[float]] | None = None,
+        outputs: Sequence[Port] = (),
+    ) -> PeriodDerivatives:
+        """One period's derivatives, by AutoDiff through the whole diagram.
+
+        Args:
+            state: (n,) just before the updates of the tick at ``time_s``.
+            time_s: A multiple of the period, s.
+            inputs: Input ports that are cut off from their source and held over
+                the period; those of one key share a value and its derivative.
+            outputs: Output ports to differentiate at the first tick.
+        """
+        inputs = inputs or {}
+        ports = frozenset(port for group in inputs for port in group)
+        simulator = self._simulator(ports, twin=True)
+        context = simulator.get_mutable_context()
+        values = [np.asarray(value, dtype=float) for value in inputs.values()]
+        seeded = seed(np.concatenate([state, *values]))
+        start = count = len(state)
+        for group, value in zip(inputs, values, strict=True):
+            for port in group:
+                part = seeded[start : start + len(value)]
+                self._fix(context, port, part, twin=True)
+            start += len(value)
+        context.SetTime(time_s)
+        _set_state(context, seeded[:count])
+        read = [self._read(context, port) for port in outputs]
+        y, by_all = value_and_gradient(
+            np.concatenate(read) if read else np.empty(0), start
+        )
+        _run(simulator, seeded[:count], time_s, 1)
+        after, jacobian = value_and_gradient(_get_state(context), start)
+        return PeriodDerivatives(
+            next_state=after,
+            A=jacobian[:, :count],
+            B=jacobian[:, count:],
+            y=y,
+            C=by_all[:, :count],
+            D=by_all[:, count:],
+        )
+
+    def settled_state(
+        self,
+        pose_WB: Sequence[float],
+        v_WP: tuple[float, float] = (0.0, 0.0),
+    ) -> tuple[NDArray[np.float64], float]:
+        """State in which all that remembers has seen a steady motion for long.
+
+        The robot moves at a constant velocity along its heading, or rests; the
+        source does what its path says; forces do not act meanwhile.
+
+        Args:
+            pose_WB: Pose at time zero, m and rad.
+            v_WP: Velocity of P in W, m/s, along the heading.
+
+        Returns:
+            State and its time in s.
+        """
+        context = self.follower.diagram.CreateDefaultContext()
+        state = _get_state(context)
+        speed = math.hypot(*v_WP)
+        wheel = speed / self.scenario.robot.wheel_radius_m
+        still = [*pose_WB, 0.0, 0.0]
+        state[self.indices("plant")] = [*still, wheel, wheel]
+        state[self.indices("odometry")] = still
+        state[self.indices("command")] = [*v_WP, wheel, wheel]
+        tracker = self.indices("tracker")
+        state[tracker[:9]] = [*pose_WB] * 3
+        no_force = {("command", "acceleration_W"): (0.0, 0.0)}
+        state = self.period_map(state, 0.0, fixed=no_force, periods=SETTLING_TICKS)
+        time_s = SETTLING_TICKS * FRAME_PERIOD_S
+        # An obstacle's speed of rounding errors alone would have a slope.
+        remembered = self.period_map(state, time_s, fixed=no_force)
+        controller = self.indices("controller")
+        state[controller] = remembered[controller]
+        return state, time_s
+
+    def _simulator(self, fixed: frozenset[Port], *, twin: bool) -> Any:
+        """A simulator whose context has these ports fixed, made once."""
+        key = (fixed, twin)
+        if key not in self._simulators:
+            make, diagram = (
+                (Simulator_[AutoDiffXd], self.twin)
+                if twin
+                else (Simulator, self.follower.diagram)
+            )
+            simulator = make(diagram)
+            integrator = self.scenario.integrator
+            config = SimulatorConfig()
+            config.integration_scheme = integrator.scheme
+            config.max_step_size = integrator.step_s
+            config.use_error_control = False
+            ApplySimulatorConfig(config, simulator)
+            self._simulators[key] = simulator
+        return self._simulators[key]
+
+    def _fix(self, context: Any, port: Port, value: Any, *, twin: bool) -> None:
+        role, name = port
+        block = self.block(role, twin=twin)
+        own = block.GetMyMutableContextFromRoot(context)
+        block.GetInputPort(name).FixValue(own, value)
+
+    def _read(self, context: Any, port: Port) -> Any:
+        role, name = port
+        block = self.block(role, twin=True)
+        return block.GetOutputPort(name).Eval(block.GetMyContextFromRoot(context))
+
+
+@lru_cache(maxsize=64)
+def _cached_loop(key: str) -> IdealLoop:
+    return IdealLoop(Scenario.model_validate_json(key))
+
+
+def ideal_loop(scenario: Scenario) -> IdealLoop:
+    """The loop of a scenario, built and converted once in a process.
+
+    Drake never frees blocks written in Python, so that a build should be used
+    again.
+
+    Raises:
+        ValueError: The scenario has no linear model.
+    """
+    return _cached_loop(scenario.model_dump_json())
+
+
+def _run(simulator: Any, state: Any, time_s: float, periods: int) -> None:
+    context = simulator.get_mutable_context()
+    context.SetTime(time_s)
+    _set_state(context, state)
+    quiet = InitializeParams()
+    quiet.suppress_initialization_events = True
+    simulator.Initialize(quiet)
+    simulator.AdvanceTo(time_s + periods * FRAME_PERIOD_S)
+
+
+def _set_state(context: Any, state: Any) -> None:
+    start = context.num_continuous_states()
+    context.SetContinuousState(state[:start])
+    for group in range(context.num_discrete_state_groups()):
+        size = context.get_discrete_state(group).size()
+        context.SetDiscreteState(group, state[start : start + size])
+        start += size
+
+
+def _get_state(context: Any) -> Any:
+    groups = [
+        context.get_discrete_state(k).CopyToVector()
+        for k in range(context.num_discrete_state_groups())
+    ]
+    continuous = context.get_continuous_state_vector().CopyToVector()
+    return np.concatenate([continuous, *groups])

@@ -1,0 +1,120 @@
+"""Gains of the repulsion laws, one set a law.
+
+K_0, k_ref, D_0 and d_ref are not printed in the papers; these defaults are
+ours, see docs/model.md. The same requirements give each law gains of its own.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+from pydantic import model_validator
+
+from systems.parameters import Parameters, Positive
+
+__all__ = [
+    "Active2017Parameters",
+    "ActiveParameters",
+    "ConventionalParameters",
+    "RepulsionParameters",
+    "VelocityTerm",
+    "matched_decay",
+]
+
+VelocityTerm = Literal["printed", "closing"]
+
+
+def matched_decay(limit: float, ratio: float) -> float:
+    """limit / (2 ln ratio): both laws are equal at half the limit."""
+    return limit / (2.0 * math.log(ratio))
+
+
+class ConventionalParameters(Parameters):
+    """Spring and damper within a reach (Han 2019, eq. 19-a)."""
+
+    stiffness_n_m: Positive = 16.0
+    """K_0, N/m."""
+    damping_n_s_m: Positive = 0.8
+    """D_0, N s/m."""
+    reach_m: Positive = 0.8
+    """rho_0: the law acts below this distance, m (Han 2019, 5.2)."""
+
+
+class ActiveParameters(Parameters):
+    """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
+
+    alpha and beta make the law equal to a conventional one with ``matched``
+    gains at half the reach and at half the speed limit.
+    """
+
+    reference_stiffness_n_m: Positive = 64.0
+    """k_ref, N/m, above K_0."""
+    matched_stiffness_n_m: Positive = 16.0
+    """K_0, N/m: the push at rho_0/2 is K_0 rho_0/2."""
+    reach_m: Positive = 0.8
+    """rho_0, m (Han 2019, 5.2); the law itself has no end."""
+    reference_damping_n_s_m: Positive = 0.2
+    """d_ref, N s/m, below D_0."""
+    matched_damping_n_s_m: Positive = 0.8
+    """D_0, N s/m: the velocity term at mu_0/2 is D_0 mu_0/2."""
+    speed_limit_m_s: Positive = 0.72
+    """mu_0: the velocity term acts below this speed, m/s (5.3)."""
+
+    @model_validator(mode="after")
+    def _check(self) -> ActiveParameters:
+        if self.reference_stiffness_n_m <= self.matched_stiffness_n_m:
+            raise ValueError(
+                f"reference_stiffness_n_m: {self.reference_stiffness_n_m} (k_ref) is "
+                f"not above matched_stiffness_n_m {self.matched_stiffness_n_m} (K_0), "
+                "and alpha = rho_0 / (2 ln(k_ref/K_0)) must be positive; raise it"
+            )
+        if self.reference_damping_n_s_m >= self.matched_damping_n_s_m:
+            raise ValueError(
+                f"reference_damping_n_s_m: {self.reference_damping_n_s_m} (d_ref) is "
+                f"not below matched_damping_n_s_m {self.matched_damping_n_s_m} (D_0), "
+                "and beta = mu_0 / (2 ln(D_0/d_ref)) must be positive; lower it"
+            )
+        return self
+
+    @property
+    def alpha_m(self) -> float:
+        """Decay length of the spring, m (Han 2019, eq. 21)."""
+        ratio = self.reference_stiffness_n_m / self.matched_stiffness_n_m
+        return matched_decay(self.reach_m, ratio)
+
+    @property
+    def beta_m_s(self) -> float:
+        """Growth speed of the damper, m/s (eq. 22, misprinted)."""
+        ratio = self.matched_damping_n_s_m / self.reference_damping_n_s_m
+        return matched_decay(self.speed_limit_m_s, ratio)
+
+
+class Active2017Parameters(Parameters):
+    """Push that grows with nearness and saturates (Kim 2017, eq. 21, fig. 6).
+
+    Kim 2017 prints no number for any of these.
+    """
+
+    distance_gain_j: Positive = 1.1
+    """K_0, N m: the push is K_0/c. Not the K_0 of the other laws."""
+    saturation_distance_m: Positive = 0.1
+    """rho_1: nearer than this the push stays at K_0/rho_1, m."""
+    damping_n_s_m: Positive = 0.8
+    """D_0, N s/m."""
+    saturation_speed_m_s: Positive = 0.72
+    """mu_1: faster than this the velocity term stays at D_0 mu_1, m/s; the top
+    speed of the robot, which the paper names as the reason."""
+
+
+class RepulsionParameters(Parameters):
+    """What pushes the robot off obstacles; each law reads its own set."""
+
+    velocity_term: VelocityTerm = "printed"
+    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
+    conventional: ConventionalParameters = ConventionalParameters()
+    """Gains of ``law: conventional``."""
+    active: ActiveParameters = ActiveParameters()
+    """Gains of ``law: active``."""
+    active2017: Active2017Parameters = Active2017Parameters()
+    """Gains of ``law: active2017``."""
