@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization."""
+"""The command line: simulate, scenarios, locate, localization, design."""
 
 from __future__ import annotations
 
@@ -150,6 +150,25 @@ def _parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="print one JSON document"
     )
     localization.set_defaults(run=_localization)
+
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    design.add_argument(
+        "scenario", nargs="?", default="default", help="library name or YAML file"
+    )
+    design.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as attraction.damping_n_s_m=4; may be repeated",
+    )
+    design.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    design.add_argument("--json", action="store_true", help="print one JSON document")
+    design.set_defaults(run=_design)
     return parser
 
 
@@ -322,6 +341,37 @@ def _localization(options: argparse.Namespace) -> None:
         print(json.dumps(summary))
     else:
         print(localization_text(summary))
+        print(f"\nresults in {out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from analysis.run_report import SCHEMA_VERSION, versions
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, options.set)
+            directory = stack.enter_context(whole_directory(out))
+            with _Progress(STUDY_RUNS, "runs") as progress:
+                study = study_design(scenario, progress=progress)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        summary = {
+            "schema_version": SCHEMA_VERSION,
+            "scenario": scenario.name,
+            **study.to_dict(),
+            "versions": versions(),
+            "out": str(out),
+        }
+        write_design(study, summary, directory)
+    if options.json:
+        print(json.dumps(summary))
+    else:
+        print(design_text(study))
         print(f"\nresults in {out}")
 
 
