@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, design."""
+"""The command line: simulate, locate, localization, compare, stability, design."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from typing import Any, NoReturn
 __all__ = ["main"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+_LAWS = "none, conventional, active, active2017"
 
 
 class InputError(ValueError):
@@ -85,26 +86,9 @@ def _parser() -> argparse.ArgumentParser:
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     simulate = commands.add_parser("simulate", help="run a scenario")
-    simulate.add_argument(
-        "scenario", nargs="?", default="default", help="library name or YAML file"
-    )
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
-    simulate.add_argument("--seed", metavar="N", help="seed of all random numbers")
-    simulate.add_argument(
-        "--law", help="none, conventional, active, active2017, or package.module:Name"
-    )
-    simulate.add_argument(
-        "--velocity-term",
-        metavar="TERM",
-        help="printed (|dC/dt|) or closing (the speed of approach alone)",
-    )
-    simulate.add_argument(
-        "--set",
-        metavar="KEY=VALUE",
-        action="append",
-        default=[],
-        help="set any field, as source.speed_m_s=0.2; may be repeated",
-    )
+    simulate.add_argument("--law", help=f"{_LAWS}, or package.module:Name")
+    _take_scenario(simulate)
     simulate.add_argument(
         "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
     )
@@ -151,19 +135,79 @@ def _parser() -> argparse.ArgumentParser:
     )
     localization.set_defaults(run=_localization)
 
-    design = commands.add_parser(
-        "design", help="the laws' gains, derived from stated requirements"
+    compare = commands.add_parser(
+        "compare", help="laws side by side on the same random layouts"
     )
-    design.add_argument(
-        "scenario", nargs="?", default="default", help="library name or YAML file"
+    compare.add_argument(
+        "scenario",
+        nargs="*",
+        help="library name, YAML file of layouts, or YAML file of a scenario "
+        "(default: the papers' four experiments)",
     )
-    design.add_argument(
+    compare.add_argument(
+        "--laws", metavar="LAW,...", help="laws to compare (default: all of ours)"
+    )
+    compare.add_argument(
+        "--velocity-term",
+        metavar="TERM,...",
+        help="printed, closing, or both (default: the scenario's)",
+    )
+    compare.add_argument(
+        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+    )
+    compare.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
+    compare.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="set any field, as attraction.damping_n_s_m=4; may be repeated",
+        help="set any field, as hearing=ideal; may be repeated",
     )
+    compare.add_argument(
+        "--grid",
+        metavar="KEY=[VALUE,...]",
+        action="append",
+        default=[],
+        help="compare values of a further field, as hearing=[audio,ideal]",
+    )
+    compare.add_argument(
+        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+    )
+    compare.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    compare.add_argument(
+        "--resume", action="store_true", help="go on with the runs in --out"
+    )
+    compare.add_argument("--json", action="store_true", help="print one JSON document")
+    compare.set_defaults(run=_compare)
+
+    stability = commands.add_parser(
+        "stability", help="stability of a scenario's loop: report, models, numbers"
+    )
+    stability.add_argument(
+        "--law",
+        metavar="LAW",
+        action="append",
+        help=f"{_LAWS}, or package.module:Name; may be repeated, to compare laws; "
+        "all: the three laws that avoid obstacles (default: the scenario's law)",
+    )
+    _take_scenario(stability)
+    stability.add_argument(
+        "--full", action="store_true", help="everything, also what takes minutes"
+    )
+    stability.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    stability.add_argument(
+        "--json", action="store_true", help="print one JSON document"
+    )
+    stability.set_defaults(run=_stability)
+
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    _take_scenario(design)
     design.add_argument(
         "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
     )
@@ -172,14 +216,31 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
+def _take_scenario(command: argparse.ArgumentParser) -> None:
+    """A scenario, and the options that change its fields."""
+    command.add_argument(
+        "scenario", nargs="?", default="default", help="library name or YAML file"
+    )
+    command.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    command.add_argument(
+        "--velocity-term",
+        metavar="TERM",
+        help="printed (|dC/dt|) or closing (the speed of approach alone)",
+    )
+    command.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as source.speed_m_s=0.2; may be repeated",
+    )
+
+
 def _overrides(options: argparse.Namespace) -> list[str]:
     """The options that stand for fields, after --set so that they win."""
     overrides = list(options.set)
-    if options.sound is not None:
-        overrides += ["sound.kind=wav", f"sound.file={json.dumps(options.sound)}"]
     for option, field in (
         ("seed", "seed"),
-        ("law", "law"),
         ("velocity_term", "repulsion.velocity_term"),
     ):
         value = getattr(options, option)
@@ -196,7 +257,15 @@ def _simulate(options: argparse.Namespace) -> None:
     with ExitStack() as stack:
         try:
             out = choose_directory(options.out)
-            scenario = load_scenario(options.scenario, _overrides(options))
+            overrides = _overrides(options)
+            if options.sound is not None:
+                overrides += [
+                    "sound.kind=wav",
+                    f"sound.file={json.dumps(options.sound)}",
+                ]
+            if options.law is not None:
+                overrides.append(f"law={options.law}")
+            scenario = load_scenario(options.scenario, overrides)
             follower = build_sound_follower(scenario, log=True)
             # Made before the run: one that cannot be made must not cost a run.
             directory = stack.enter_context(whole_directory(out))
@@ -245,6 +314,7 @@ class _Progress:
             leave=False,
         )
         self._interrupted = False
+        self._steps = 0
 
     def __enter__(self) -> _Progress:
         signals = (signal.SIGINT, signal.SIGTERM)
@@ -258,6 +328,12 @@ class _Progress:
         self._bar.update(done - self._bar.n)
         if self._interrupted:
             raise KeyboardInterrupt
+
+    def step(self, title: str) -> None:
+        """Names what comes next; what came before is done."""
+        self._bar.set_description(title)
+        self(self._steps)
+        self._steps += 1
 
     def __exit__(self, *exception: Any) -> None:
         for number, handler in self._handlers.items():
@@ -344,32 +420,107 @@ def _localization(options: argparse.Namespace) -> None:
         print(f"\nresults in {out}")
 
 
-def _design(options: argparse.Namespace) -> None:
-    from analysis.design_study import STUDY_RUNS, study_design
-    from analysis.design_text import design_text, write_design
+def _stability(options: argparse.Namespace) -> None:
     from analysis.result_directory import choose_directory, whole_directory
-    from analysis.run_report import SCHEMA_VERSION, versions
+    from analysis.stability import analyse_law, chosen_laws
+    from analysis.stability_parts import parts
+    from analysis.stability_report import (
+        stability_document,
+        stability_text,
+        write_stability,
+    )
     from diagrams import load_scenario
 
     with ExitStack() as stack:
         try:
             out = choose_directory(options.out)
-            scenario = load_scenario(options.scenario, options.set)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            scenarios = chosen_laws(scenario, options.law or [])
+            directory = stack.enter_context(whole_directory(out))
+            work = parts(full=options.full)
+            total = len(work) * len(scenarios) + 1
+            progress = stack.enter_context(_Progress(total, "parts"))
+            analyses = [
+                analyse_law(each, work, step=progress.step) for each in scenarios
+            ]
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        except SystemExit as error:
+            raise RunError("Drake ended the analysis; its message is above") from error
+        progress.step("writing the report")
+        document = stability_document(analyses, out)
+        write_stability(analyses, document, directory)
+    if options.json:
+        print(json.dumps(document, allow_nan=False))
+    else:
+        print(stability_text(document))
+        print(f"\nreport in {out / 'report.html'}")
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from analysis.compare import prepare_comparison
+    from analysis.compare_options import comparison_plans
+    from analysis.compare_report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+
+    try:
+        plans = comparison_plans(
+            options.scenario,
+            laws=options.laws,
+            velocity_terms=options.velocity_term,
+            runs=options.runs,
+            seed=options.seed,
+            settings=options.set,
+            grid=options.grid,
+        )
+        prepared = prepare_comparison(
+            plans, options.out, workers=options.workers, resume=options.resume
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    try:
+        with _Progress(prepared.runs, "runs") as progress:
+            comparisons = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons)
+        write_comparison(prepared, comparisons, summary)
+    except RuntimeError as error:
+        raise RunError(str(error)) from error
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
+            "--resume"
+        ) from None
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(compare_text(summary, comparisons))
+        print(f"\nresults in {prepared.out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_summary, design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
             directory = stack.enter_context(whole_directory(out))
             with _Progress(STUDY_RUNS, "runs") as progress:
                 study = study_design(scenario, progress=progress)
         except ValueError as error:
             raise InputError.from_error(error) from None
-        summary = {
-            "schema_version": SCHEMA_VERSION,
-            "scenario": scenario.name,
-            **study.to_dict(),
-            "versions": versions(),
-            "out": str(out),
-        }
+        except SystemExit as error:
+            raise RunError("Drake ended the design; its message is above") from error
+        summary = design_summary(study, out)
         write_design(study, summary, directory)
     if options.json:
-        print(json.dumps(summary))
+        print(json.dumps(summary, allow_nan=False))
     else:
         print(design_text(study))
         print(f"\nresults in {out}")

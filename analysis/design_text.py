@@ -9,9 +9,10 @@ from typing import Any
 
 from analysis.design import Check
 from analysis.design_study import Alternative, DesignStudy
+from analysis.run_report import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
-__all__ = ["design_text", "write_design"]
+__all__ = ["design_summary", "design_text", "write_design"]
 
 
 def design_text(study: DesignStudy) -> str:
@@ -61,6 +62,17 @@ def _check_text(check: Check) -> str:
     unit = "" if check.unit == "1" else f" {check.unit}"
     value = 0.0 if math.isclose(check.value, 0.0, abs_tol=5e-4) else check.value
     return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"
+
+
+def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
+    """The JSON document of the study."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "scenario": study.today.scenario.name,
+        **study.to_dict(),
+        "versions": versions(),
+        "out": str(out),
+    }
 
 
 def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:

@@ -89,7 +89,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Args:
         result: The run.
         clearance: (n,) distance from the robot to the nearest body at each
-            tick, m (``analysis.metrics.clearance``); none leaves its panel out.
+            tick, m (``analysis.proximity``); none leaves its panel out.
 
     Raises:
         ValueError: ``clearance`` has not one value a tick.
@@ -99,7 +99,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     if distance is not None and distance.shape != result.time.shape:
         raise ValueError(
             f"clearance: {distance.shape} values for {result.time.shape} ticks; "
-            "give analysis.metrics.clearance of the same run"
+            "give the clearance of the same run (analysis.proximity)"
         )
     rows = len(panels) + (distance is not None)
     figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")

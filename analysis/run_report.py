@@ -8,7 +8,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from analysis.metrics import clearance, run_metrics
+from analysis.metrics import run_metrics
+from analysis.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
 
 __all__ = ["run_summary", "summary_text", "versions", "write_run"]
@@ -71,7 +72,7 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
-    plot_time_series(result, clearance(result)).savefig(
+    plot_time_series(result, Proximity(result).clearance).savefig(
         directory / "time_series.png", dpi=150
     )
     diagram = build_sound_follower(result.scenario).diagram

@@ -22,6 +22,7 @@ __all__ = [
     "sensor_pose",
     "sound_bursts",
     "tick_at",
+    "touching_point",
 ]
 
 #: Okabe and Ito's palette: told apart with any colour vision.
@@ -103,9 +104,6 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 def contact_point(result: RunResult) -> NDArray[np.float64]:
     """Where the robot touched what it hit, (2,) in W, m.
 
-    The mean of the corners of either rectangle that lie in the other, or of
-    the nearest ones if none does.
-
     Raises:
         ValueError: The run had no collision.
     """
@@ -115,8 +113,19 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     body = scenario.bodies()[hit.object].rectangle(hit.time)
     pose = result.poses("WB")[tick_at(result, hit.time)]
     footprint = robot_rectangle(pose, scenario.robot)
-    corners = np.concatenate([rectangle_corners(footprint), rectangle_corners(body)])
-    others = [body] * 4 + [footprint] * 4
+    return touching_point(footprint, body)
+
+
+def touching_point(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Where two rectangles touch, (2,) in their frame, m.
+
+    The mean of the corners of either that lie in the other, or of the nearest
+    ones if none does.
+    """
+    corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
+    others = [b] * 4 + [a] * 4
     away = [
         math.hypot(*nearest_point_on_rectangle(corner, other))
         for corner, other in zip(corners, others, strict=True)

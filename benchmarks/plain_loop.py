@@ -21,13 +21,18 @@ from systems.diff_drive_plant import body_twist, plant_derivatives
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
 from systems.mic_array import microphones_B, record_frame
-from systems.noise import BEFORE_THE_RUN, tick_generator
+from systems.noise import BEFORE_THE_RUN, standard_normals, tick_generator
 from systems.signals import FRAME_PERIOD_S
 from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.source_fix import SourceFix
 from systems.tdoa_estimator import port_values, robot_localiser
 from systems.tracker_model import Estimate, Track, TrackerModel
-from systems.ultrasonic_array import cone_ranges, measured_ranges, world_rectangles
+from systems.ultrasonic_array import (
+    SENSORS,
+    cone_ranges,
+    measured_ranges,
+    world_rectangles,
+)
 from systems.waveforms import make_waveform
 from systems.wheel_odometry import advance_pose, encoder_angle
 from systems.wheel_speed_command import (
@@ -128,7 +133,7 @@ class PlainLoop:
             true,
             scenario.ultrasonic,
             scenario.acoustics.c,
-            tick_generator(self.ultrasonic_seed, tick),
+            standard_normals((2, SENSORS), self.ultrasonic_seed, tick),
         )
         points = echo_points(ranges.tolist(), echo.tolist(), scenario.ultrasonic)
         vectors = collision_vectors(points, scenario.collision_vector)

@@ -91,6 +91,11 @@ class Body(NamedTuple):
         """(5,) x, y, theta, length, width in W at a time in s."""
         return np.array([*self.path.pose(time), *self.size])
 
+    def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 5) rectangles at many times at once."""
+        poses = self.path.poses(times)
+        return np.hstack([poses, np.tile(np.array(self.size), (len(poses), 1))])
+
 
 class Scenario(Parameters):
     """One run. Every field has a default: the default scenario is complete."""

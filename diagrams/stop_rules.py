@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
@@ -30,7 +31,8 @@ class Collision:
     object: str
     """Name of the obstacle, or ``source``."""
     fault: str
-    """``robot`` or ``obstacle``: who closed in faster on the line of centres."""
+    """``robot`` or ``obstacle``: who alone, the other standing still, would have
+    come nearer since the last tick; turning counts, a body at rest never is."""
     time: float
     """First contact, s, to a fifth of a tick."""
 
@@ -121,28 +123,36 @@ class StopRules:
                 continue
             instant = self._first_contact(time, pose, body)
             if instant is not None and (first is None or instant < first.time):
-                first = Collision(name, self._fault(time, pose, body.path), instant)
+                fault = self._fault(instant, time, pose, body)
+                first = Collision(name, fault, instant)
         return first
 
     def _first_contact(
         self, time: float, pose: list[float], body: Body
     ) -> float | None:
-        now = np.array(pose)
-        before = now if self._pose is None else np.array(self._pose)
-        robot = self.follower.scenario.robot
         for part in np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS:
             instant = self._time + part * (time - self._time)
-            footprint = robot_rectangle(before + part * (now - before), robot)
+            footprint = self._footprint(instant, time, pose)
             if rectangle_clearance(footprint, body.rectangle(instant)) < 0.0:
                 return float(instant)
         return None
 
-    def _fault(self, time: float, pose: list[float], path: Any) -> str:
-        """Who moves faster towards the other, along the line of centres."""
-        x, y, _ = path.pose(time)
-        towards = np.array([x - pose[0], y - pose[1]])
-        before = np.array(pose if self._pose is None else self._pose)
-        span = max(time - self._time, FRAME_PERIOD_S)
-        robot_speed = float((np.array(pose) - before)[:2] @ towards) / span
-        body_speed = -float(np.array(path.velocity(time)[:2]) @ towards)
-        return "robot" if robot_speed >= body_speed else "obstacle"
+    def _fault(self, instant: float, time: float, pose: list[float], body: Body) -> str:
+        """Who alone would have come nearer since the last tick, the other standing."""
+        robot_then = self._footprint(self._time, time, pose)
+        robot_now = self._footprint(instant, time, pose)
+        body_then, body_now = body.rectangle(self._time), body.rectangle(instant)
+        robot_alone = rectangle_clearance(robot_now, body_then)
+        body_alone = rectangle_clearance(robot_then, body_now)
+        return "robot" if robot_alone <= body_alone else "obstacle"
+
+    def _footprint(
+        self, instant: float, time: float, pose: list[float]
+    ) -> NDArray[np.float64]:
+        """The robot's rectangle between the last tick and this one."""
+        now = np.array(pose)
+        before = now if self._pose is None else np.array(self._pose)
+        part = (instant - self._time) / max(time - self._time, FRAME_PERIOD_S)
+        return robot_rectangle(
+            before + part * (now - before), self.follower.scenario.robot
+        )

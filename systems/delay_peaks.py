@@ -41,14 +41,14 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
     return 1.0 / (size + floor + np.finfo(np.float32).tiny)
 
 
-def _ramp(rests: NDArray[np.float64] | float) -> NDArray[np.float32]:
-    """(..., EDGE_SAMPLES) rising edges that begin late by some part of a sample."""
-    place = np.arange(EDGE_SAMPLES) + 0.5 - np.asarray(rests)[..., np.newaxis]
+def _ramp(rests: NDArray[np.float64]) -> NDArray[np.float32]:
+    """(n, EDGE_SAMPLES) rising edges that begin late by some part of a sample."""
+    place = np.arange(EDGE_SAMPLES) + 0.5 - rests[:, np.newaxis]
     share = np.clip(place / EDGE_SAMPLES, 0.0, 1.0)
     return (0.5 - 0.5 * np.cos(np.pi * share)).astype(np.float32)
 
 
-_RAMP = _ramp(0.0)
+_EVEN_RAMPS = _ramp(np.zeros(1)), _ramp(np.zeros(1))
 
 
 def cut_to_overlap(
@@ -61,16 +61,44 @@ def cut_to_overlap(
         arrivals: (n,) arrival at each channel after channel 0, samples. Channels
             are cut at whole samples; their edges follow what is left of it.
     """
-    starts = np.rint(arrivals).astype(np.int64)
-    rests = arrivals - starts
-    starts -= starts.min()
-    length = frame.shape[1] - int(starts.max())
-    cut = np.stack([frame[k, s : s + length] for k, s in enumerate(starts)])
-    if length >= 2 * EDGE_SAMPLES:
-        broken = rests.any()
-        cut[:, :EDGE_SAMPLES] *= _ramp(rests) if broken else _RAMP
-        cut[:, -EDGE_SAMPLES:] *= (_ramp(-rests) if broken else _RAMP)[..., ::-1]
+    whole = np.rint(arrivals)
+    rests = arrivals - whole
+    starts = (whole - whole.min()).astype(np.int64)
+    rising, falling = (_ramp(rests), _ramp(-rests)) if rests.any() else _EVEN_RAMPS
+    return _cut(frame, starts, rising, falling)
+
+
+@njit(cache=True)
+def _cut(frame, starts, rising, falling):  # pragma: no cover  (compiled)
+    """``cut_to_overlap`` from starts, and edges that are alike or one a channel."""
+    channels, samples = frame.shape
+    length = samples - starts.max()
+    cut = np.empty((channels, length), dtype=frame.dtype)
+    edge = rising.shape[1] if length >= 2 * rising.shape[1] else 0
+    for m in range(channels):
+        ramp = m if rising.shape[0] > 1 else 0
+        cut[m] = frame[m, starts[m] : starts[m] + length]
+        for k in range(edge):
+            cut[m, k] *= rising[ramp, k]
+            cut[m, length - 1 - k] *= falling[ramp, k]
     return cut
+
+
+@njit(cache=True)
+def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
+    """Cross-spectra (p, bins) of pairs of channels, and energies (n,)."""
+    channels, bins = spectra.shape
+    energy = np.zeros(channels)
+    for m in range(channels):
+        for k in range(bins):
+            a = spectra[m, k]
+            energy[m] += a.real * a.real + a.imag * a.imag
+    cross = np.empty((len(pairs), bins), dtype=spectra.dtype)
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        for k in range(bins):
+            cross[p, k] = spectra[i, k].conjugate() * spectra[j, k]
+    return cross, energy
 
 
 @njit(cache=True)
@@ -229,11 +257,10 @@ def find_peaks(
     whole = np.rint(arrivals)
     cut = cut_to_overlap(frame, whole)
     spectra = fft.rfft(cut, length)[:, band]
-    energy = np.asarray(np.sum(np.abs(spectra) ** 2, axis=1, dtype=np.float64))
+    cross, energy = _pair_spectra(spectra, tables.pairs)
     if not energy.min() > 0.0:
         return None
     first, second = tables.pairs.T
-    cross = spectra[first].conj() * spectra[second]
     weights = whitening(cross) if phat else np.ones(cross.shape, dtype=np.float32)
     step = 2.0 * math.pi / length
     rest = arrivals - whole

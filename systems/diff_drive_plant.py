@@ -22,7 +22,7 @@ __all__ = [
     "plant_derivatives",
 ]
 
-_Slip = Annotated[float, Field(ge=0.0, lt=1.0)]
+_Slip = Annotated[float, Field(gt=-1.0, lt=1.0)]
 
 
 class PlantParameters(Parameters):
@@ -31,7 +31,8 @@ class PlantParameters(Parameters):
     motor_lag_s: Positive = 0.05
     """Time constant of each wheel's speed loop, s; not printed, ours."""
     slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
-    """Part of the left and right rim speed that is lost; unseen by the encoders."""
+    """Part of the left and right rim speed that is lost, unseen by the encoders;
+    negative: the wheel is larger than ``wheel_radius_m`` by this share."""
 
 
 def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):

@@ -8,16 +8,19 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
+from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
-from systems.coherent import refine_source
+from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
+from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
+from systems.steered_response import NEAREST_M
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
@@ -32,6 +35,14 @@ _NOISE_MARGIN = 3.0
 
 # Frames over which the level of the noise is averaged.
 _NOISE_FRAMES = 8.0
+
+# A knock may raise that level no more than a noise of so many times it.
+_LOUDEST_NOISE = 2.0
+
+# Share of frames of steady white noise that are loud enough to be searched for a
+# sound; frames that are no louder than the noise are not. A sound 15 dB below it
+# would still be searched for, while none is found below 12 dB.
+_SEARCHED_SHARE = 0.1
 
 # Frames whose echoes were suppressed are believed from this correlation on, and up
 # to this ambiguity.
@@ -62,11 +73,15 @@ class TDOAParameters(Parameters):
     sound_speed_m_s: Positive | None = None
     """Speed of sound that the estimator believes in, m/s; unset: the true one."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
-    """Share of frames of noise alone in which a sound is heard."""
+    """Share of frames of steady noise in which a sound is heard, at most."""
     suppress_echoes: bool = True
     """Weigh frames with echoes by the precedence of the first wave front."""
     maximum_closure_s: Positive = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
+    maximum_misfit: Fraction = 0.05
+    """Largest disagreement of a delay with that of the place beyond
+    ``maximum_closure_s``, as a share of the longest that sound can take across the
+    array. It shows with four microphones or more."""
     maximum_ambiguity: Fraction = 0.8
     """Largest second peak over the first one."""
     maximum_bearing_std_deg: Positive = 3.0
@@ -86,11 +101,18 @@ class TDOAParameters(Parameters):
 class HearingMemory(NamedTuple):
     """What a frame leaves behind for the next one."""
 
+    energy: float
+    """Of a frame between the sounds, units of the frame squared; 0 until such a
+    frame was heard."""
     noise_energy: float
-    """Of the mean channel within the band between the sounds, units of the frame
-    squared; 0 until such a frame was heard."""
+    """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
     """(n, bins) see ``systems.precedence``."""
+
+
+def _averaged(known: float, new: float) -> float:
+    """The level of the noise after one more frame."""
+    return known + (min(new, _LOUDEST_NOISE * known) - known) / _NOISE_FRAMES
 
 
 class Localiser:
@@ -105,6 +127,11 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+        # The energy of white noise scatters by the root of 2 over its samples, and
+        # what it is compared with is known as well as an average can be.
+        variance = 2.0 / (plan.shape.count * plan.frame_samples)
+        variance *= 1.0 + 1.0 / (2.0 * _NOISE_FRAMES - 1.0)
+        self._loud = 1.0 - float(ndtri(_SEARCHED_SHARE)) * math.sqrt(variance)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -125,7 +152,7 @@ class Localiser:
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
-        return HearingMemory(0.0, self._sizes.silent())
+        return HearingMemory(0.0, 0.0, self._sizes.silent())
 
     def localise(
         self, frame: NDArray[np.float32], memory: HearingMemory
@@ -139,7 +166,16 @@ class Localiser:
         Returns:
             The source on the side of ``ArrayShape.ahead``, or None where nothing
             is heard, and the new memory.
+
+        Raises:
+            ValueError: The frame is no frame of this array, or not finite.
         """
+        energy = self._checked_energy(frame)
+        searched = 1.0
+        if memory.energy > 0.0:
+            if energy <= self._loud * memory.energy:
+                return None, self._after_noise(memory, energy)
+            searched = _SEARCHED_SHARE
         seen = look(
             frame,
             self.plan,
@@ -149,8 +185,17 @@ class Localiser:
         if seen is None:
             return None, memory
         search = seen[0]
-        if search.chance > self.parameters.false_alarm_rate:
-            return None, self._after_noise(memory, search.energy)
+        if searched * search.chance > self.parameters.false_alarm_rate:
+            return None, self._after_noise(memory, energy, search.energy)
+        return self._locate(frame, seen, memory)
+
+    def _locate(
+        self,
+        frame: NDArray[np.float32],
+        seen: tuple[DelaySearch, slice],
+        memory: HearingMemory,
+    ) -> tuple[SourceFix | None, HearingMemory]:
+        """Where the sound comes from that ``look`` has seen in a frame."""
         if not self.parameters.suppress_echoes:
             return self._fix(frame, self._delays(frame, seen)), memory
         delays = self._delays(frame, seen)
@@ -167,6 +212,33 @@ class Localiser:
             return None, memory
         return self._fix(dry, delays, self._echo_errors(news)), memory
 
+    def _checked_energy(self, frame: NDArray[np.float32]) -> float:
+        expected = (self.plan.shape.count, self.plan.frame_samples)
+        if frame.shape != expected:
+            raise ValueError(
+                f"audio: a frame of shape {frame.shape}; give a channel for each of "
+                f"the {expected[0]} microphones, of {expected[1]} samples"
+            )
+        energy = float(np.vdot(frame, frame))
+        if not math.isfinite(energy) and not np.isfinite(frame).all():
+            channel, sample = np.argwhere(~np.isfinite(frame))[0]
+            raise ValueError(
+                f"audio: channel {channel + 1}: sample {sample} is "
+                f"{frame[channel, sample]}; give numbers"
+            )
+        return energy
+
+    def _is_place(self, fix: SourceFix, tau: NDArray[np.float64]) -> bool:
+        """Whether a source could be there, and the delays be those from there."""
+        shape, c = self.plan.shape, self.plan.c
+        if fix.range_valid and fix.range < NEAREST_M:
+            return False
+        if shape.freedom <= 0:
+            return True
+        limit = self.parameters.maximum_closure_s
+        limit += self.parameters.maximum_misfit * shape.max_delay(c)
+        return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
+
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
             frame,
@@ -176,14 +248,22 @@ class Localiser:
             seen=seen,
         )
 
-    def _after_noise(self, memory: HearingMemory, energy: float) -> HearingMemory:
-        known = memory.noise_energy
+    def _after_noise(
+        self, memory: HearingMemory, energy: float, noise_energy: float | None = None
+    ) -> HearingMemory:
+        """Noise of a frame's energy, and of that within the band if it is known."""
         echoes = memory.echoes
         if echoes.any():
             echoes = self._sizes.faded(echoes, self.plan.frame_samples)
-        if known > 0.0:
-            energy = known + (energy - known) / _NOISE_FRAMES
-        return HearingMemory(energy, echoes)
+        if not memory.energy > 0.0:
+            return HearingMemory(energy, noise_energy or 0.0, echoes)
+        if noise_energy is None:
+            noise_energy = memory.noise_energy * energy / memory.energy
+        return HearingMemory(
+            _averaged(memory.energy, energy),
+            _averaged(memory.noise_energy, noise_energy),
+            echoes,
+        )
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
         """Whether noise alone explains what the channels do not share."""
@@ -218,6 +298,8 @@ class Localiser:
         if echoes is not None:
             covariance = covariance + echoes
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if not self._is_place(fix, delays.tau):
+            return None
         if parameters.method == "ml" and echoes is None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length

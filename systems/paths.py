@@ -13,6 +13,9 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 __all__ = ["WaypointPath", "seconds"]
 
 AtEnd = Literal["stop", "shuttle"]
@@ -118,6 +121,34 @@ class WaypointPath:
         s, _ = self._arc_length(time)
         segment, along = self._find(s)
         return segment.pose(along)
+
+    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
+        times = np.asarray(times, dtype=float)
+        if not self.moves:
+            return np.tile(np.array(self.pose(0.0)), (len(times), 1))
+        s = np.maximum(self._speed * (times - self._start_time), 0.0)
+        if self._at_end == "stop":
+            s = np.minimum(s, self.length)
+        else:
+            s = self.length - np.abs(s % (2.0 * self.length) - self.length)
+        ends = np.array(self._ends)
+        index = np.minimum(np.searchsorted(ends, s, side="right"), len(ends) - 1)
+        x, y, theta, curvature, length = np.array(
+            [(g.x, g.y, g.theta, g.curvature, g.length) for g in self._segments]
+        )[index].T
+        along = s - (ends[index] - length)
+        # Chord of the arc: its length tends to ``along`` as the curvature vanishes.
+        half = 0.5 * curvature * along
+        chord = along * np.sinc(half / np.pi)
+        return np.stack(
+            [
+                x + chord * np.cos(theta + half),
+                y + chord * np.sin(theta + half),
+                theta + 2.0 * half,
+            ],
+            axis=1,
+        )
 
     def velocity(self, time: float) -> tuple[float, float, float]:
         """(vx, vy, omega) in W at a time in s; m/s and rad/s."""

@@ -23,7 +23,7 @@ __all__ = ["EchoMemory", "keep_first_wave_front"]
 _WINDOW_S = 2.56e-3
 _HOPS_PER_WINDOW = 4
 
-# Memory of a room that decays by 60 dB in 0.35 s; the trials in
+# Memory of a room that decays by 60 dB in 0.69 s; the trials in
 # docs/localization.md change little from 20 to 100 ms.
 _DECAY_S = 0.05
 

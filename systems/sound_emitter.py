@@ -78,7 +78,7 @@ def make_emission(
         path: (k, 4) x, y, vx, vy of the source in W at the last k ticks, the
             last one now; m and m/s.
     """
-    ages = FRAME_PERIOD_S * np.arange(len(path) - 1.0, -1.0, -1.0)
+    ages = _tick_ages(len(path))
     count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
@@ -92,6 +92,11 @@ def make_emission(
         level_pa=sound.level_pa,
         sounding=samples is not None,
     )
+
+
+@cache
+def _tick_ages(count: int) -> NDArray[np.float64]:
+    return FRAME_PERIOD_S * np.arange(count - 1.0, -1.0, -1.0)
 
 
 @cache

@@ -6,15 +6,15 @@ import math
 from typing import Annotated, Literal
 
 import numpy as np
-from numpy.random import Generator
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 from pydrake.systems.framework import LeafSystem
+from scipy.special import ndtri
 
 from systems.acoustics import AcousticParameters
 from systems.cache import declare_cache
 from systems.geometry import cone_range, control_point, rotate
-from systems.noise import tick_generator
+from systems.noise import standard_normals
 from systems.parameters import Fraction, NonNegative, Parameters, Point, Positive, Size
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
@@ -111,7 +111,7 @@ def measured_ranges(
     true_ranges: NDArray[np.float64],
     parameters: UltrasonicParameters,
     sound_speed: float,
-    rng: Generator,
+    numbers: NDArray[np.floating],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """What the sensors report of the true ranges.
 
@@ -119,19 +119,20 @@ def measured_ranges(
         true_ranges: (3,) m, infinity where a cone is empty.
         parameters: The sensors.
         sound_speed: True speed of sound, m/s.
-        rng: Source of noise and dropouts; two draws a sensor.
+        numbers: (2, 3) standard normal: noise, and luck, which drops an echo
+            where it is below the quantile of the probability of that.
 
     Returns:
         (3,) ranges in [minimum, maximum], m, and (3,) echoes, 0 or 1. Without
         an echo the range is finite and means nothing.
     """
-    noise = rng.standard_normal(SENSORS).tolist()
-    luck = rng.random(SENSORS).tolist()
+    noise, luck = numbers.tolist()
+    needed = float(ndtri(parameters.dropout_probability))
     stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
     low, high = parameters.minimum_range_m, parameters.maximum_range_m
     ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
     for k, true_range in enumerate(true_ranges.tolist()):
-        if true_range <= high and luck[k] >= parameters.dropout_probability:
+        if true_range <= high and luck[k] >= needed:
             measured = stretch * true_range + parameters.noise_m * noise[k]
             ranges[k] = min(max(measured, low), high)
             echo[k] = 1.0
@@ -221,10 +222,12 @@ class UltrasonicArray(LeafSystem):
             port.Eval(context) for port in self._inputs
         )
         tick = round(context.get_time() / FRAME_PERIOD_S)
-        rng = tick_generator(self._seed, tick)
+        numbers = standard_normals((2, SENSORS), self._seed, tick)
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
         true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
-        ranges, echo = measured_ranges(true, self._parameters, self._sound_speed, rng)
+        ranges, echo = measured_ranges(
+            true, self._parameters, self._sound_speed, numbers
+        )
         if self._parameters.firing == "simultaneous":
             return ranges, echo
         held = context.get_discrete_state(0).CopyToVector().reshape(2, SENSORS)

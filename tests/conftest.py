@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+import shutil
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
 
 import hypothesis
 import numpy as np
@@ -46,3 +49,59 @@ def forbid_global_numpy_generator() -> Iterator[None]:
     np.testing.assert_equal(
         after, before, err_msg="drawn from numpy's global generator; pass a seed"
     )
+
+
+#: Chromium without a window: no call home, and no way out, for every name is
+#: unknown and the proxy is nowhere.
+_CHROMIUM_FLAGS = (
+    "--headless=new",
+    "--no-sandbox",
+    "--enable-unsafe-swiftshader",
+    "--no-first-run",
+    "--disable-background-networking",
+    "--disable-component-update",
+    "--disable-sync",
+    "--enable-logging=stderr",
+    "--host-resolver-rules=MAP * ~NOTFOUND",
+    "--proxy-server=127.0.0.1:9",
+    "--window-size=900,600",
+)
+
+
+def _without_network() -> list[str]:
+    """A prefix that takes a program's network away, where that is permitted."""
+    prefix = ["unshare", "--map-root-user", "--net"]
+    tried = subprocess.run([*prefix, "true"], capture_output=True, check=False)
+    return prefix if tried.returncode == 0 else []
+
+
+@pytest.fixture(scope="session")
+def chromium(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
+    """Opens a page without network: ``chromium(page, option, ...)`` -> its log.
+
+    What a page writes to its console stands in the log after ``CONSOLE``.
+    """
+    browser = shutil.which("chromium")
+    if browser is None:
+        pytest.fail("chromium is not on PATH; install the package chromium")
+    prefix = _without_network()
+
+    def run(page: Path, *options: str) -> str:
+        profile = tmp_path_factory.mktemp("profile")
+        done = subprocess.run(
+            [
+                *prefix,
+                browser,
+                *_CHROMIUM_FLAGS,
+                f"--user-data-dir={profile}",
+                *options,
+                page.as_uri(),
+            ],
+            capture_output=True,
+            text=True,
+            timeout=180.0,
+            check=False,
+        )
+        return done.stderr
+
+    return run

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-import subprocess
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -15,63 +14,32 @@ from diagrams import load_scenario, simulate
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
-#: No call home, and no way out: every name is unknown, and the proxy is nowhere.
-FLAGS = (
-    "--headless=new",
-    "--no-sandbox",
-    "--enable-unsafe-swiftshader",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--host-resolver-rules=MAP * ~NOTFOUND",
-    "--proxy-server=127.0.0.1:9",
-    "--window-size=900,600",
-    "--virtual-time-budget=8000",
-)
+Chromium = Callable[..., str]
+
 #: Animation times of the two pictures, s; the source is silent in both.
 EARLY_S, LATE_S = 0.8, 5.8
-TIMEOUT_S = 180.0
 
 
-def _without_network() -> list[str]:
-    """A prefix that takes a program's network away, where that is permitted."""
-    prefix = ["unshare", "--map-root-user", "--net"]
-    tried = subprocess.run([*prefix, "true"], capture_output=True, check=False)
-    return prefix if tried.returncode == 0 else []
-
-
-def _picture(page: Path, time: float, folder: Path) -> np.ndarray:
+def _picture(chromium: Chromium, page: Path, time: float) -> np.ndarray:
     """(rows, columns, 3) screenshot of the page's animation at a time, in 0..1."""
-    browser = shutil.which("chromium")
-    if browser is None:
-        pytest.fail("chromium is not on PATH; install the package chromium")
     seek = f"viewer.animator.pause(); viewer.animator.seek({time})"
     script = f"<script>setTimeout(() => {{ {seek} }}, 2500)</script></body>"
-    sought = folder / f"at_{time}.html"
+    sought = page.parent / f"at_{time}.html"
     sought.write_text(page.read_text().replace("</body>", script))
-    shot = folder / f"at_{time}.png"
-    command = [
-        *_without_network(),
-        browser,
-        *FLAGS,
-        f"--user-data-dir={folder / f'profile_{time}'}",
-        f"--screenshot={shot}",
-        sought.as_uri(),
-    ]
-    done = subprocess.run(
-        command, capture_output=True, text=True, timeout=TIMEOUT_S, check=False
-    )
-    assert shot.is_file(), f"chromium took no picture: {done.stderr[-2000:]}"
+    shot = page.parent / f"at_{time}.png"
+    chromium(sought, "--virtual-time-budget=8000", f"--screenshot={shot}")
+    assert shot.is_file()
     return np.asarray(imread(shot))[:, :, :3]
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory: pytest.TempPathFactory) -> list[np.ndarray]:
+def pictures(
+    tmp_path_factory: pytest.TempPathFactory, chromium: Chromium
+) -> list[np.ndarray]:
     folder = tmp_path_factory.mktemp("replay")
     result = simulate(load_scenario("default", ["hearing=ideal", "duration_s=6"]))
     write_replay(result, folder / "replay.html")
-    return [_picture(folder / "replay.html", t, folder) for t in (EARLY_S, LATE_S)]
+    return [_picture(chromium, folder / "replay.html", t) for t in (EARLY_S, LATE_S)]
 
 
 def _place(picture: np.ndarray, channel: int) -> np.ndarray:

@@ -64,6 +64,8 @@ def test_scenarios_lists_the_papers_experiments(capsys):
         "two_static_obstacles",
         "one_moving_obstacle",
         "two_moving_obstacles",
+        "corridor",
+        "u_trap",
     } <= set(listed)
 
 

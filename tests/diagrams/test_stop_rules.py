@@ -105,6 +105,17 @@ def test_box_that_drives_into_a_waiting_robot_is_at_fault():
     assert touch <= result.collision.time <= touch + 0.0051
 
 
+def test_turning_into_a_box_at_rest_is_the_robots_fault():
+    """The bar's left end sweeps back onto a box behind it, and the centre leaves."""
+    box = {"name": "box", "waypoints_m": [[-0.3, 0.3]], "size_m": [0.1, 0.1]}
+    result = run(source={"waypoints_m": [[0.6, 2.4]]}, obstacles=[box], duration_s=20.0)
+    assert result.collision is not None
+    assert (result.collision.object, result.collision.fault) == ("box", "robot")
+    before, now = result.poses("WB")[-2:]
+    away = now[:2] - before[:2]
+    assert away @ (np.array([-0.3, 0.3]) - before[:2]) < 0.0
+
+
 def test_the_source_can_be_hit_too():
     result = run(
         source={"waypoints_m": [[1.2, 0.0]]},
@@ -132,7 +143,7 @@ def test_contact_between_two_ticks_is_found():
     }
     result = run(**WAITING, start={"heading_deg": 45.0}, obstacles=[speck])
     assert result.collision is not None
-    assert result.collision.object == "speck"
+    assert (result.collision.object, result.collision.fault) == ("speck", "obstacle")
     assert result.collision.time == pytest.approx(20.5 * 0.025, abs=0.005)
 
     robot = robot_rectangle(result.scenario.start.pose, result.scenario.robot)

@@ -96,6 +96,17 @@ def test_slip_loses_rim_speed_and_no_wheel_angle():
     np.testing.assert_allclose(result["wheel_angles"], 5.0 * lagged(1.0))
 
 
+def test_larger_wheels_drive_farther_than_they_turn():
+    worn = drive(
+        DiffDrivePlant(plant=PlantParameters(slip=(-0.02, -0.02))), (5, 5), 1.0
+    )
+    larger = drive(
+        DiffDrivePlant(robot=RobotParameters(wheel_radius_m=0.0612)), (5, 5), 1.0
+    )
+    np.testing.assert_allclose(worn["pose_WB"], larger["pose_WB"])
+    np.testing.assert_allclose(worn["wheel_angles"], 5.0 * lagged(1.0))
+
+
 def test_own_dimensions():
     robot = RobotParameters(wheel_radius_m=0.1, wheel_separation_m=0.5)
     result = drive(DiffDrivePlant(robot=robot), (1.0, 2.0), 1.0)

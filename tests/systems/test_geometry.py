@@ -13,6 +13,7 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from systems.geometry import (
     cone_range,
+    contact_time,
     control_point,
     nearest_point_on_rectangle,
     rectangle_clearance,
@@ -232,3 +233,31 @@ def test_overlap_is_undone_by_its_depth(a, heading, length, width, u, v):
 )
 def test_clearance_in_closed_form(b, expected):
     assert clearance((0.0, 0.0, 0.0, 2.0, 1.0), b) == pytest.approx(expected)
+
+
+def approach(a, b, velocity, time) -> float:
+    return clearance((a[0] + time * velocity[0], a[1] + time * velocity[1], *a[2:]), b)
+
+
+@given(a=rectangles, b=rectangles, vx=st.floats(-2, 2), vy=st.floats(-2, 2))
+def test_contact_time_is_when_the_clearance_vanishes(a, b, vx, vy):
+    time = contact_time(np.array(a, float), np.array(b, float), vx, vy)
+    ahead = np.linspace(0.0, 20.0, 60)
+    if math.isinf(time):
+        assert min(approach(a, b, (vx, vy), t) for t in ahead) > -1e-6
+        return
+    assert approach(a, b, (vx, vy), time) <= 1e-6
+    if time > 0.0:
+        earlier = time * ahead / 20.001
+        assert all(approach(a, b, (vx, vy), t) > -1e-6 for t in earlier)
+
+
+def test_contact_time_in_numbers():
+    """Faces 3 m apart at 0.5 m/s; 45 deg later the corner comes first."""
+    a, b = np.array([0, 0, 0, 1.0, 1.0]), np.array([4.0, 0, 0, 1.0, 1.0])
+    assert contact_time(a, b, 0.5, 0.0) == pytest.approx(6.0)
+    assert math.isinf(contact_time(a, b, -0.5, 0.0))
+    assert math.isinf(contact_time(a, b, 0.0, 0.0))
+    a[2] = math.pi / 4
+    assert contact_time(a, b, 0.5, 0.0) == pytest.approx((3.5 - math.sqrt(0.5)) / 0.5)
+    assert contact_time(b, b, 0.5, 0.0) == 0.0

@@ -148,3 +148,20 @@ def test_no_speed_no_motion():
 def test_impossible_paths_say_how_to_mend_them(points, message):
     with pytest.raises(ValueError, match=message):
         WaypointPath(points, speed=0.3)
+
+
+@given(
+    points=waypoint_lists,
+    radius=st.sampled_from([0.0, 0.1, 0.5]),
+    at_end=st.sampled_from(["stop", "shuttle"]),
+)
+def test_many_poses_at_once_are_those_one_by_one(points, radius, at_end):
+    path = make_path(points, corner_radius=radius, at_end=at_end, start_time=1.0)
+    times = np.linspace(0.0, 4.0 + 2.5 * path.length / 0.3, 41) + 1e-6
+    one_by_one = np.array([path.pose(t) for t in times])
+    np.testing.assert_allclose(path.poses(times), one_by_one, atol=1e-9)
+
+
+def test_many_poses_of_a_body_at_rest():
+    path = WaypointPath([(1.0, 2.0)], speed=0.3, heading=0.5)
+    np.testing.assert_array_equal(path.poses([0.0, 9.0]), [[1.0, 2.0, 0.5]] * 2)

@@ -1,0 +1,119 @@
+"""How smoothly a body moves: jerk, spectral arc length, turning to and fro."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "jerk",
+    "log_dimensionless_jerk",
+    "spectral_arc_length",
+    "turn_reversals",
+    "windows",
+]
+
+#: Samples of the cubic that ``jerk`` fits: 0.25 s at 25 ms.
+JERK_WINDOW = 11
+#: ``spectral_arc_length``: highest frequency, Hz, and least relative magnitude.
+CUTOFF_HZ = 10.0
+THRESHOLD = 0.05
+#: Zeros are appended to this many times the samples, as a power of two.
+PADDING = 4
+
+
+def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
+    """Second derivative of a velocity, of a cubic fitted to 11 samples.
+
+    A least-squares cubic over 0.25 s (a Savitzky-Golay filter) resamples
+    nothing and passes slow motion: a sine of 1 Hz comes out 5 % low, of 2 Hz
+    19 %, of 5 Hz 79 %.
+
+    Args:
+        velocity: (n,) or (n, k) at even intervals, m/s (or rad/s).
+        period: Interval, s.
+
+    Returns:
+        (n - 10,) or (n - 10, k), m/s^3: samples whose window is whole; empty
+        where there are fewer than 11.
+    """
+    velocity = np.asarray(velocity, dtype=float)
+    if len(velocity) < JERK_WINDOW:
+        return np.empty((0, *velocity.shape[1:]))
+    half = JERK_WINDOW // 2
+    offsets = np.arange(-half, half + 1) * period
+    # The even part of the cubic is a + c t^2, and its second derivative 2 c.
+    c = np.linalg.pinv(np.stack([np.ones(JERK_WINDOW), offsets**2], axis=1))[1]
+    return 2.0 * sliding_window_view(velocity, JERK_WINDOW, axis=0) @ c
+
+
+def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
+    """SPARC: minus the length of the speed's normalised magnitude spectrum.
+
+    Balasubramanian et al. 2012, 2015; zero for no movement at all frequencies,
+    more negative the less smooth. Made for movements of a few seconds: long
+    ones are cut into ``windows``.
+
+    Args:
+        speed: (..., n) m/s; a window at rest throughout has no arc length.
+        rate_hz: Samples a second.
+
+    Returns:
+        (...) dimensionless.
+    """
+    speed = np.asarray(speed, dtype=float)
+    count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
+    magnitude = np.abs(np.fft.rfft(speed, count))
+    magnitude /= np.max(magnitude, axis=-1, keepdims=True)
+    frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
+    magnitude = magnitude[..., frequency <= CUTOFF_HZ]
+    loud = magnitude >= THRESHOLD
+    first = np.argmax(loud, axis=-1)
+    last = loud.shape[-1] - 1 - np.argmax(loud[..., ::-1], axis=-1)
+    step = 1.0 / np.maximum(last - first, 1)
+    index = np.arange(loud.shape[-1] - 1)
+    inside = (index >= first[..., None]) & (index < last[..., None])
+    lengths = np.hypot(step[..., None], np.diff(magnitude, axis=-1))
+    return -np.sum(np.where(inside, lengths, 0.0), axis=-1)
+
+
+def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
+    """LDLJ: -ln of T^3 / v_peak^2 times the integral of v''^2.
+
+    Balasubramanian et al. 2015, with plain differences as there; more negative
+    the less smooth.
+
+    Args:
+        speed: (..., n) m/s; neither at rest throughout nor of constant slope.
+        rate_hz: Samples a second.
+
+    Returns:
+        (...) dimensionless.
+    """
+    speed = np.asarray(speed, dtype=float)
+    duration = speed.shape[-1] / rate_hz
+    second = np.diff(speed, 2, axis=-1) * rate_hz**2
+    integral = np.sum(second**2, axis=-1) / rate_hz
+    return -np.log(duration**3 / np.max(np.abs(speed), axis=-1) ** 2 * integral)
+
+
+def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
+    """(w, length) consecutive windows; an incomplete last one is left out."""
+    values = np.asarray(values, dtype=float)
+    count = len(values) // length
+    return values[: count * length].reshape(count, length)
+
+
+def turn_reversals(turn_rate: ArrayLike, least: float) -> int:
+    """How often a body turns back: changes of side of its turn rate.
+
+    Args:
+        turn_rate: (n,) rad/s.
+        least: Rates below this are no turn, rad/s.
+    """
+    rate = np.asarray(turn_rate, dtype=float)
+    sides = np.sign(rate[np.abs(rate) >= least])
+    return int(np.count_nonzero(np.diff(sides)))

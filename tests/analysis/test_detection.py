@@ -1,0 +1,79 @@
+"""False alarms and the detection curve: what is counted, and as what."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from analysis.detection import detection_curve, noise_chances
+from analysis.free_field import Loudspeaker
+from systems.array_shape import ArrayShape
+from systems.localise import Localiser, TDOAParameters
+from systems.noise import tick_generator
+from systems.robot import RobotParameters
+
+C = 340.0
+SHAPE = ArrayShape.of(RobotParameters().microphones_m)
+CHIRP = Loudspeaker.of("chirp", seed=3)
+
+
+def curve(levels_db, trials=12, **changes):
+    settings = {"shape": SHAPE, "c": C, "trials": trials, "seed": 2, **changes}
+    return detection_curve(CHIRP, levels_db, **settings)
+
+
+def test_chances_belong_to_the_seed_and_to_each_frame():
+    """The first frames of a longer run are those of a shorter one."""
+    few = noise_chances(20, shape=SHAPE, c=C, seed=9)
+    many = noise_chances(40, shape=SHAPE, c=C, seed=9)
+    np.testing.assert_array_equal(many[:20], few)
+    assert np.unique(many).size == 40
+    assert ((many > 0.0) & (many <= 1.0)).all()
+    assert not np.isin(noise_chances(20, shape=SHAPE, c=C, seed=8), few).any()
+
+
+def test_a_chance_is_a_false_alarm_of_every_rate_above_it():
+    """The localiser hears something in a frame if and only if its rate is higher."""
+    seed, tick = 9, 3
+    chance = float(noise_chances(tick + 1, shape=SHAPE, c=C, seed=seed)[tick])
+    noise = tick_generator(seed, tick).standard_normal((3, 2500), dtype=np.float32)
+    for factor, heard in ((1.01, True), (0.99, False)):
+        rate = factor * chance
+        localiser = Localiser.of(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
+        _, memory = localiser.localise(noise, localiser.blank())
+        # What is noise leaves its level behind.
+        assert (memory.noise_energy == 0.0) == heard
+
+
+def test_loud_is_heard_and_faint_is_not():
+    loud, faint = curve([20.0, -40.0])
+    assert (loud.snr_db, loud.trials) == (20.0, 12)
+    assert (loud.heard, loud.ranged, loud.wrong) == (12, 12, 0)
+    assert (faint.heard, faint.ranged, faint.wrong) == (0, 0, 0)
+
+
+def test_what_is_off_by_more_than_it_says_is_wrong():
+    """An estimator that takes sound for 15 % faster: sin(bearing) is 1.15 times it."""
+    (point,) = curve(
+        [20.0], 25, range_m=20.0, parameters=TDOAParameters(sound_speed_m_s=1.15 * C)
+    )
+    bearings = [
+        abs(tick_generator(2, trial).uniform(-math.pi / 3.0, math.pi / 3.0))
+        for trial in range(25)
+    ]
+    errors = [math.asin(1.15 * math.sin(bearing)) - bearing for bearing in bearings]
+    limit = math.radians(5.0)
+    assert sum(error > 1.1 * limit for error in errors) <= point.wrong
+    assert point.wrong <= sum(error > 0.9 * limit for error in errors)
+    assert 0 < point.wrong < point.heard
+
+
+def test_a_stricter_rate_hears_less():
+    levels = [-12.0, -10.0]
+    lax, strict = (
+        curve(levels, trials=25, parameters=TDOAParameters(false_alarm_rate=rate))
+        for rate in (1e-3, 1e-12)
+    )
+    for a, b in zip(lax, strict, strict=True):
+        assert b.heard < a.heard
