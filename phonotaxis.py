@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, stability."""
+"""The command line: simulate, scenarios, locate, localization, stability, sweep."""
 
 from __future__ import annotations
 
@@ -156,6 +156,25 @@ def _parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="print one JSON document"
     )
     stability.set_defaults(run=_stability)
+
+    sweep = commands.add_parser(
+        "sweep", help="run many scenarios, drawn from distributions and grids"
+    )
+    sweep.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/sweeps.md")
+    sweep.add_argument(
+        "--workers", metavar="N", type=int, help="local processes (default: one a core)"
+    )
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster, as tcp://host:8786"
+    )
+    sweep.add_argument(
+        "--resume", action="store_true", help="go on with what --out holds"
+    )
+    sweep.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    sweep.add_argument("--json", action="store_true", help="print one JSON document")
+    sweep.set_defaults(run=_sweep)
     return parser
 
 
@@ -246,12 +265,13 @@ class _Progress:
     that strikes inside them into a SystemError.
     """
 
-    def __init__(self, total: float, unit: str) -> None:
+    def __init__(self, total: float, unit: str, done: float = 0.0) -> None:
         from tqdm import tqdm
 
         form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
         self._bar = tqdm(
             total=total,
+            initial=done,
             disable=not sys.stderr.isatty(),
             bar_format=form,
             leave=False,
@@ -398,6 +418,43 @@ def _stability(options: argparse.Namespace) -> None:
     else:
         print(stability_text(document))
         print(f"\nreport in {out / 'report.html'}")
+
+
+def _sweep(options: argparse.Namespace) -> None:
+    from analysis.sweep import prepare_sweep
+    from analysis.sweep_page import write_sweep
+    from analysis.sweep_plan import load_sweep
+    from analysis.sweep_summary import sweep_summary, sweep_text
+
+    try:
+        plan = load_sweep(options.sweep)
+        sweep = prepare_sweep(
+            plan,
+            options.out,
+            workers=options.workers,
+            scheduler=options.scheduler,
+            resume=options.resume,
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    total, done, out = len(sweep.points), sweep.store.done, sweep.store.out
+    try:
+        with _Progress(total, "runs", len(done)) as progress:
+            results = sweep.run(progress)
+        summary = sweep_summary(plan, sweep.points, results, out)
+        write_sweep(plan, sweep.points, results, summary)
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; {len(done)} of {total} runs are kept: go on with --out "
+            f"{out} --resume"
+        ) from None
+    except (RuntimeError, OSError) as error:
+        raise RunError(str(error)) from error
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(sweep_text(plan, results))
+        print(f"\nresults in {out}, report in {out / 'report.html'}")
 
 
 if __name__ == "__main__":
