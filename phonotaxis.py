@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, stability, sweep."""
+"""The command line: one subcommand for each thing to do."""
 
 from __future__ import annotations
 
@@ -89,10 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
     simulate.add_argument("--law", help=f"{_LAWS}, or package.module:Name")
     _take_scenario(simulate)
-    simulate.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    simulate.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(simulate)
     simulate.set_defaults(run=_simulate)
 
     scenarios = commands.add_parser("scenarios", help="list the library's scenarios")
@@ -127,13 +124,52 @@ def _parser() -> argparse.ArgumentParser:
         help="redraw errors of the array for every measurement, within 0.2 mm, "
         "0.2 us and 0.2 %% of the speed of sound",
     )
-    localization.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    localization.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
+    _take_output(localization)
     localization.set_defaults(run=_localization)
+
+    compare = commands.add_parser(
+        "compare", help="laws side by side on the same random layouts"
+    )
+    compare.add_argument(
+        "scenario",
+        nargs="*",
+        help="library name, YAML file of layouts, or YAML file of a scenario "
+        "(default: the papers' four experiments)",
+    )
+    compare.add_argument(
+        "--laws", metavar="LAW,...", help="laws to compare (default: all of ours)"
+    )
+    compare.add_argument(
+        "--velocity-term",
+        metavar="TERM,...",
+        help="printed, closing, or both (default: the scenario's)",
+    )
+    compare.add_argument(
+        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+    )
+    compare.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
+    compare.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as hearing=ideal; may be repeated",
+    )
+    compare.add_argument(
+        "--grid",
+        metavar="KEY=[VALUE,...]",
+        action="append",
+        default=[],
+        help="compare values of a further field, as hearing=[audio,ideal]",
+    )
+    compare.add_argument(
+        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+    )
+    compare.add_argument(
+        "--resume", action="store_true", help="go on with the runs in --out"
+    )
+    _take_output(compare)
+    compare.set_defaults(run=_compare)
 
     stability = commands.add_parser(
         "stability", help="stability of a scenario's loop: report, models, numbers"
@@ -149,12 +185,7 @@ def _parser() -> argparse.ArgumentParser:
     stability.add_argument(
         "--full", action="store_true", help="everything, also what takes minutes"
     )
-    stability.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    stability.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
+    _take_output(stability)
     stability.set_defaults(run=_stability)
 
     sweep = commands.add_parser(
@@ -170,12 +201,16 @@ def _parser() -> argparse.ArgumentParser:
     sweep.add_argument(
         "--resume", action="store_true", help="go on with what --out holds"
     )
-    sweep.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    sweep.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(sweep)
     sweep.set_defaults(run=_sweep)
     return parser
+
+
+def _take_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON document")
 
 
 def _take_scenario(command: argparse.ArgumentParser) -> None:
@@ -455,6 +490,49 @@ def _sweep(options: argparse.Namespace) -> None:
     else:
         print(sweep_text(plan, results))
         print(f"\nresults in {out}, report in {out / 'report.html'}")
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from analysis.compare import prepare_comparison
+    from analysis.compare_options import comparison_plans
+    from analysis.compare_report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+
+    try:
+        plans = comparison_plans(
+            options.scenario,
+            laws=options.laws,
+            velocity_terms=options.velocity_term,
+            runs=options.runs,
+            seed=options.seed,
+            settings=options.set,
+            grid=options.grid,
+        )
+        prepared = prepare_comparison(
+            plans, options.out, workers=options.workers, resume=options.resume
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    try:
+        with _Progress(prepared.runs, "runs") as progress:
+            comparisons = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons)
+        write_comparison(prepared, comparisons, summary)
+    except RuntimeError as error:
+        raise RunError(str(error)) from error
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
+            "--resume"
+        ) from None
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(compare_text(summary, comparisons))
+        print(f"\nresults in {prepared.out}")
 
 
 if __name__ == "__main__":

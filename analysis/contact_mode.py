@@ -264,6 +264,6 @@ def contact_limits(
         stiffness_n_m=left,
         reference_stiffness_n_m=left * math.e**2,
         today=(scenario.plant.motor_lag_s, 0),
-        stiffness_today_n_m=scenario.repulsion.stiffness_n_m,
-        reference_stiffness_today_n_m=scenario.repulsion.reference_stiffness_n_m,
+        stiffness_today_n_m=scenario.repulsion.conventional.stiffness_n_m,
+        reference_stiffness_today_n_m=scenario.repulsion.active.reference_stiffness_n_m,
     )

@@ -62,7 +62,7 @@ class RadialLaw:
     def gradient(self, c: float, s: float) -> tuple[float, float]:
         """(df/dc, df/ds) in N/m and N s/m; at s = 0 the slope towards s > 0."""
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
-        slopes = f.derivatives() if isinstance(f, AutoDiffXd) else ()
+        slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
         return (float(slopes[0]), float(slopes[1])) if len(slopes) else (0.0, 0.0)
 
 

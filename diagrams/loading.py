@@ -20,6 +20,7 @@ __all__ = [
     "explain",
     "library_scenarios",
     "load_scenario",
+    "parse_setting",
     "read_mapping",
     "resolve_sound",
     "scenario_from_mapping",
@@ -66,7 +67,7 @@ def load_scenario(
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
     for override in overrides:
-        _override(data, override)
+        set_field(data, *parse_setting(override))
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
@@ -143,7 +144,12 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
             sound[key] = str((folder / sound[key]).resolve())
 
 
-def _override(data: dict[str, Any], text: str) -> None:
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Key and value of ``key=value``; the value is YAML.
+
+    Raises:
+        ScenarioError: It is not of that form.
+    """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
         raise ScenarioError(text or "--set", "is not of the form key=value, as seed=2")
@@ -151,7 +157,7 @@ def _override(data: dict[str, Any], text: str) -> None:
         value = YAML(typ="safe").load(value_text)
     except YAMLError:
         raise ScenarioError(key, f"{value_text!r} is not a YAML value") from None
-    set_field(data, key, value)
+    return key, value
 
 
 def set_field(data: dict[str, Any], key: str, value: Any) -> None:

@@ -113,5 +113,8 @@ class RepulsionParameters(Parameters):
     velocity_term: VelocityTerm = "printed"
     """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
     conventional: ConventionalParameters = ConventionalParameters()
+    """Gains of ``law: conventional``."""
     active: ActiveParameters = ActiveParameters()
+    """Gains of ``law: active``."""
     active2017: Active2017Parameters = Active2017Parameters()
+    """Gains of ``law: active2017``."""

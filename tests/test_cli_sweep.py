@@ -79,7 +79,7 @@ def test_json_document_page_and_reproduction(capsys, tmp_path):
         ("draw: {source.spee_m_s: {uniform: [0, 1]}}", [], "source.spee_m_s", "mean"),
         ("draw: {source.speed_m_s: {uniform: [1, 0]}}", [], "draw.source", "low <"),
         (
-            "draw: {source.speed_m_s: {normal: [0, 1]}}",
+            "draw: {source.speed_m_s: {normal: [0, 1]}}\nruns: 9",
             [],
             "source.speed_m_s",
             "narrow",

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import pytest
 
 from analysis.detection import detection_curve, noise_chances
 from analysis.free_field import Loudspeaker

@@ -48,7 +48,10 @@ def test_facts_of_groups_stand_under_their_group():
 
 
 def test_rows_of_mappings():
-    rows = [{"speed_m_s": 0.3, "kind": "sink"}, {"speed_m_s": None, "kind": "saddle"}]
+    rows: list[dict[str, object]] = [
+        {"speed_m_s": 0.3, "kind": "sink"},
+        {"speed_m_s": None, "kind": "saddle"},
+    ]
     assert cells(row_table(rows)) == [
         ["speed (m/s)", "kind"],
         ["0.3", "sink"],
