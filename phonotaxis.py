@@ -1,4 +1,4 @@
-"""The command line: simulate, locate, localization, compare, stability, design."""
+"""The command line: one subcommand for each thing to do."""
 
 from __future__ import annotations
 
@@ -89,10 +89,7 @@ def _parser() -> argparse.ArgumentParser:
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
     simulate.add_argument("--law", help=f"{_LAWS}, or package.module:Name")
     _take_scenario(simulate)
-    simulate.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    simulate.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(simulate)
     simulate.set_defaults(run=_simulate)
 
     scenarios = commands.add_parser("scenarios", help="list the library's scenarios")
@@ -127,12 +124,7 @@ def _parser() -> argparse.ArgumentParser:
         help="redraw errors of the array for every measurement, within 0.2 mm, "
         "0.2 us and 0.2 %% of the speed of sound",
     )
-    localization.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    localization.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
+    _take_output(localization)
     localization.set_defaults(run=_localization)
 
     compare = commands.add_parser(
@@ -174,12 +166,9 @@ def _parser() -> argparse.ArgumentParser:
         "--workers", metavar="N", type=int, help="processes (default: one a core)"
     )
     compare.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    compare.add_argument(
         "--resume", action="store_true", help="go on with the runs in --out"
     )
-    compare.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(compare)
     compare.set_defaults(run=_compare)
 
     stability = commands.add_parser(
@@ -196,24 +185,39 @@ def _parser() -> argparse.ArgumentParser:
     stability.add_argument(
         "--full", action="store_true", help="everything, also what takes minutes"
     )
-    stability.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    stability.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
+    _take_output(stability)
     stability.set_defaults(run=_stability)
+
+    sweep = commands.add_parser(
+        "sweep", help="run many scenarios, drawn from distributions and grids"
+    )
+    sweep.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/sweeps.md")
+    sweep.add_argument(
+        "--workers", metavar="N", type=int, help="local processes (default: one a core)"
+    )
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster, as tcp://host:8786"
+    )
+    sweep.add_argument(
+        "--resume", action="store_true", help="go on with what --out holds"
+    )
+    _take_output(sweep)
+    sweep.set_defaults(run=_sweep)
 
     design = commands.add_parser(
         "design", help="the laws' gains, derived from stated requirements"
     )
     _take_scenario(design)
-    design.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    design.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(design)
     design.set_defaults(run=_design)
     return parser
+
+
+def _take_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    command.add_argument("--json", action="store_true", help="print one JSON document")
 
 
 def _take_scenario(command: argparse.ArgumentParser) -> None:
@@ -303,12 +307,13 @@ class _Progress:
     that strikes inside them into a SystemError.
     """
 
-    def __init__(self, total: float, unit: str) -> None:
+    def __init__(self, total: float, unit: str, done: float = 0.0) -> None:
         from tqdm import tqdm
 
         form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
         self._bar = tqdm(
             total=total,
+            initial=done,
             disable=not sys.stderr.isatty(),
             bar_format=form,
             leave=False,
@@ -455,6 +460,43 @@ def _stability(options: argparse.Namespace) -> None:
     else:
         print(stability_text(document))
         print(f"\nreport in {out / 'report.html'}")
+
+
+def _sweep(options: argparse.Namespace) -> None:
+    from analysis.sweep import prepare_sweep
+    from analysis.sweep_page import write_sweep
+    from analysis.sweep_plan import load_sweep
+    from analysis.sweep_summary import sweep_summary, sweep_text
+
+    try:
+        plan = load_sweep(options.sweep)
+        sweep = prepare_sweep(
+            plan,
+            options.out,
+            workers=options.workers,
+            scheduler=options.scheduler,
+            resume=options.resume,
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    total, done, out = len(sweep.points), sweep.store.done, sweep.store.out
+    try:
+        with _Progress(total, "runs", len(done)) as progress:
+            results = sweep.run(progress)
+        summary = sweep_summary(plan, sweep.points, results, out)
+        write_sweep(plan, sweep.points, results, summary)
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; {len(done)} of {total} runs are kept: go on with --out "
+            f"{out} --resume"
+        ) from None
+    except (RuntimeError, OSError) as error:
+        raise RunError(str(error)) from error
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(sweep_text(plan, results))
+        print(f"\nresults in {out}, report in {out / 'report.html'}")
 
 
 def _compare(options: argparse.Namespace) -> None:
