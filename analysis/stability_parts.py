@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from analysis.linear_parts import linear_parts
+from analysis.robustness_parts import robustness_parts
 from analysis.stability import Part
 
 __all__ = ["parts"]
@@ -13,4 +15,4 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return ()
+    return (*linear_parts(), *robustness_parts(full=full))

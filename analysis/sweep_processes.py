@@ -49,14 +49,17 @@ class WorkerProcess:
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,
             )
-        self.connection.send(scenario)
+        self._send(scenario)
+
+    def _send(self, message: Task | Scenario) -> None:
+        # A process that has just ended is noticed by receive.
+        with contextlib.suppress(OSError):
+            self.connection.send(message)
 
     def give(self, task: Task) -> None:
         """Hands over a task; ``receive`` gets its outcome."""
         self.task = task
-        # A worker that has just ended is noticed by receive.
-        with contextlib.suppress(OSError):
-            self.connection.send(task)
+        self._send(task)
 
     def receive(self) -> Outcome | None:
         """Waits for the next message; none: that it is ready.
@@ -67,11 +70,9 @@ class WorkerProcess:
         """
         try:
             message = self.connection.recv()
-        except OSError:
-            raise EOFError from None
-        except EOFError:
+        except (EOFError, OSError):
             if self.ready:
-                raise
+                raise EOFError from None
             raise WorkerError(
                 "a worker process could not start; what it printed says why"
             ) from None

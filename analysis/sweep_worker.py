@@ -11,6 +11,7 @@ import contextlib
 import gc
 import os
 import signal
+from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from analysis.sweep_run import Task, run_task
@@ -20,8 +21,6 @@ __all__ = ["READY", "main"]
 
 READY = "ready"
 RUNS_PER_CHILD = 50
-#: Exit status of a child whose parent has nothing more to do.
-_AT_END = 3
 _WARM_S = 0.1
 
 
@@ -36,18 +35,29 @@ def main(file_descriptor: int) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with Connection(file_descriptor) as connection:
         try:
-            _warm(connection.recv())
+            scenario = connection.recv()
+            # A run may end its process: that must happen when it is its turn.
+            if _survives(lambda: _warm(scenario)):
+                _warm(scenario)
             connection.send(READY)
         except (EOFError, OSError):
             return
         gc.freeze()  # else the collector writes to pages that children share
-        while True:
-            child = os.fork()
-            if child == 0:
-                _serve(connection)
-            _, status = os.waitpid(child, 0)
-            if status != 0:
-                return
+        while _survives(lambda: _serve(connection)):
+            pass
+
+
+def _survives(work: Callable[[], None]) -> bool:
+    """Works in a forked child, and tells whether it got to the end."""
+    child = os.fork()
+    if child == 0:
+        status = 1
+        try:
+            work()
+            status = 0
+        finally:
+            os._exit(status)  # not a word to what waits for the end of Python
+    return os.waitpid(child, 0)[1] == 0
 
 
 def _warm(scenario: Scenario) -> None:
@@ -57,13 +67,7 @@ def _warm(scenario: Scenario) -> None:
 
 
 def _serve(connection: Connection) -> None:
-    """The child's life: some runs, then the end, without a word to exit handlers."""
-    status = 0
-    try:
-        for _ in range(RUNS_PER_CHILD):
-            task: Task = connection.recv()
-            connection.send(run_task(task))
-    except (EOFError, OSError):
-        status = _AT_END
-    finally:
-        os._exit(status)
+    """Some runs. At the end of all, EOFError."""
+    for _ in range(RUNS_PER_CHILD):
+        task: Task = connection.recv()
+        connection.send(run_task(task))

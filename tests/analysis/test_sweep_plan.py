@@ -19,7 +19,10 @@ X = ("obstacles.0.waypoints_m.0.0", "obstacles.0.waypoints_m.1.0")
 PLAN: dict[str, Any] = {
     "scenario": "one_moving_obstacle",
     "set": {"hearing": "ideal"},
-    "grid": {"law": ["conventional", "active"], "repulsion.stiffness_n_m": [8.0, 16.0]},
+    "grid": {
+        "law": ["conventional", "active"],
+        "attraction.stiffness_n_m": [8.0, 16.0],
+    },
     "draw": {SPEED: {"uniform": [0.1, 0.5]}, ", ".join(X): {"normal": [2.6, 0.3]}},
     "runs": 3,
     "seed": 4,
@@ -36,9 +39,9 @@ def written(path, text):
 
 
 def test_cells_are_the_crossed_grid():
-    laws, gains = PLAN["grid"]["law"], PLAN["grid"]["repulsion.stiffness_n_m"]
+    laws, gains = PLAN["grid"]["law"], PLAN["grid"]["attraction.stiffness_n_m"]
     crossed = [
-        {"law": law, "repulsion.stiffness_n_m": gain} for law in laws for gain in gains
+        {"law": law, "attraction.stiffness_n_m": gain} for law in laws for gain in gains
     ]
     assert plan().cells() == crossed
     assert plan(grid={}).cells() == [{}]
@@ -58,7 +61,7 @@ def test_scenario_has_every_field():
     scenario = sweep.scenario_of(point)
     assert scenario.hearing == "ideal"
     assert scenario.law == "active"
-    assert scenario.repulsion.stiffness_n_m == 16.0
+    assert scenario.attraction.stiffness_n_m == 16.0
     assert scenario.seed == point.seed
     obstacle = scenario.obstacles[0]
     assert obstacle.speed_m_s == point.fields[SPEED]
