@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, stability."""
+"""The command line: simulate, locate, localization, compare, stability, design."""
 
 from __future__ import annotations
 
@@ -203,6 +203,16 @@ def _parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="print one JSON document"
     )
     stability.set_defaults(run=_stability)
+
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    _take_scenario(design)
+    design.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    design.add_argument("--json", action="store_true", help="print one JSON document")
+    design.set_defaults(run=_design)
     return parser
 
 
@@ -488,6 +498,32 @@ def _compare(options: argparse.Namespace) -> None:
     else:
         print(compare_text(summary, comparisons, pooled))
         print(f"\nresults in {prepared.out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_summary, design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            directory = stack.enter_context(whole_directory(out))
+            with _Progress(STUDY_RUNS, "runs") as progress:
+                study = study_design(scenario, progress=progress)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        except SystemExit as error:
+            raise RunError("Drake ended the design; its message is above") from error
+        summary = design_summary(study, out)
+        write_design(study, summary, directory)
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(design_text(study))
+        print(f"\nresults in {out}")
 
 
 if __name__ == "__main__":
