@@ -525,8 +525,8 @@ def _compare(options: argparse.Namespace) -> None:
         raise InputError.from_error(error) from None
     try:
         with _Progress(prepared.runs, "runs") as progress:
-            comparisons = prepared.run(progress)
-        summary = compare_summary(prepared, comparisons)
+            comparisons, pooled = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons, pooled)
         write_comparison(prepared, comparisons, summary)
     except RuntimeError as error:
         raise RunError(str(error)) from error
@@ -538,7 +538,7 @@ def _compare(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:
-        print(compare_text(summary, comparisons))
+        print(compare_text(summary, comparisons, pooled))
         print(f"\nresults in {prepared.out}")
 
 
