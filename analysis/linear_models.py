@@ -101,9 +101,10 @@ class LinearModel:
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
         """The eigenvalue table, slowest first, without pure delays (z = 0)."""
-        values, right = np.linalg.eig(self.A)
-        left = np.linalg.pinv(right)
-        shares = np.abs(right * left.T)
+        from scipy.linalg import eig
+
+        values, left, right = eig(self.A, left=True, right=True)
+        shares = np.abs(left * right)
         modes = []
         for value, share in zip(values.astype(complex), shares.T, strict=True):
             if value.imag < 0.0 or (self.period_s and abs(value) < _DELAY):
