@@ -84,7 +84,21 @@ def _complain(field: str, message: str, *, as_json: bool) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="phonotaxis", description="A robot that follows a sound.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (
+        _add_simulate,
+        _add_scenarios,
+        _add_locate,
+        _add_localization,
+        _add_compare,
+        _add_stability,
+        _add_sweep,
+        _add_design,
+    ):
+        add(commands)
+    return parser
 
+
+def _add_simulate(commands: Any) -> None:
     simulate = commands.add_parser("simulate", help="run a scenario")
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
     simulate.add_argument("--law", help=f"{_LAWS}, or package.module:Name")
@@ -92,12 +106,16 @@ def _parser() -> argparse.ArgumentParser:
     _take_output(simulate)
     simulate.set_defaults(run=_simulate)
 
+
+def _add_scenarios(commands: Any) -> None:
     scenarios = commands.add_parser("scenarios", help="list the library's scenarios")
     scenarios.add_argument(
         "--json", action="store_true", help="print one JSON document"
     )
     scenarios.set_defaults(run=_scenarios)
 
+
+def _add_locate(commands: Any) -> None:
     locate = commands.add_parser(
         "locate", help="bearing and range over time of a recording"
     )
@@ -111,6 +129,8 @@ def _parser() -> argparse.ArgumentParser:
     locate.add_argument("--json", action="store_true", help="print one JSON document")
     locate.set_defaults(run=_locate)
 
+
+def _add_localization(commands: Any) -> None:
     localization = commands.add_parser(
         "localization", help="the papers' localisation tables, ours, and the bound"
     )
@@ -127,6 +147,8 @@ def _parser() -> argparse.ArgumentParser:
     _take_output(localization)
     localization.set_defaults(run=_localization)
 
+
+def _add_compare(commands: Any) -> None:
     compare = commands.add_parser(
         "compare", help="laws side by side on the same random layouts"
     )
@@ -171,6 +193,8 @@ def _parser() -> argparse.ArgumentParser:
     _take_output(compare)
     compare.set_defaults(run=_compare)
 
+
+def _add_stability(commands: Any) -> None:
     stability = commands.add_parser(
         "stability", help="stability of a scenario's loop: report, models, numbers"
     )
@@ -188,6 +212,8 @@ def _parser() -> argparse.ArgumentParser:
     _take_output(stability)
     stability.set_defaults(run=_stability)
 
+
+def _add_sweep(commands: Any) -> None:
     sweep = commands.add_parser(
         "sweep", help="run many scenarios, drawn from distributions and grids"
     )
@@ -203,7 +229,15 @@ def _parser() -> argparse.ArgumentParser:
     )
     _take_output(sweep)
     sweep.set_defaults(run=_sweep)
-    return parser
+
+
+def _add_design(commands: Any) -> None:
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    _take_scenario(design)
+    _take_output(design)
+    design.set_defaults(run=_design)
 
 
 def _take_output(command: argparse.ArgumentParser) -> None:
@@ -518,8 +552,8 @@ def _compare(options: argparse.Namespace) -> None:
         raise InputError.from_error(error) from None
     try:
         with _Progress(prepared.runs, "runs") as progress:
-            comparisons = prepared.run(progress)
-        summary = compare_summary(prepared, comparisons)
+            comparisons, pooled = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons, pooled)
         write_comparison(prepared, comparisons, summary)
     except RuntimeError as error:
         raise RunError(str(error)) from error
@@ -531,8 +565,34 @@ def _compare(options: argparse.Namespace) -> None:
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:
-        print(compare_text(summary, comparisons))
+        print(compare_text(summary, comparisons, pooled))
         print(f"\nresults in {prepared.out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_summary, design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            directory = stack.enter_context(whole_directory(out))
+            with _Progress(STUDY_RUNS, "runs") as progress:
+                study = study_design(scenario, progress=progress)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        except SystemExit as error:
+            raise RunError("Drake ended the design; its message is above") from error
+        summary = design_summary(study, out)
+        write_design(study, summary, directory)
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(design_text(study))
+        print(f"\nresults in {out}")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,9 @@ _PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
 
 
 def compare_summary(
-    prepared: PreparedComparison, comparisons: dict[str, Comparison]
+    prepared: PreparedComparison,
+    comparisons: dict[str, Comparison],
+    pooled: Sequence[Pair],
 ) -> dict[str, Any]:
     """The JSON document of a comparison."""
     plan = next(iter(prepared.sweeps.values())).plan
@@ -54,6 +56,7 @@ def compare_summary(
         "seed": plan.seed,
         "cells": cells,
         "pairs": pairs,
+        "pooled": [asdict(pair) for pair in pooled],
         "versions": versions(),
         "out": str(prepared.out),
     }
@@ -115,7 +118,11 @@ def _command(out: Path, cell: Cell, kind: str) -> str:
     return shlex.join(["phonotaxis", "simulate", file])
 
 
-def compare_text(summary: dict[str, Any], comparisons: dict[str, Comparison]) -> str:
+def compare_text(
+    summary: dict[str, Any],
+    comparisons: dict[str, Comparison],
+    pooled: Sequence[Pair],
+) -> str:
     """Tables for a terminal."""
     lines = [
         f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
@@ -125,6 +132,8 @@ def compare_text(summary: dict[str, Any], comparisons: dict[str, Comparison]) ->
     for name, comparison in comparisons.items():
         lines += ["", name, *_cell_lines(comparison.cells)]
         lines += ["", *(line for pair in comparison.pairs for line in _pair_line(pair))]
+    if len(comparisons) > 1:
+        lines += ["", "all together", *(line for p in pooled for line in _pair_line(p))]
     lines += ["", "Runs to look at:"]
     for cell in summary["cells"]:
         lines += [

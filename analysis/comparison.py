@@ -7,7 +7,8 @@ differ in nothing but the law.
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any, Literal
 from zlib import crc32
@@ -35,6 +36,7 @@ __all__ = [
     "Median",
     "Pair",
     "compare_runs",
+    "pooled_pairs",
 ]
 
 ExampleKind = Literal["worst", "typical", "best"]
@@ -157,21 +159,86 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
         table: Its results; see ``analysis.sweep_store.load_results``.
         scenario: Name of the experiment.
     """
-    grid = plan.cells()
-    runs = [table[table["cell"] == k].sort_values("run") for k in range(len(grid))]
     cells = [
         _cell(scenario, fields, rows, plan.seed)
-        for fields, rows in zip(grid, runs, strict=True)
+        for fields, rows in zip(plan.cells(), _runs(plan, table), strict=True)
     ]
-    pairs = []
-    for one, other in combinations(range(len(grid)), 2):
-        apart = [key for key in grid[one] if grid[one][key] != grid[other][key]]
-        if len(apart) == 1:
-            common = {k: v for k, v in grid[one].items() if k != apart[0]}
-            values = grid[one][apart[0]], grid[other][apart[0]]
-            rates, medians = _compare(runs[one], runs[other], plan.seed)
-            pairs.append(Pair(scenario, apart[0], *values, common, *rates, medians))
+    pairs = [
+        _pair(scenario, neighbours, plan.seed)
+        for neighbours in _neighbours(plan, table)
+    ]
     return Comparison(cells, pairs)
+
+
+def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
+    """Pairs that differ in one field, over all experiments and other fields."""
+    groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
+    for plan, table in sweeps:
+        for one in _neighbours(plan, table):
+            key = (one.field, str(one.first), str(one.second))
+            groups.setdefault(key, []).append(one)
+    seed = sweeps[0][0].seed
+    return [_pair("all", _joined(group), seed) for group in groups.values()]
+
+
+@dataclass(frozen=True)
+class _Neighbours:
+    """Runs of two cells that differ in one field, layout by layout."""
+
+    field: str
+    first: Any
+    second: Any
+    fields: dict[str, Any]
+    first_rows: pd.DataFrame
+    second_rows: pd.DataFrame
+
+
+def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
+    """Each cell's rows in the order of the layouts."""
+    count = len(plan.cells())
+    return [table[table["cell"] == k].sort_values("run") for k in range(count)]
+
+
+def _neighbours(plan: SweepPlan, table: pd.DataFrame) -> Iterator[_Neighbours]:
+    rows = list(zip(plan.cells(), _runs(plan, table), strict=True))
+    for (one, ones), (other, others) in combinations(rows, 2):
+        apart = [key for key in one if one[key] != other[key]]
+        if len(apart) == 1:
+            field = apart[0]
+            common = {key: value for key, value in one.items() if key != field}
+            yield _Neighbours(field, one[field], other[field], common, ones, others)
+
+
+def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
+    return replace(
+        group[0],
+        fields={},
+        first_rows=pd.concat([one.first_rows for one in group]),
+        second_rows=pd.concat([one.second_rows for one in group]),
+    )
+
+
+def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
+    first, second = runs.first_rows, runs.second_rows
+    both = _success(first) & _success(second)
+    metrics = {}
+    for name in (*ALL_RUNS, *SUCCESSES):
+        one, other = _column(first, name), _column(second, name)
+        if name in SUCCESSES:
+            one, other = one[both], other[both]
+        median = paired_median(one, other, seed=_stream(seed, name))
+        if median.pairs:
+            metrics[name] = median
+    return Pair(
+        scenario=scenario,
+        field=runs.field,
+        first=runs.first,
+        second=runs.second,
+        fields=runs.fields,
+        success=paired_rate(_success(first), _success(second)),
+        collision=paired_rate(_collision(first), _collision(second)),
+        metrics=metrics,
+    )
 
 
 def _cell(scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int) -> Cell:
@@ -199,23 +266,6 @@ def _cell(scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int) 
         metrics=metrics,
         examples=_examples(rows, success),
     )
-
-
-def _compare(
-    first: pd.DataFrame, second: pd.DataFrame, seed: int
-) -> tuple[tuple[PairedRate, PairedRate], dict[str, PairedMedian]]:
-    rates = (
-        paired_rate(_success(first), _success(second)),
-        paired_rate(_collision(first), _collision(second)),
-    )
-    both = _success(first) & _success(second)
-    medians = {}
-    for name in (*ALL_RUNS, *SUCCESSES):
-        one, other = _column(first, name), _column(second, name)
-        if name in SUCCESSES:
-            one, other = one[both], other[both]
-        medians[name] = paired_median(one, other, seed=_stream(seed, name))
-    return rates, {name: m for name, m in medians.items() if m.pairs}
 
 
 def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:

@@ -10,6 +10,7 @@ The simulation is the all-ideal build of the same builder, head-on to a wide box
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ __all__ = [
 ]
 
 #: Phases of a cycle at which the law is evaluated.
-_PHASES = 96
+_PHASES = 64
 #: Depth and width of the box, m: wider than P ever strays.
 _BOX_M = (0.1, 1.0)
 #: Follow distance of the run, m: behind the box and clear of the master robot.
@@ -193,7 +194,7 @@ def contact_oscillation(
 
 
 def predict_oscillation(
-    contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 40
+    contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 20
 ) -> OscillationPrediction:
     """Harmonic balance up to an amplitude.
 
@@ -320,7 +321,7 @@ def _cycles(
     peaks = np.flatnonzero((inner >= clearances[:-2]) & (inner > clearances[2:])) + 1
     peaks = peaks[clearances[peaks] > np.median(clearances[-len(times) // 4 :])]
     rows = []
-    for a, b in zip(peaks[:-1], peaks[1:], strict=True):
+    for a, b in pairwise(peaks.tolist()):
         swing = clearances[a : b + 1]
         top = 0.5 * (swing[0] + swing[-1])
         span = times[b] - times[a]

@@ -19,33 +19,30 @@ from analysis.head_on import head_on
 from analysis.ideal_loop import ideal_scenario
 from analysis.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
-from systems.collision_vector import collision_vectors, echo_points
-from systems.geometry import control_point, rotate
-from systems.ideal_obstacle_sensor import nearest_vectors
-from systems.impedance import attraction_force, repulsion_force
-from systems.signals import FRAME_PERIOD_S
-from systems.ultrasonic_array import cone_ranges
+from systems.active_impedance_controller import active_force
 
 __all__ = [
+    "BOX_M",
+    "BOX_X_M",
+    "TO_GO_M",
     "EquilibriumMap",
     "RatioMap",
     "RestPoint",
-    "TrapStiffness",
+    "boxes_scenario",
     "gap_map",
     "local_minima",
     "offset_map",
     "stiffness_ratio_map",
-    "trap_stiffness",
 ]
 
 #: Footprint of the boxes, m: along and across the line to the source; printed.
 BOX_M = (0.05, 0.1)
 #: Place of the boxes, and what is left to go behind them, m.
 BOX_X_M, TO_GO_M = 2.0, 2.0
-#: Bodies of ``trap_stiffness``, m: 1 um stands for a point.
-_BODIES_M = {"point": (1e-6, 1e-6), "face": BOX_M}
 #: Spacing of the grid on which energies are compared, m.
 _CELL_M = 0.02
+#: Spacing of the distances of ``stiffness_ratio_map``, m.
+_RATIO_STEP_M = 2e-3
 #: Follow distance of the maps, m: as printed the attraction would end in the
 #: master robot, which repels as well.
 _FOLLOW_M = 1.2
@@ -130,31 +127,6 @@ class RatioMap:
             "to_go_m": self.to_go_m,
             "today": self.today,
         }
-
-
-@dataclass(frozen=True)
-class TrapStiffness:
-    """What a small sideways step does at the equilibrium before one body."""
-
-    sensing: str
-    """``exact`` or ``cones``."""
-    body: str
-    """``point``, or ``face``: a printed box whose face looks at the robot."""
-    equilibrium_m: float
-    """Clearance of P, m."""
-    along_n_m: float
-    """-dF/dx along the line, N/m; positive: P returns."""
-    across_n_m: float
-    """-dF/dy across it, N/m. The heading turns with P, by dy / epsilon."""
-
-    @property
-    def trap(self) -> bool:
-        """Whether P returns from any small step."""
-        return self.along_n_m > 0.0 and self.across_n_m > 0.0
-
-    def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
-        return {**vars(self), "trap": self.trap}
 
 
 def local_minima(model: PointMass, *, cell_m: float = _CELL_M) -> NDArray[np.float64]:
@@ -267,9 +239,9 @@ def _map(
     values = tuple(float(v) for v in values)
     points = []
     for k, value in enumerate(values):
-        case = _case(scenario, boxes(value), sensing)
+        case = boxes_scenario(scenario, boxes(value), sensing)
         found = _end_of_run(case) if sensing == "cones" else _minima(case)
-        points += [RestPoint(value, *place, outcome) for *place, outcome in found]
+        points += [RestPoint(value, x, y, outcome) for x, y, outcome in found]
         if progress is not None:
             progress((k + 1) / len(values))
     return EquilibriumMap(scenario.law, parameter, sensing, values, tuple(points))
@@ -282,8 +254,8 @@ def _minima(case: Scenario) -> list[tuple[float, float, str]]:
     held = minima[:, 0] < BOX_X_M + BOX_M[0]
     beyond = minima[~held]
     goal = beyond[[np.argmin(model.potential(beyond))]] if len(beyond) else beyond
-    return [(*p, "jam") for p in minima[held].tolist()] + [
-        (*p, "goal") for p in goal.tolist()
+    return [(x, y, "jam") for x, y in minima[held].tolist()] + [
+        (x, y, "goal") for x, y in goal.tolist()
     ]
 
 
@@ -296,13 +268,20 @@ def _end_of_run(case: Scenario) -> list[tuple[float, float, str]]:
     return [(x, y, "jam" if x < BOX_X_M + BOX_M[0] else "goal")]
 
 
-def _case(
+def boxes_scenario(
     scenario: Scenario,
     places: list[tuple[float, float]],
     sensing: str,
     size_m: tuple[float, float] = BOX_M,
 ) -> Scenario:
-    """A start at rest, boxes in the way, the source behind them on the x axis."""
+    """A start at rest, boxes in the way, the source behind them on the x axis.
+
+    Args:
+        scenario: Law and gains.
+        places: Centres of the boxes, m.
+        sensing: ``exact nearest``, ``exact sum`` or ``cones``.
+        size_m: Extents of each box along and across, m.
+    """
     data = ideal_scenario(scenario).model_dump() | {
         "duration_s": 60.0,
         "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
@@ -335,96 +314,33 @@ def stiffness_ratio_map(
         ratios: k_ref/K_0, above 1.
         to_go_m: See ``head_on``.
     """
+    contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
+    gains = scenario.repulsion.active
+    stiffness = scenario.attraction.stiffness_n_m
+    c = np.arange(_RATIO_STEP_M, contact.law.range_m, _RATIO_STEP_M)
+    pull = stiffness * (contact.to_go_m + c)
     outer, inner = [], []
     for ratio in ratios:
-        case = head_on(_with_ratio(scenario, float(ratio)), to_go_m=to_go_m)
-        places = case.equilibria_m
-        outer.append(places[0] if places else math.nan)
-        inner.append(places[1] if len(places) > 1 else math.nan)
-    gains = scenario.repulsion
+        k_ref = float(ratio) * gains.matched_stiffness_n_m
+        case = gains.model_copy(update={"reference_stiffness_n_m": k_ref})
+        force = np.array([active_force(value, 0.0, case) for value in c.tolist()])
+        places = _crossings(c, force - pull)
+        outer.append(max(places["down"], default=math.nan))
+        inner.append(max(places["up"], default=math.nan))
     return RatioMap(
         np.array(ratios, dtype=float),
         np.array(outer),
         np.array(inner),
-        head_on(scenario, to_go_m=to_go_m).to_go_m,
-        gains.reference_stiffness_n_m / gains.stiffness_n_m,
+        contact.to_go_m,
+        gains.reference_stiffness_n_m / gains.matched_stiffness_n_m,
     )
 
 
-def _with_ratio(scenario: Scenario, ratio: float) -> Scenario:
-    gains = scenario.repulsion
-    changed = gains.model_copy(
-        update={"reference_stiffness_n_m": ratio * gains.stiffness_n_m}
-    )
-    return scenario.model_copy(update={"law": "active", "repulsion": changed})
-
-
-def trap_stiffness(
-    scenario: Scenario, sensing: str, body: str = "point"
-) -> TrapStiffness:
-    """Stiffness of the blocks' own force at the equilibrium before one body.
-
-    P is on the line to the source, the body straight ahead. The hand-position
-    law turns the robot by dy/epsilon where P steps aside by dy.
-
-    Args:
-        scenario: Law and gains.
-        sensing: ``exact`` or ``cones``.
-        body: ``point`` or ``face``.
-
-    Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law does not hold P before the body, or a word is
-            unknown.
-    """
-    if sensing not in ("exact", "cones"):
-        raise ValueError(f"sensing: {sensing!r} is neither 'exact' nor 'cones'")
-    if body not in _BODIES_M:
-        raise ValueError(f"body: {body!r} is neither 'point' nor 'face'")
-    size = _BODIES_M[body]
-    case = _case(scenario, [(BOX_X_M, 0.0)], "cones", size)
-    contact = head_on(case, to_go_m=TO_GO_M + 0.5 * size[0])
-    c, step = contact.equilibrium_m, 1e-4
-    x = BOX_X_M - 0.5 * size[0] - c
-    law, epsilon = contact.law.function, scenario.robot.control_point_m
-
-    def force(dx: float, dy: float) -> tuple[float, float]:
-        return _block_force(case, law, (x + dx, dy, dy / epsilon), sensing)
-
-    return TrapStiffness(
-        sensing=sensing,
-        body=body,
-        equilibrium_m=c,
-        along_n_m=-(force(step, 0.0)[0] - force(-step, 0.0)[0]) / (2.0 * step),
-        across_n_m=-(force(0.0, step)[1] - force(0.0, -step)[1]) / (2.0 * step),
-    )
-
-
-def _block_force(
-    case: Scenario, law: Any, place: tuple[float, float, float], sensing: str
-) -> tuple[float, float]:
-    """Sum of the forces at rest by the blocks' functions, N in W.
-
-    The place is x and y of P, and the heading.
-    """
-    x, y, theta = place
-    offset = case.robot.control_point_m
-    pose = (x - offset * math.cos(theta), y - offset * math.sin(theta), theta)
-    bodies = [body.rectangle(0.0) for body in case.bodies().values()]
-    if sensing == "exact":
-        vectors = nearest_vectors(
-            pose, bodies, offset, case.ultrasonic.maximum_range_m, 1
-        )
-    else:
-        ranges = cone_ranges(np.array(pose), np.array(bodies), case.ultrasonic, offset)
-        echo = ranges <= case.ultrasonic.maximum_range_m
-        points = echo_points(ranges.tolist(), echo.tolist(), case.ultrasonic)
-        vectors = collision_vectors(points, case.collision_vector)
-    vectors_W = [(v[0], *rotate(theta, v[1], v[2])) for v in vectors]
-    term = case.repulsion.velocity_term
-    F_b, _ = repulsion_force(vectors_W, {}, law, term, FRAME_PERIOD_S)
-    p_WP, p_WS = control_point(pose, offset), case.source.path().pose(0.0)[:2]
-    F_m = attraction_force(
-        p_WP, (0.0, 0.0), p_WS, True, case.attraction, case.robot.mass_kg
-    )
-    return float(F_m[0] + F_b[0]), float(F_m[1] + F_b[1])
+def _crossings(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> dict[str, list[float]]:
+    """Where y passes through zero on its way up and down, by interpolation."""
+    at = np.flatnonzero(np.diff(np.sign(y)))
+    places = x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at])
+    up = y[at + 1] > y[at]
+    return {"up": places[up].tolist(), "down": places[~up].tolist()}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analysis.equilibria import EquilibriumSearch, find_equilibria
-from analysis.html_page import Cell, note, number, paragraph, table
+from analysis.html_page import ZERO, Cell, note, number, paragraph, table
 from analysis.linear_models import LinearModel, Mode
 from analysis.linearisation import (
     GradientCheck,
@@ -26,6 +26,10 @@ __all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
 
 #: Elements of a matrix below this are printed as a dot.
 _ZERO = 1e-12
+#: Matrices of more columns are printed in small type.
+_WIDE = 8
+#: Slower modes than this are neutral, 1/s.
+_NEUTRAL_1_S = 1e-6
 #: Modes that are printed.
 _MODES = 12
 
@@ -245,7 +249,7 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
             if getattr(continuous, matrix).any()
         ),
         _mode_table(continuous.modes, "Modes, continuous"),
-        _mode_table(data.at.modes, "Modes of P's motion, sampled, as ln(z)/T"),
+        _mode_table(data.sampled.modes, "Modes of the built diagram, as ln(z)/T"),
     ]
 
 
@@ -257,14 +261,15 @@ def matrix_table(model: LinearModel, matrix: str) -> str:
         [row, *(_element(value) for value in values)]
         for row, values in zip(rows, getattr(model, matrix), strict=True)
     ]
-    return table([matrix, *columns], body, dense=True)
+    return table([matrix, *columns], body, dense=len(columns) > _WIDE)
 
 
 def _element(value: float) -> Cell:
-    return "\u00b7" if abs(value) < _ZERO else float(np.round(value, 12))
+    return ZERO if abs(value) < _ZERO else float(np.round(value, 12))
 
 
 def _mode_table(modes: Sequence[Mode], caption: str) -> str:
+    moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
     rows: list[list[Cell]] = [
         [
             mode.eigenvalue,
@@ -275,15 +280,16 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
             mode.settling_s,
             ", ".join(f"{k} {100.0 * v:.0f} %" for k, v in top(mode.participation)),
         ]
-        for mode in modes[:_MODES]
+        for mode in moving[:_MODES]
     ]
-    left = len(modes) - len(rows)
-    more = f"; {left} faster ones left out" if left > 0 else ""
+    faster = len(moving) - len(rows)
+    left = f"; left out: {len(modes) - len(moving)} neutral"
+    left += f" and {faster} faster ones" if faster else ""
     return table(
         ["pole (1/s)", "z", "damping ratio", "rad/s", "time constant (s)",
          "to 2 % (s)", "participation"],
         rows,
-        caption=caption + more,
+        caption=caption + left,
     )  # fmt: skip
 
 

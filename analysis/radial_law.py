@@ -53,6 +53,14 @@ class RadialLaw:
         """f(c, s) in N; 0 beyond the range."""
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
+    def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
+        """f(c, 0) in N, by interpolation; many distances at once."""
+        place = np.maximum(np.asarray(c, dtype=float), 0.0) / DISTANCE_STEP_M
+        index = np.minimum(place.astype(int), len(self.forces_n) - 2)
+        part = place - index
+        f = (1.0 - part) * self.forces_n[index] + part * self.forces_n[index + 1]
+        return np.where(place < len(self.forces_n) - 1, f, 0.0)
+
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
         """U(c) in J, by interpolation."""
         return np.asarray(

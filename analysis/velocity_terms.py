@@ -53,7 +53,8 @@ class OneSidedModel:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """(2,) 1/s."""
-        return np.roots([self.mass_kg, self.damping_n_s_m, self.stiffness_n_m])
+        roots = np.roots([self.mass_kg, self.damping_n_s_m, self.stiffness_n_m])
+        return roots.astype(complex)
 
     @property
     def natural_frequency_rad_s(self) -> float:
@@ -188,7 +189,7 @@ def velocity_term_analysis(
     contact = head_on(scenario, to_go_m=to_go_m)
     _, slope = contact.law.gradient(contact.equilibrium_m, 0.0)
     damping = scenario.attraction.damping_n_s_m
-    variants = {}
+    variants: dict[str, VelocityTermVariant] = {}
     for term in VARIANTS:
         sides = [
             OneSidedModel(
@@ -260,7 +261,7 @@ def _sampled_harmonics(
     omega = 2.0 * np.pi / (_CYCLE_TICKS * FRAME_PERIOD_S)
     turn = omega * FRAME_PERIOD_S
     # Ticks fall between those of the exact integral's symmetric grid.
-    phase = turn * (np.arange(_CYCLE_TICKS) + 0.25)
+    phase = turn * (np.arange(_CYCLE_TICKS, dtype=float) + 0.25)
     c = contact.equilibrium_m + amplitude / omega * np.sin(phase)
     before = contact.equilibrium_m + amplitude / omega * np.sin(phase - turn)
     speeds = np.array(

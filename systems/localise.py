@@ -15,6 +15,7 @@ from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
+from systems.echo_errors import echo_errors, energy_spread
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
@@ -36,8 +37,9 @@ _NOISE_MARGIN = 3.0
 # Frames over which the level of the noise is averaged.
 _NOISE_FRAMES = 8.0
 
-# A knock may raise that level no more than a noise of so many times it.
-_LOUDEST_NOISE = 2.0
+# A knock, or a sound that reverberates too much to be heard, may raise that level no
+# more than a noise of so many times it.
+_LOUDEST_NOISE = 1.5
 
 # Share of frames of steady white noise that are loud enough to be searched for a
 # sound; frames that are no louder than the noise are not. A sound 15 dB below it
@@ -49,13 +51,13 @@ _SEARCHED_SHARE = 0.1
 _ECHO_CORRELATION = 0.4
 _ECHO_AMBIGUITY = 0.7
 
-# Echoes that slip through, those off the floor above all, shift each arrival by
-# itself (standard deviation, s) and the whole direction (rad). The less of a
-# frame is news, the more: from this share on they count fully. All from the
-# trials in rooms, docs/localization.md.
-_ECHO_ERROR_S = 1.2e-6
-_ECHO_ERROR_RAD = 2e-3
-_ECHO_NEWS = 0.12
+# In the first frame of a sound it may not have reached all channels: noise alone
+# would seem to be heard there with more than this probability.
+_SHARED_CHANCE = 1e-3
+
+# A sound begins within a frame whose energy is spread over less than this share
+# of it.
+_WHOLE_FRAME = 0.8
 
 
 class TDOAParameters(Parameters):
@@ -108,6 +110,8 @@ class HearingMemory(NamedTuple):
     """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
     """(n, bins) see ``systems.precedence``."""
+    heard: bool = False
+    """Whether it held a sound."""
 
 
 def _averaged(known: float, new: float) -> float:
@@ -187,30 +191,46 @@ class Localiser:
         search = seen[0]
         if searched * search.chance > self.parameters.false_alarm_rate:
             return None, self._after_noise(memory, energy, search.energy)
-        return self._locate(frame, seen, memory)
+        after = memory._replace(heard=True)
+        if not memory.heard and search.weakest > _SHARED_CHANCE:
+            return None, after
+        if not self.parameters.suppress_echoes:
+            return self._fix(frame, self._delays(frame, seen)), after
+        begins = not memory.heard and energy_spread(frame) < _WHOLE_FRAME
+        return self._locate(frame, seen, after, begins=begins)
 
     def _locate(
         self,
         frame: NDArray[np.float32],
         seen: tuple[DelaySearch, slice],
         memory: HearingMemory,
+        *,
+        begins: bool,
     ) -> tuple[SourceFix | None, HearingMemory]:
-        """Where the sound comes from that ``look`` has seen in a frame."""
-        if not self.parameters.suppress_echoes:
-            return self._fix(frame, self._delays(frame, seen)), memory
+        """Where the sound comes from that ``look`` has seen in a frame.
+
+        A sound that begins within the frame may have met the floor, which shows in
+        no channel alone: it is never taken to be free of echoes.
+        """
         delays = self._delays(frame, seen)
-        if delays is not None and self._is_direct(delays, memory):
+        direct = delays is not None and self._is_direct(delays, memory)
+        if direct and not begins:
             return self._fix(frame, delays), memory
         dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
         memory = memory._replace(echoes=echoes)
-        delays = self._delays(dry)
+        if direct:
+            news = 1.0
+        else:
+            frame, delays = dry, self._delays(dry)
         if (
             delays is None
             or delays.correlation < _ECHO_CORRELATION
             or delays.ambiguity > _ECHO_AMBIGUITY
         ):
             return None, memory
-        return self._fix(dry, delays, self._echo_errors(news)), memory
+        plan = self.plan
+        errors = echo_errors(plan.shape, plan.c, news, delays.angular_frequency)
+        return self._fix(frame, delays, errors), memory
 
     def _checked_energy(self, frame: NDArray[np.float32]) -> float:
         expected = (self.plan.shape.count, self.plan.frame_samples)
@@ -272,13 +292,6 @@ class Localiser:
         return (
             delays.correlation >= least or delays.noise_energy <= _NOISE_MARGIN * known
         )
-
-    def _echo_errors(self, news: float) -> NDArray[np.float64]:
-        """(n - 1, n - 1) covariance of delays, for a share of news, s^2."""
-        places = self.plan.shape.p_AM
-        turns = (places[1:] - places[0]) * (_ECHO_ERROR_RAD / self.plan.c)
-        single = _ECHO_ERROR_S**2 * (np.eye(len(turns)) + 1.0)
-        return (single + turns @ turns.T) * max(1.0, _ECHO_NEWS / news) ** 2
 
     def _fix(
         self,
