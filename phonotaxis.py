@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, stability."""
+"""The command line: simulate, locate, localization, compare, stability, design."""
 
 from __future__ import annotations
 
@@ -135,6 +135,53 @@ def _parser() -> argparse.ArgumentParser:
     )
     localization.set_defaults(run=_localization)
 
+    compare = commands.add_parser(
+        "compare", help="laws side by side on the same random layouts"
+    )
+    compare.add_argument(
+        "scenario",
+        nargs="*",
+        help="library name, YAML file of layouts, or YAML file of a scenario "
+        "(default: the papers' four experiments)",
+    )
+    compare.add_argument(
+        "--laws", metavar="LAW,...", help="laws to compare (default: all of ours)"
+    )
+    compare.add_argument(
+        "--velocity-term",
+        metavar="TERM,...",
+        help="printed, closing, or both (default: the scenario's)",
+    )
+    compare.add_argument(
+        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+    )
+    compare.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
+    compare.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as hearing=ideal; may be repeated",
+    )
+    compare.add_argument(
+        "--grid",
+        metavar="KEY=[VALUE,...]",
+        action="append",
+        default=[],
+        help="compare values of a further field, as hearing=[audio,ideal]",
+    )
+    compare.add_argument(
+        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+    )
+    compare.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    compare.add_argument(
+        "--resume", action="store_true", help="go on with the runs in --out"
+    )
+    compare.add_argument("--json", action="store_true", help="print one JSON document")
+    compare.set_defaults(run=_compare)
+
     stability = commands.add_parser(
         "stability", help="stability of a scenario's loop: report, models, numbers"
     )
@@ -156,6 +203,16 @@ def _parser() -> argparse.ArgumentParser:
         "--json", action="store_true", help="print one JSON document"
     )
     stability.set_defaults(run=_stability)
+
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    _take_scenario(design)
+    design.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    design.add_argument("--json", action="store_true", help="print one JSON document")
+    design.set_defaults(run=_design)
     return parser
 
 
@@ -398,6 +455,75 @@ def _stability(options: argparse.Namespace) -> None:
     else:
         print(stability_text(document))
         print(f"\nreport in {out / 'report.html'}")
+
+
+def _compare(options: argparse.Namespace) -> None:
+    from analysis.compare import prepare_comparison
+    from analysis.compare_options import comparison_plans
+    from analysis.compare_report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+
+    try:
+        plans = comparison_plans(
+            options.scenario,
+            laws=options.laws,
+            velocity_terms=options.velocity_term,
+            runs=options.runs,
+            seed=options.seed,
+            settings=options.set,
+            grid=options.grid,
+        )
+        prepared = prepare_comparison(
+            plans, options.out, workers=options.workers, resume=options.resume
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    try:
+        with _Progress(prepared.runs, "runs") as progress:
+            comparisons = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons)
+        write_comparison(prepared, comparisons, summary)
+    except RuntimeError as error:
+        raise RunError(str(error)) from error
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
+            "--resume"
+        ) from None
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(compare_text(summary, comparisons))
+        print(f"\nresults in {prepared.out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_summary, design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            directory = stack.enter_context(whole_directory(out))
+            with _Progress(STUDY_RUNS, "runs") as progress:
+                study = study_design(scenario, progress=progress)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        except SystemExit as error:
+            raise RunError("Drake ended the design; its message is above") from error
+        summary = design_summary(study, out)
+        write_design(study, summary, directory)
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(design_text(study))
+        print(f"\nresults in {out}")
 
 
 if __name__ == "__main__":

@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
-from systems.coherent import refine_source
+from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
@@ -20,6 +20,7 @@ from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
+from systems.steered_response import NEAREST_M
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
@@ -77,6 +78,10 @@ class TDOAParameters(Parameters):
     """Weigh frames with echoes by the precedence of the first wave front."""
     maximum_closure_s: Positive = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
+    maximum_misfit: Fraction = 0.05
+    """Largest disagreement of a delay with that of the place beyond
+    ``maximum_closure_s``, as a share of the longest that sound can take across the
+    array. It shows with four microphones or more."""
     maximum_ambiguity: Fraction = 0.8
     """Largest second peak over the first one."""
     maximum_bearing_std_deg: Positive = 3.0
@@ -223,6 +228,17 @@ class Localiser:
             )
         return energy
 
+    def _is_place(self, fix: SourceFix, tau: NDArray[np.float64]) -> bool:
+        """Whether a source could be there, and the delays be those from there."""
+        shape, c = self.plan.shape, self.plan.c
+        if fix.range_valid and fix.range < NEAREST_M:
+            return False
+        if shape.freedom <= 0:
+            return True
+        limit = self.parameters.maximum_closure_s
+        limit += self.parameters.maximum_misfit * shape.max_delay(c)
+        return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
+
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
             frame,
@@ -282,6 +298,8 @@ class Localiser:
         if echoes is not None:
             covariance = covariance + echoes
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if not self._is_place(fix, delays.tau):
+            return None
         if parameters.method == "ml" and echoes is None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length

@@ -19,7 +19,7 @@ from analysis.linearisation import (
 from analysis.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario import Scenario
 
-LAWS = ["none", "conventional", "active"]
+LAWS = ["none", "conventional", "active", "active2017"]
 
 
 def points(law):

@@ -17,6 +17,16 @@ from diagrams import load_scenario
 from diagrams.scenario import Scenario
 
 K_R, K_0, RHO_0, M, D_R = 2.0, 16.0, 0.8, 3.94, 1.0
+REPULSION = {
+    "conventional": {"stiffness_n_m": K_0, "reach_m": RHO_0},
+    "active": {
+        "reference_stiffness_n_m": 64.0,
+        "reference_damping_n_s_m": 0.2,
+        "matched_stiffness_n_m": 16.0,
+        "reach_m": RHO_0,
+        "speed_limit_m_s": 0.72,
+    },
+}
 POINT = {"length_m": 1e-3, "width_m": 1e-3}
 
 
@@ -27,6 +37,7 @@ def one_obstacle(law: str, behind: float, **data) -> Scenario:
             "law": law,
             "source": {"waypoints_m": [[3.0, 0.0]]} | POINT,
             "attraction": {"follow_distance_m": 0.0},
+            "repulsion": REPULSION,
             "obstacles": [
                 {
                     "name": "pin",
@@ -58,12 +69,13 @@ def test_one_obstacle_makes_the_saddle_of_the_closed_form(behind):
 
 
 @settings(max_examples=5)
-@given(st.floats(0.6, 3.0), st.sampled_from(["conventional", "active"]))
+@given(st.floats(0.6, 3.0), st.sampled_from(["conventional", "active", "active2017"]))
 def test_one_small_obstacle_is_never_a_local_minimum(behind, law):
     """Exact nearest-point sensing: whatever lies before the obstacle is no sink."""
-    search = find_equilibria(one_obstacle(law, behind), smallest_m=0.004)
-    before = [p for p in search.points if p.p_WP[0] < 3.0 - behind]
-    assert all(p.kind != "sink" for p in before)
+    area = (-1.0, 2.99 - behind, -1.0, 1.0)
+    search = find_equilibria(one_obstacle(law, behind), area_m=area)
+    assert not search.unresolved
+    assert all(p.kind != "sink" for p in search.points)
 
 
 def test_a_flat_face_across_the_line_is_a_trap_as_wide_as_the_face():
@@ -84,7 +96,7 @@ def test_a_flat_face_across_the_line_is_a_trap_as_wide_as_the_face():
 
 def test_a_stiff_obstacle_oscillates_and_is_a_source():
     """At K_0 = 30 the radial mode grows, past the contact limit of 18.2 N/m."""
-    gains = {"stiffness_n_m": 30.0, "reference_stiffness_n_m": 120.0}
+    gains = {"conventional": {"stiffness_n_m": 30.0}}
     search = find_equilibria(one_obstacle("conventional", 2.0, repulsion=gains))
     (point,) = [p for p in search.points if p.p_WP[0] < 0.9]
     assert point.kind == "source"
@@ -103,7 +115,8 @@ def test_far_from_obstacles_p_rests_anywhere_round_the_source():
 
 def test_pushed_off_the_source_by_the_closed_form_of_the_active_law():
     """On the line K_r (d - d_f) = f(d - half the source's length)."""
-    point = follow_equilibrium(Scenario(law="active"))
+    scenario = {"law": "active", "repulsion": REPULSION}
+    point = follow_equilibrium(Scenario.model_validate(scenario))
     alpha = RHO_0 / (2 * math.log(64 / 16))
     c = point.clearance_m
     push = 64 * math.exp(-c / alpha) * c + 0.2 * 0.72
@@ -112,7 +125,7 @@ def test_pushed_off_the_source_by_the_closed_form_of_the_active_law():
     assert point.stable
 
 
-@pytest.mark.parametrize("law", ["conventional", "active"])
+@pytest.mark.parametrize("law", ["conventional", "active", "active2017"])
 def test_force_field_is_what_the_diagram_does(law):
     scenario = ideal_scenario(load_scenario("two_static_obstacles", [f"law={law}"]))
     loop = ideal_loop(frozen_scenario(scenario))
@@ -124,7 +137,7 @@ def test_force_field_is_what_the_diagram_does(law):
         np.testing.assert_allclose(field.force(p), M * acceleration, atol=1e-12)
 
 
-@pytest.mark.parametrize("law", ["conventional", "active"])
+@pytest.mark.parametrize("law", ["conventional", "active", "active2017"])
 def test_every_root_of_a_blind_search_is_found(law):
     """scipy from 200 random starts finds nothing that the search does not list."""
     from scipy.optimize import root
