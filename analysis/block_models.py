@@ -63,7 +63,7 @@ def sampled_blocks(
             read_after=flows,
         )
         names = tuple(loop.state_names[k] for k in loop.indices(role))
-        models.append(replace(model, state_names=names))
+        models.append(replace(model, name=role, state_names=names))
     return tuple(models)
 
 

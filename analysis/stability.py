@@ -51,6 +51,8 @@ class Part:
     """Pieces of HTML from the data and a prefix for names of figures."""
     fresh: bool = False
     """Whether it begins a sheet of paper."""
+    document: Callable[[Any], dict[str, Any]] | None = None
+    """Entries of the JSON document; none: the data as it is, under the key."""
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+from analysis.certificate_parts import certificate_parts
+from analysis.extended_parts import extended_parts
+from analysis.linear_parts import linear_parts
+from analysis.robustness_parts import robustness_parts
 from analysis.stability import Part
+from analysis.velocity_parts import velocity_parts
 
 __all__ = ["parts"]
 
@@ -13,4 +18,10 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return ()
+    return (
+        *linear_parts(),
+        *velocity_parts(),
+        *certificate_parts(full=full),
+        *robustness_parts(full=full),
+        *(extended_parts() if full else ()),
+    )

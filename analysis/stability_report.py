@@ -51,10 +51,13 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
     findings = analysis.findings.values()
     parts: dict[str, Any] = {}
     for finding in findings:
+        part = finding.part
         if finding.problem:
-            parts[finding.part.key] = {"problem": finding.problem}
+            parts[part.key] = {"problem": finding.problem}
+        elif part.document is None:
+            parts[part.key] = plain(finding.data)
         else:
-            parts[finding.part.key] = plain(finding.data)
+            parts |= plain(part.document(finding.data))
     return {
         "law": analysis.law,
         **parts,
