@@ -20,7 +20,7 @@ BASIS = [(1, 0), (0, 1), (1, 1), (2, 0)]
 number = st.floats(-3.0, 3.0)
 polynomials = st.dictionaries(
     st.tuples(st.integers(0, 3), st.integers(0, 3)), number, max_size=6
-).map(lambda terms: Polynomial(dict(terms)))
+).map(lambda terms: Polynomial({**terms}))
 points = st.tuples(number, number)
 
 
