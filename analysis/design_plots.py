@@ -39,7 +39,7 @@ def _plot_balance(axes: Axes, study: DesignStudy) -> None:
     pull = scenario.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]
-        push = spring(law, scenario.repulsion)
+        push = spring(law, scenario)
         force = np.array([push(c) for c in _DISTANCE_M.tolist()])
         axes.plot(_DISTANCE_M, force, color=colour, label=title)
         stops = (force > pull) & (nearest <= _DISTANCE_M)
