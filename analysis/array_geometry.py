@@ -33,7 +33,7 @@ class ArrayGeometry(Parameters):
     """Places (x, y) or (x, y, z) in the order of the channels, m."""
     channels: _Channels | None = None
     """Columns of the file to use, from 0; none: the first ones."""
-    sound_speed: Positive | None = None
+    sound_speed: float | None = Field(default=None, ge=100.0, le=8000.0)
     """Speed of sound, m/s; none: 340, or from the temperature."""
     temperature_c: float | None = Field(default=None, ge=-50.0, le=60.0)
     """Temperature, deg C."""
@@ -119,6 +119,10 @@ def _first_error(error: ValidationError) -> str:
     # Members of a union stand in the path, too, by names with brackets.
     where = ".".join(str(part) for part in first["loc"] if "[" not in str(part))
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] in {"tuple_type", "too_short", "too_long"}:
+        message = f"is {first['input']}; give [x, y] or [x, y, z] of each microphone"
+        if first["loc"][0] != "microphones":
+            message = f"is {first['input']}; give a list, as in the documentation"
     if first["type"] == "extra_forbidden":
         message = "unknown key; remove it"
     return f"{where}: {message}" if where else message
