@@ -60,6 +60,17 @@ class ForceField:
         forces = self._forces(seed(p_WP), twin=True)
         return value_and_gradient(forces[:2] + forces[2:], 2)
 
+    def damping(self, p_WP: ArrayLike) -> float:
+        """Minus the force's slope in the virtual mass's own speed, N s/m."""
+        self._forces(np.asarray(p_WP, dtype=float), twin=True)
+        block, context = self._controller(twin=True)
+        port = block.GetInputPort("v_WP")
+        port.FixValue(context, seed([0.0, 0.0]))
+        forces = block.GetOutputPort("forces_W").Eval(context)
+        port.FixValue(context, np.zeros(2))
+        _, slope = value_and_gradient(forces[:2] + forces[2:], 2)
+        return -float(slope[0, 0])
+
     @cached_property
     def reach_m(self) -> float:
         """Beyond this distance no body is seen, m."""

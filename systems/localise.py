@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
 from systems.coherent import arrival_delays, refine_source
@@ -40,11 +39,6 @@ _NOISE_FRAMES = 8.0
 # A knock, or a sound that reverberates too much to be heard, may raise that level no
 # more than a noise of so many times it.
 _LOUDEST_NOISE = 1.5
-
-# Share of frames of steady white noise that are loud enough to be searched for a
-# sound; frames that are no louder than the noise are not. A sound 15 dB below it
-# would still be searched for, while none is found below 12 dB.
-_SEARCHED_SHARE = 0.1
 
 # Frames whose echoes were suppressed are believed from this correlation on, and up
 # to this ambiguity.
@@ -131,11 +125,6 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
-        # The energy of white noise scatters by the root of 2 over its samples, and
-        # what it is compared with is known as well as an average can be.
-        variance = 2.0 / (plan.shape.count * plan.frame_samples)
-        variance *= 1.0 + 1.0 / (2.0 * _NOISE_FRAMES - 1.0)
-        self._loud = 1.0 - float(ndtri(_SEARCHED_SHARE)) * math.sqrt(variance)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -175,11 +164,8 @@ class Localiser:
             ValueError: The frame is no frame of this array, or not finite.
         """
         energy = self._checked_energy(frame)
-        searched = 1.0
-        if memory.energy > 0.0:
-            if energy <= self._loud * memory.energy:
-                return None, self._after_noise(memory, energy)
-            searched = _SEARCHED_SHARE
+        if energy <= memory.energy:  # no louder than the noise
+            return None, self._after_noise(memory, energy)
         seen = look(
             frame,
             self.plan,
@@ -189,7 +175,7 @@ class Localiser:
         if seen is None:
             return None, memory
         search = seen[0]
-        if searched * search.chance > self.parameters.false_alarm_rate:
+        if search.chance > self.parameters.false_alarm_rate:
             return None, self._after_noise(memory, energy, search.energy)
         after = memory._replace(heard=True)
         if not memory.heard and search.weakest > _SHARED_CHANCE:
