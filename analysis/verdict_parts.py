@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import Any
-
-import numpy as np
 
 from analysis.contact_mode import contact_spectral_radius
 from analysis.html_page import Cell, table
@@ -13,6 +12,7 @@ from analysis.loop_uncertainty import law_stiffness
 from analysis.margin_parts import Margins, least_damped
 from analysis.stability import Part, Study
 from analysis.verdicts import Criterion, Verdict, judge
+from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["verdict_parts"]
 
@@ -80,13 +80,18 @@ def _contact(study: Study, ticks: int) -> Reading:
     if stiffness <= 0.0:
         return "the law does not push off obstacles"
     total = scenario.attraction.stiffness_n_m + stiffness
-    return contact_spectral_radius(scenario, total, latency_ticks=ticks)
+    return _growth(contact_spectral_radius(scenario, total, latency_ticks=ticks))
+
+
+def _growth(radius: float) -> float:
+    """ln(|z|)/T of the sampled loop, 1/s."""
+    return math.log(radius) / FRAME_PERIOD_S
 
 
 def _worst_case(key: str) -> Callable[[Study], Reading]:
     def read(study: Study) -> Reading:
         data = study.found.get(key)
-        return data.cloud.worst_radius if data else "robustness was not computed"
+        return _growth(data.cloud.worst_radius) if data else "it was not computed"
 
     return read
 
@@ -123,7 +128,7 @@ def _routes(study: Study) -> Reading:
 _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     (
         Criterion(
-            "slowest decay at rest", "1/s", "below", 0.0,
+            "growth at rest", "1/s", "below", 0.0,
             "small deviations from the follow point die out",
             "small deviations from the follow point grow",
             "stability",
@@ -177,7 +182,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "growth before an obstacle", "|z|", "below", 1.0,
+            "growth before an obstacle", "1/s", "below", 0.0,
             "P comes to rest before an obstacle",
             "P swings before an obstacle, ever farther or in a limit cycle",
             "stability at the law's largest stiffness",
@@ -186,7 +191,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "the same, one tick late", "|z|", "below", 1.0,
+            "the same, one tick late", "1/s", "below", 0.0,
             "a processor may need one tick more",
             "one more tick of latency makes P swing before an obstacle",
             _OURS,
@@ -195,7 +200,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "worst case at rest", "|z|", "below", 1.0,
+            "worst case at rest", "1/s", "below", 0.0,
             "it stays stable with all parameters off",
             "parameters that are off make it unstable",
             "stability over the box of parameters",
@@ -204,7 +209,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "worst case before an obstacle", "|z|", "below", 1.0,
+            "worst case before an obstacle", "1/s", "below", 0.0,
             "it stays stable before an obstacle with all parameters off",
             "parameters that are off make P swing before an obstacle",
             "stability over the box of parameters",
@@ -279,7 +284,7 @@ def _verdicts(study: Study) -> tuple[Verdict, ...]:
         value = read(study)
         if isinstance(value, str):
             verdicts.append(judge(criterion, None, value))
-        elif np.isnan(value):
+        elif math.isnan(value):
             verdicts.append(judge(criterion, None, "there is no such number"))
         else:
             verdicts.append(judge(criterion, value))
