@@ -19,6 +19,8 @@ __all__ = ["ArrayGeometry", "load_geometry"]
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
 
+_LEAST_BAND_HZ = 500.0
+
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
@@ -57,6 +59,11 @@ class ArrayGeometry(Parameters):
             )
         if self.band is not None and self.band[0] >= self.band[1]:
             raise ValueError("band: must rise, as [300, 8000]")
+        if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
+            raise ValueError(
+                f"band: {list(self.band)} is too narrow to tell delays; give at least "
+                f"{_LEAST_BAND_HZ:g} Hz"
+            )
         aperture = ArrayShape.of(self.microphones).aperture_m
         if aperture > _LARGEST_M:
             raise ValueError(

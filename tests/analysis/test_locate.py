@@ -467,6 +467,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         (GOOD + "sound_speed: 0.34\n", "sound_speed.*100"),
         ("microphones: [1, 2, 3]\n", r"microphones.0: is 1; give \[x, y\]"),
         ("microphones: [[0, 0], [0, 1, 2], [1, 1]]\n", r"0, 1, 2\]; give \[x, y\]"),
+        (GOOD + "band: [300, 330]\n", "band.*narrow.*500 Hz"),
         (GOOD + "band: 300\n", "band: is 300; give a list"),
         (GOOD + "band: [8000, 300]\n", "band"),
         (GOOD + "bandwidth: 3\n", "bandwidth: unknown key"),
