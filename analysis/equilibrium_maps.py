@@ -161,7 +161,8 @@ def _refined(
 ) -> tuple[float, float]:
     """Compass search from a cell: halves its step where no neighbour is lower."""
     step, here = cell_m, point.copy()
-    directions = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]], dtype=float)
+    angle = 2.0 * np.pi * np.arange(16) / 16
+    directions = np.column_stack([np.cos(angle), np.sin(angle)])
     value = float(model.potential(here[None])[0])
     while step > 1e-4:
         tries = here + step * directions
@@ -258,10 +259,18 @@ def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:
     model = point_mass(case)
     minima = local_minima(model, cell_m=cell_m)
     held = minima[:, 0] < BOX_X_M + BOX_M[0]
+    jams: list[tuple[float, float]] = []
+    for cell in minima[held]:
+        place = _refined(model, cell, cell_m)
+        # A search may leave a shallow cell for the goal, or for another jam.
+        if place[0] < BOX_X_M + BOX_M[0] and all(
+            math.dist(place, other) > cell_m for other in jams
+        ):
+            jams.append(place)
     beyond = minima[~held]
     goal = beyond[[np.argmin(model.potential(beyond))]] if len(beyond) else beyond
-    return [(*_refined(model, p, cell_m), "jam") for p in minima[held]] + [
-        (*_refined(model, p, cell_m), "goal") for p in goal
+    return [(x, y, "jam") for x, y in jams] + [
+        (*_refined(model, cell, cell_m), "goal") for cell in goal
     ]
 
 

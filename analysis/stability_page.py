@@ -60,9 +60,6 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
         ]
     )
     parts = [about, _verdict_table(rows, list(verdicts))]
-    if len(analyses) == 1:
-        sources = [(v.name, v.source) for v in verdicts[analyses[0].law]]
-        parts.append(table(["criterion", "source of the threshold"], sources))
     return section("summary", "Summary", parts)
 
 
