@@ -191,7 +191,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "the same, one tick late", "1/s", "below", 0.0,
+            "the same with echoes a tick late", "1/s", "below", 0.0,
             "a processor may need one tick more",
             "one more tick of latency makes P swing before an obstacle",
             _OURS,
