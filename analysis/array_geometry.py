@@ -16,6 +16,9 @@ from systems.parameters import Parameters, Point, Positive
 
 __all__ = ["ArrayGeometry", "load_geometry"]
 
+# Positions that are farther apart are in other units than metres.
+_LARGEST_M = 30.0
+
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
@@ -54,7 +57,12 @@ class ArrayGeometry(Parameters):
             )
         if self.band is not None and self.band[0] >= self.band[1]:
             raise ValueError("band: must rise, as [300, 8000]")
-        ArrayShape.of(self.microphones)
+        aperture = ArrayShape.of(self.microphones).aperture_m
+        if aperture > _LARGEST_M:
+            raise ValueError(
+                f"microphones: {aperture:g} m apart; give positions in m, at most "
+                f"{_LARGEST_M:g} m apart"
+            )
         return self
 
     @property

@@ -28,6 +28,7 @@ __all__ = [
     "SwitchingPoint",
     "find_equilibria",
     "follow_equilibrium",
+    "nearest_equilibrium",
 ]
 
 #: Roots nearer to each other than this are one, m.
@@ -179,7 +180,7 @@ def _roots(
     for cell in (near, *weakest, *turned):
         if len(flat) > _MOST_STARTS:
             break
-        root = _newton(field_, group.centres[cell])
+        root = nearest_equilibrium(field_, group.centres[cell])
         if root is None or np.abs(group.centres - root).max(axis=1).min() > 2.0 * edge:
             continue
         sizes = np.abs(np.linalg.eigvals(field_.gradient(root)[1]))
@@ -190,9 +191,10 @@ def _roots(
     return found or flat[:1]
 
 
-def _newton(
+def nearest_equilibrium(
     field_: ForceField, begin: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
+    """(2,) where no force acts on P, by Newton's method; none: not found, m."""
     p = begin.copy()
     for _ in range(30):
         force, slope = field_.gradient(p)

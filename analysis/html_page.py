@@ -21,7 +21,9 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
 __all__ = [
+    "ZERO",
     "Cell",
+    "bullets",
     "definitions",
     "equation",
     "figure_html",
@@ -38,6 +40,9 @@ _CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
 
 #: Text, or a number; none is a dash.
 Cell = str | complex | None
+
+#: Stands for a zero among numbers, so that the others are seen.
+ZERO = "\u00b7"
 
 #: Cells that are coloured, by their text.
 _VERDICT_CLASSES = {
@@ -64,6 +69,11 @@ def note(text: str) -> str:
     return f'<p class="note">{_inline(text)}</p>'
 
 
+def bullets(texts: Iterable[str]) -> str:
+    """A list with a dot before each text."""
+    return "<ul>" + "".join(f"<li>{_inline(text)}</li>" for text in texts) + "</ul>"
+
+
 def definitions(rows: Iterable[tuple[str, str]]) -> str:
     """Pairs of term and text, a line each."""
     lines = "".join(
@@ -83,7 +93,8 @@ def table(
 
     Args:
         headings: One for each column; all empty: no row of headings.
-        rows: Cells; numbers are set to the right, verdicts in their colours.
+        rows: Cells; numbers are set to the right, verdicts in their colours. A row
+            of a single cell spans the table and heads the rows that follow.
         caption: Stands above.
         dense: In small type, for matrices.
     """
@@ -91,17 +102,24 @@ def table(
     top = f"<caption>{_inline(caption)}</caption>" if caption else ""
     head = "".join(f"<th>{_inline(text)}</th>" for text in headings)
     head = f"<thead><tr>{head}</tr></thead>" if any(headings) else ""
-    body = "".join(
-        "<tr>" + "".join(_cell(cell) for cell in row) + "</tr>" for row in rows
-    )
+    body = "".join(_row(row, len(headings)) for row in rows)
     return (
         f'<div class="wide"><table{kind}>{top}{head}<tbody>{body}</tbody></table></div>'
     )
 
 
+def _row(cells: Sequence[Cell], columns: int) -> str:
+    if len(cells) == 1 < columns:
+        spanning = f'<td colspan="{columns}">{_inline(str(cells[0]))}</td>'
+        return f'<tr class="group">{spanning}</tr>'
+    return "<tr>" + "".join(_cell(cell) for cell in cells) + "</tr>"
+
+
 def _cell(value: Cell) -> str:
     if not isinstance(value, str):
         return f'<td class="number">{number(value)}</td>'
+    if value == ZERO:
+        return f'<td class="number">{ZERO}</td>'
     kind = _VERDICT_CLASSES.get(value.lower())
     opening = f'<td class="{kind}">' if kind else "<td>"
     return f"{opening}{_inline(value)}</td>"

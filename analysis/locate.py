@@ -126,6 +126,11 @@ def _check_recording(
     samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, where: str
 ) -> None:
     count, needed = len(samples), len(geometry.microphones)
+    if geometry.channels is not None and max(geometry.channels) >= count >= needed:
+        raise ValueError(
+            f"{where} has {count} channels, numbers 0 to {count - 1}; 'channels' in "
+            f"the geometry file counts from 0 and names {max(geometry.channels)}"
+        )
     if max(geometry.columns) >= count:
         what = "is mono" if count == 1 else f"has {count} channels"
         raise ValueError(

@@ -66,7 +66,7 @@ def _title(result: LocateResult) -> str:
 
 
 def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
-    """Estimates with bars; the summary as a line with its scatter as a band."""
+    """Estimates with bars; the summary as a line, its error as a band."""
     std_name = name.replace("_deg", "_std_deg").replace("_m", "_std_m")
     rows = [
         (e.t_s, getattr(e, name), getattr(e, std_name))
@@ -75,7 +75,7 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     ]
     times, values, errors = np.array(rows).T
     summary = result.summary()
-    centre, scatter = summary[name], summary[std_name]
+    centre, std = summary[name], summary[std_name]
     if name == "bearing_deg" and centre is not None:
         # A bearing near 180 deg must not jump from top to bottom.
         values = centre + (values - centre + 180.0) % 360.0 - 180.0
@@ -91,8 +91,8 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     if centre is not None:
         axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
         axes.axhspan(
-            centre - scatter,
-            centre + scatter,
+            centre - std,
+            centre + std,
             color=COLOURS["source"],
             alpha=0.15,
             linewidth=0,

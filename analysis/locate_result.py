@@ -167,9 +167,12 @@ def _main_source(estimates: list[SourceEstimate]) -> list[SourceEstimate]:
 def _median(
     estimates: Sequence[tuple[float | None, float | None]],
 ) -> tuple[float | None, float | None]:
-    """Median of values with errors, and the scatter about it.
+    """Median of values with errors, and the error of a single one.
 
-    Values count by their errors, as in a mean. None, None where there are none.
+    Values count by their errors, as in a mean. Their error is the scatter about
+    the median, or what is usually stated, whichever is larger: a few values
+    that agree say little, and what they have in common nothing. None, None
+    where there are no values.
     """
     rows = [row for row in estimates if row[0] is not None and row[1] is not None]
     if not rows:
@@ -178,7 +181,7 @@ def _median(
     weights = 1.0 / np.maximum(errors, _LEAST_ERROR * np.median(errors)) ** 2
     centre = _weighted_median(values, weights)
     scatter = _TO_STANDARD * float(np.median(np.abs(values - centre)))
-    return centre, scatter
+    return centre, max(scatter, float(np.median(errors)))
 
 
 def _weighted_median(

@@ -6,6 +6,11 @@ from analysis.locate_result import LocateResult, SourceEstimate
 
 __all__ = ["locate_text"]
 
+_WHY_NOTHING = (
+    "; there is silence or noise, or the positions (in m) or the speed of sound are "
+    "not those of the array, or the source is within 0.2 m of its centre"
+)
+
 _COLUMNS = (
     ("bearing_deg", "bearing/deg", 11, 2),
     ("bearing_std_deg", "std", 7, 3),
@@ -21,7 +26,7 @@ def locate_text(result: LocateResult) -> str:
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
     faults = [fault.message for fault in result.faults]
     if not result.estimates:
-        return "\n".join([f"{heard}: nothing to locate", *faults])
+        return "\n".join([f"{heard}: nothing to locate{_WHY_NOTHING}", *faults])
     lines = [heard, *_direction(result), _range(result), *faults, ""]
     lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
     lines += [_row(estimate) for estimate in result.estimates]
@@ -34,12 +39,12 @@ def _direction(result: LocateResult) -> list[str]:
     if summary["bearing_deg"] is not None:
         parts.append(
             f"bearing {summary['bearing_deg']:.2f} deg "
-            f"(scatter {summary['bearing_std_deg']:.2f})"
+            f"(std {summary['bearing_std_deg']:.2f})"
         )
     if summary["elevation_deg"] is not None:
         parts.append(
             f"elevation {summary['elevation_deg']:.1f} deg "
-            f"(scatter {summary['elevation_std_deg']:.1f})"
+            f"(std {summary['elevation_std_deg']:.1f})"
         )
     lines = [", ".join(parts) or "direction not observable: the row is slanted"]
     for other in summary["alternatives"]:
@@ -58,7 +63,7 @@ def _range(result: LocateResult) -> str:
     if summary["range_m"] is None:
         size = 100.0 * result.shape.aperture_m
         return f"range not observable (microphones within {size:.1f} cm)"
-    return f"range {summary['range_m']:.3f} m (scatter {summary['range_std_m']:.3f})"
+    return f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f})"
 
 
 def _row(estimate: SourceEstimate) -> str:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.proximity import Proximity
 from analysis.shortest_path import shortest_path_length
+from analysis.sightings import sightings
 from analysis.smoothness import (
     jerk,
     log_dimensionless_jerk,
@@ -45,6 +46,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_smoothness_metrics(result),
         **_effort_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
+        **_collision_metrics(result),
         **_hearing_metrics(result),
     }
 
@@ -198,6 +200,16 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
     first = np.flatnonzero(reacting)
     return float(nearest[first[0]]) if len(first) else None
+
+
+def _collision_metrics(result: RunResult) -> dict[str, float | None]:
+    """What the cones knew of the body that was hit."""
+    before = sightings(result)
+    return {
+        "contact_warning_s": before.warning_s if before else None,
+        "contact_unseen_s": before.unseen_s if before else None,
+        "contact_push_n": before.push_n if before else None,
+    }
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:

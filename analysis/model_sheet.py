@@ -85,6 +85,11 @@ class ParameterRow:
     text: str
     """Symbol, unit and source, in the words of its block."""
 
+    @property
+    def of_law(self) -> bool:
+        """Whether it belongs to the law, rather than to every loop."""
+        return self.field.startswith("repulsion.")
+
 
 @dataclass(frozen=True)
 class Limit:
@@ -120,7 +125,10 @@ class ModelSheet:
     seed: int
     scenario_sha256: str
     """Of the effective scenario as YAML, with this law."""
-    equations: tuple[Equation, ...]
+    motion: tuple[Equation, ...]
+    """Of every law."""
+    law_equations: tuple[Equation, ...]
+    """None for a law of the user's."""
     parameters: tuple[ParameterRow, ...]
     envelope: tuple[Limit, ...]
     latencies: tuple[Latency, ...]
@@ -140,7 +148,8 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
         law=scenario.law,
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
-        equations=(*_MOTION, *_LAWS.get(scenario.law, ())),
+        motion=_MOTION,
+        law_equations=_LAWS.get(scenario.law, ()),
         parameters=tuple(_parameters(scenario)),
         envelope=_envelope(scenario),
         latencies=_latencies(scenario),

@@ -13,7 +13,7 @@ from systems.channel_faults import ChannelFault
 __all__ = ["channels_without_faults"]
 
 # What leaves nothing to locate with.
-_FATAL = ("nan", "dead")
+_FATAL = ("nan", "dead", "copied")
 
 
 def channels_without_faults(
@@ -38,11 +38,15 @@ def channels_without_faults(
         The channels, and the faults that remain worth saying.
 
     Raises:
-        ValueError: Channels are dead, not finite, or exchanged.
+        ValueError: Channels are dead, not finite, copies, or exchanged.
     """
-    for fault in faults:
-        if fault.kind in _FATAL:
-            raise ValueError(f"{where}: {fault.message}")
+    fatal = [fault for fault in faults if fault.kind in _FATAL]
+    if fatal:
+        first, *rest = fatal
+        further = sorted({k + 1 for f in rest for k in f.channels if f is not first})
+        names = ", ".join(map(str, further))
+        more = f"; see to channels {names} as well" if rest else ""
+        raise ValueError(f"{where}: {first.message}{more}")
     samples = samples.copy()
     for fault in faults:
         if fault.kind == "inverted":

@@ -126,12 +126,14 @@ class RecordingSpectra:
     @cached_property
     def weights(self) -> NDArray[np.float32]:
         """(s, f) what each snapshot is worth, 0 to 1."""
-        power = np.maximum(self.power, np.finfo(np.float32).tiny)
+        tiny = np.finfo(np.float32).tiny
+        power = np.maximum(self.power, tiny)
         hop_s = self.hop / self.sample_rate_hz
         decay = np.float32(10.0 ** (-6.0 * hop_s / _REVERBERATION_S))
         echo = np.zeros_like(power)
         for k in range(1, len(power)):
             echo[k] = decay * np.maximum(echo[k - 1], power[k - 1])
-        above = np.clip(1.0 - _ABOVE_NOISE * self.noise / power, 0.0, 1.0)
-        direct = np.clip(1.0 - _ECHO_SHARE * echo / power, 0.0, 1.0)
-        return (above * direct).astype(np.float32)
+        above = 1.0 - np.minimum(_ABOVE_NOISE * self.noise, power) / power
+        direct = 1.0 - np.minimum(_ECHO_SHARE * echo, power) / power
+        # Digital silence is worth nothing, however long ago its last echo was.
+        return (above * direct * (self.power > tiny)).astype(np.float32)

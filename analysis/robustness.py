@@ -49,6 +49,8 @@ class UncertainParameter:
     """Greatest value; not below the nominal one."""
     reason: str
     """Why the interval is as it is."""
+    whole: bool = False
+    """Whether it is a whole number."""
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
@@ -159,6 +161,8 @@ def pole_cloud(
     high = np.array([p.high for p in parameters])
     unit = qmc.LatinHypercube(len(parameters), rng=np.random.default_rng(seed))
     values = low + unit.random(samples) * (high - low)
+    whole = np.array([p.whole for p in parameters])
+    values = np.where(whole, np.round(values), values)
     found = []
     for row in values:
         found.append(poles(_named(parameters, row)))
@@ -209,14 +213,15 @@ def pole_sensitivities(
 ) -> tuple[PoleSensitivity, ...]:
     """Derivatives of the slowest pole, by central differences.
 
-    At an end of its interval a parameter is varied to the inside only. The
-    pole is followed as the nearest one, which holds for simple poles.
+    At an end of its interval a parameter is varied to the inside only, and a
+    whole number over its whole interval. The pole is followed as the nearest
+    one, which holds for simple poles.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal))
     rows = []
     for p in parameters:
-        step = _STEP * (p.high - p.low)
+        step = (1.0 if p.whole else _STEP) * (p.high - p.low)
         ends = (max(p.nominal - step, p.low), min(p.nominal + step, p.high))
         moved = [
             continuous(_nearest(poles({**nominal, p.name: end}), pole), period)

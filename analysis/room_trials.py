@@ -16,14 +16,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
+from scipy.stats import binomtest
 
 from systems.acoustics import AcousticParameters
 from systems.adc import MicArrayParameters, convert, frame_noise
 from systems.geometry import rotate
+from systems.localise import Localiser
 from systems.mic_array import FRAME_SAMPLES, microphones_B
 from systems.noise import tick_generator
 from systems.robot import RobotParameters
-from systems.room import RoomImages, RoomParameters, room_images, room_impulse_responses
+from systems.room import RoomParameters, room_images, room_impulse_responses
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.tdoa_estimator import TDOAParameters, port_values, robot_localiser
 from systems.tracker_model import Estimate, TrackerModel, TrackerParameters
@@ -70,11 +72,23 @@ class RoomResult:
     """(n,) over the true range; NaN where nothing was heard."""
 
     @property
+    def heard(self) -> NDArray[np.bool_]:
+        """(n,) whether any frame was believed."""
+        return np.isfinite(self.bearing_errors_deg)
+
+    @property
     def located(self) -> NDArray[np.bool_]:
         """(n,) whether bearing and range are within their limits."""
         return (np.abs(self.bearing_errors_deg) <= BEARING_WITHIN_DEG) & (
             np.abs(self.range_errors) <= RANGE_WITHIN
         )
+
+    @property
+    def located_interval(self) -> tuple[float, float]:
+        """Wilson's 95 % interval of the share that is located."""
+        trials = binomtest(int(self.located.sum()), len(self.layouts))
+        low, high = trials.proportion_ci(0.95, method="wilson")
+        return float(low), float(high)
 
 
 def draw_layouts(
@@ -121,6 +135,7 @@ def locate_bursts(
     layouts: list[Layout],
     *,
     parameters: TDOAParameters | None = None,
+    tracking: TrackerParameters | None = None,
     snr_db_at_1m: float = 30.0,
     seed: int = 0,
 ) -> RoomResult:
@@ -131,70 +146,85 @@ def locate_bursts(
         sound: What is played, once.
         layouts: Where robot and source stand.
         parameters: Of the estimator.
+        tracking: Of the tracker; here every source counts as in front.
         snr_db_at_1m: As of ``MicArrayParameters``.
         seed: Of sound and noise.
     """
-    parameters = parameters or TDOAParameters()
+    robot = RobotParameters()
     microphones = MicArrayParameters(snr_db_at_1m=snr_db_at_1m)
     images = room_images(room, _AIR.c)
-    waveform = make_waveform(sound, seed)
-    burst = waveform[: round(sound.on_s * SAMPLE_RATE_HZ)]
-    errors = [
-        _errors(
-            _tracked(layout, room, images, burst, parameters, microphones, seed + k),
-            layout,
+    burst = make_waveform(sound, seed)[: round(sound.on_s * SAMPLE_RATE_HZ)]
+    localiser, p_PA_B = robot_localiser(parameters or TDOAParameters(), robot, _AIR)
+    tracking = (tracking or TrackerParameters()).model_copy(
+        update={"resolve_front_back": False}
+    )
+    tracker = TrackerModel(tracking, robot, 1.5 * FRAME_PERIOD_S)
+    errors = []
+    for k, layout in enumerate(layouts):
+        p_WM = _microphones_W(layout.pose_WB, robot)
+        response = room_impulse_responses(
+            room, layout.p_WS, p_WM, _AIR.c, images=images
         )
-        for k, layout in enumerate(layouts)
-    ]
+        frames = _frames(response, burst, microphones, seed + k)
+        fixes = _fixes(frames, localiser, p_PA_B)
+        errors.append(_errors(_tracked(fixes, tracker, layout.pose_WB), layout))
     bearing, distance = np.array(errors).T
     return RoomResult(layouts, bearing, distance)
 
 
-def _tracked(
-    layout: Layout,
-    room: RoomParameters,
-    images: RoomImages,
+def _frames(
+    response: NDArray[np.float32],
     burst: NDArray[np.float32],
-    parameters: TDOAParameters,
     microphones: MicArrayParameters,
     seed: int,
-) -> NDArray[np.float64] | None:
-    """(2,) where the tracker has the source after the burst, in W, m."""
-    robot = RobotParameters()
-    p_WM = _microphones_W(layout.pose_WB, robot)
-    response = room_impulse_responses(room, layout.p_WS, p_WM, _AIR.c, images=images)
+) -> Iterator[NDArray[np.float32]]:
+    """(m, FRAME_SAMPLES) counts, until the burst has been emitted."""
     # Sound begins at any place of a frame, after some frames of noise alone.
     lead = int(tick_generator(seed, 1).integers(4, 5 * FRAME_SAMPLES)) + FRAME_SAMPLES
     frames = -(-(lead + len(burst)) // FRAME_SAMPLES)
-    pressure = np.zeros((len(p_WM), frames * FRAME_SAMPLES), dtype=np.float32)
+    pressure = np.zeros((len(response), frames, FRAME_SAMPLES), dtype=np.float32)
+    stream = pressure.reshape(len(response), -1)
     heard = oaconvolve(response, burst[np.newaxis], axes=1)
-    length = min(heard.shape[1], pressure.shape[1] - lead)
-    pressure[:, lead : lead + length] = heard[:, :length]
+    length = min(heard.shape[1], stream.shape[1] - lead)
+    stream[:, lead : lead + length] = heard[:, :length]
     noise_pa = float(
         np.sqrt(np.mean(burst**2)) * 10.0 ** (-microphones.snr_db_at_1m / 20.0)
     )
-    localiser, p_PA_B = robot_localiser(parameters, robot, _AIR)
-    tracker = TrackerModel(
-        TrackerParameters(resolve_front_back=False, hold="world"),
-        robot,
-        1.5 * FRAME_PERIOD_S,
-    )
-    pose = layout.pose_WB
-    track, memory, believed = tracker.start(pose), localiser.blank(), False
     for k in range(frames):
-        part = pressure[:, k * FRAME_SAMPLES : (k + 1) * FRAME_SAMPLES]
+        part = np.ascontiguousarray(pressure[:, k])
         noise = frame_noise(part.shape, seed, k)
-        counts = convert(np.ascontiguousarray(part), noise, noise_pa, microphones)
-        fix, memory = localiser.localise(counts.astype(np.float32), memory)
-        if fix is not None:
-            believed = True
-            ports = port_values(fix, p_PA_B)
-            estimate = Estimate(
-                ports[2].tolist(), ports[3].tolist(), ranged=fix.range_valid
-            )
+        yield convert(part, noise, noise_pa, microphones).astype(np.float32)
+
+
+def _fixes(
+    frames: Iterator[NDArray[np.float32]],
+    localiser: Localiser,
+    p_PA_B: NDArray[np.float64],
+) -> Iterator[Estimate | None]:
+    """What the estimator says of each frame, as the tracker takes it."""
+    memory = localiser.blank()
+    for frame in frames:
+        fix, memory = localiser.localise(frame, memory)
+        if fix is None:
+            yield None
+            continue
+        ports = port_values(fix, p_PA_B)
+        yield Estimate(ports[2].tolist(), ports[3].tolist(), ranged=fix.range_valid)
+
+
+def _tracked(
+    estimates: Iterator[Estimate | None],
+    tracker: TrackerModel,
+    pose: NDArray[np.float64],
+) -> NDArray[np.float64] | None:
+    """(2,) where the tracker of a robot at rest has the source at last, in W, m."""
+    track, heard = tracker.start(pose), False
+    for estimate in estimates:
+        if estimate is not None:
+            heard = True
             track = tracker.hear(track, estimate, pose)
         track = tracker.older(track, pose)
-    return np.array(tracker.position(track, pose)) if believed else None
+    return np.array(tracker.position(track, pose)) if heard else None
 
 
 def _errors(p_WS: NDArray[np.float64] | None, layout: Layout) -> tuple[float, float]:
@@ -206,4 +236,5 @@ def _errors(p_WS: NDArray[np.float64] | None, layout: Layout) -> tuple[float, fl
     dx, dy = rotate(-theta, p_WS[0] - x, p_WS[1] - y)
     dx -= robot.control_point_m
     bearing = math.degrees(math.atan2(dy, dx)) - layout.bearing_deg
+    bearing = math.remainder(bearing, 360.0)
     return bearing, math.hypot(dx, dy) / layout.range_m - 1.0

@@ -32,6 +32,14 @@ _REFLECTION_SHARE = 0.3
 # more than the first number; the range is believed from the second one on.
 _CURVED, _CERTAIN = 1.0, 9.0
 
+# Sources are rarely nearer than half a metre, nor than two apertures: deviation
+# of the inverse range, 1/m, and of its product with the aperture.
+_INVERSE_RANGE, _APERTURES = 1.0, 0.5
+
+# A source nearly above a flat array has no bearing that could be told, if it
+# varies by more within the tolerances.
+_LARGEST_STD_RAD = math.radians(20.0)
+
 # A place whose delays are off by more is no place: deviations of chi-square.
 _MISFIT_DEVIATIONS = 5.0
 
@@ -47,7 +55,8 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
     Returns:
         The source; with a range where its standard deviation is below it even
         if the tolerances above are counted, which they are not in the standard
-        deviations themselves. None where no place fits the delays.
+        deviations themselves. None where no place fits the delays, or where the
+        bearing cannot be told.
     """
     tau, covariance = sighting.tau, sighting.covariance
     shrink = _SPEED_TOLERANCE**2
@@ -55,7 +64,10 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
     count = len(tau)
     tolerance = shrink * np.outer(tau, tau)
     tolerance += (_PLACE_TOLERANCE_M / c) ** 2 * (np.eye(count) + 1.0)
-    far = locate_far_source(tau, covariance, shape, c, tolerance)
+    bent = min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
+    far = locate_far_source(
+        tau, covariance, shape, c, tolerance, inverse_range_std=bent
+    )
     near = locate_source(tau, covariance + tolerance, shape, c)
     if (
         near.range_valid
@@ -69,7 +81,14 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
     if shape.dimension == 2 and shape.kind == "plane":
         # A source above the plane has shorter delays than any within it.
         lifted = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
-        far = _level(locate_far_source(tau, covariance, lifted, c, tolerance))
+        far = _level(
+            locate_far_source(
+                tau, covariance, lifted, c, tolerance, inverse_range_std=bent
+            )
+        )
+        within = locate_far_source(tau, covariance + tolerance, lifted, c)
+        if within.bearing_std > _LARGEST_STD_RAD:
+            return None
     return far if far.chi_square < _limit(shape.freedom + 1) else None
 
 

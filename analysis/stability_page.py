@@ -8,6 +8,7 @@ from typing import Any
 
 from analysis.html_page import (
     Cell,
+    bullets,
     definitions,
     equation,
     note,
@@ -17,7 +18,7 @@ from analysis.html_page import (
     section,
     table,
 )
-from analysis.model_sheet import ModelSheet
+from analysis.model_sheet import Equation, ModelSheet, ParameterRow
 from analysis.stability import Finding, LawAnalysis
 from analysis.verdicts import Comparison, Verdict, compare_verdicts
 
@@ -35,8 +36,8 @@ def stability_page(analyses: Sequence[LawAnalysis]) -> str:
     """The report as HTML, with everything in it."""
     first = analyses[0].scenario
     laws = ", ".join(_NAMES.get(a.law, a.law).lower() for a in analyses)
-    contents = [("summary", "Summary")]
-    parts = [_summary(analyses)]
+    contents = [("summary", "Summary"), ("model", "Model sheet")]
+    parts = [_summary(analyses), _model(analyses[0].sheet)]
     for k, analysis in enumerate(analyses):
         law = _NAMES.get(analysis.law, analysis.law)
         prefix = f"law{k}"
@@ -59,9 +60,6 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
         ]
     )
     parts = [about, _verdict_table(rows, list(verdicts))]
-    if len(analyses) == 1:
-        sources = [(v.name, v.source) for v in verdicts[analyses[0].law]]
-        parts.append(table(["criterion", "source of the threshold"], sources))
     return section("summary", "Summary", parts)
 
 
@@ -79,12 +77,14 @@ def _verdict_table(rows: Sequence[Comparison], laws: Sequence[str]) -> str:
 
 
 def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
-    sheet = section(
-        f"{prefix}-model", "Model sheet", _sheet(analysis.sheet, prefix), level=3
+    sheet = analysis.sheet
+    parts = _equations(sheet.law_equations, prefix)
+    parts.append(_parameter_table([row for row in sheet.parameters if row.of_law]))
+    parts.append(
+        paragraph(f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.")
     )
-    return [
-        sheet,
-        *(
+    for key, finding in analysis.findings.items():
+        parts.append(
             section(
                 f"{prefix}-{key}",
                 finding.part.title,
@@ -92,9 +92,8 @@ def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
                 level=3,
                 fresh=finding.part.fresh,
             )
-            for key, finding in analysis.findings.items()
-        ),
-    ]
+        )
+    return parts
 
 
 def _finding(finding: Finding, prefix: str) -> list[str]:
@@ -103,17 +102,11 @@ def _finding(finding: Finding, prefix: str) -> list[str]:
     return finding.part.render(finding.data, f"{prefix}-{finding.part.key}")
 
 
-def _sheet(sheet: ModelSheet, prefix: str) -> list[str]:
-    parts = [
-        part
-        for k, formula in enumerate(sheet.equations)
-        for part in (
-            paragraph(f"{formula.title}:"),
-            equation(formula.tex, f"{prefix}-equation{k}", formula.text),
-        )
-    ]
-    parts += [paragraph(text) for text in sheet.assumptions]
-    parts.append(_parameter_table(sheet))
+def _model(sheet: ModelSheet) -> str:
+    """What holds for every law."""
+    parts = _equations(sheet.motion, "motion")
+    parts.append(bullets(sheet.assumptions))
+    parts.append(_parameter_table([row for row in sheet.parameters if not row.of_law]))
     parts.append(
         table(
             ["limit", "value", "unit", "remark"],
@@ -121,30 +114,35 @@ def _sheet(sheet: ModelSheet, prefix: str) -> list[str]:
             caption="Operating envelope",
         )
     )
-    latencies: list[tuple[Cell, ...]] = [
-        (x.path, x.part, 1e3 * x.mean_s, x.remark) for x in sheet.latencies
-    ]
-    latencies += [
-        (path, "`sum`", 1e3 * sheet.latency_s(path), "")
-        for path in ("source", "obstacle")
-    ]
+    latencies: list[list[Cell]] = []
+    for path in ("source", "obstacle"):
+        latencies.append([f"From {path} to wheels: {1e3 * sheet.latency_s(path):g} ms"])
+        latencies += [
+            [x.part, 1e3 * x.mean_s, x.remark]
+            for x in sheet.latencies
+            if x.path == path
+        ]
     parts.append(
-        table(
-            ["from", "part", "mean (ms)", "remark"],
-            latencies,
-            caption="Latency budget, from the world to the wheels",
+        table(["part", "mean (ms)", "remark"], latencies, caption="Latency budget")
+    )
+    return section("model", "Model sheet", parts, fresh=True)
+
+
+def _equations(formulas: Sequence[Equation], prefix: str) -> list[str]:
+    return [
+        part
+        for k, formula in enumerate(formulas)
+        for part in (
+            paragraph(f"{formula.title}:"),
+            equation(formula.tex, f"{prefix}-equation{k}", formula.text),
         )
-    )
-    parts.append(
-        paragraph(f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.")
-    )
-    return parts
+    ]
 
 
-def _parameter_table(sheet: ModelSheet) -> str:
+def _parameter_table(parameters: Sequence[ParameterRow]) -> str:
     rows: list[list[Cell]] = []
-    for part, group in groupby(sheet.parameters, key=lambda row: row.part):
-        rows.append([part, "", ""])
+    for part, group in groupby(parameters, key=lambda row: row.part):
+        rows.append([part])
         rows += [
             [f"`{row.field}`", _shown(row.value, changed=row.changed), row.text]
             for row in group

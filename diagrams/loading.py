@@ -8,7 +8,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
@@ -17,9 +17,14 @@ from diagrams.scenario import Scenario
 __all__ = [
     "ScenarioError",
     "dump_scenario",
+    "explain",
     "library_scenarios",
     "load_scenario",
+    "parse_setting",
+    "read_mapping",
+    "resolve_sound",
     "scenario_from_mapping",
+    "set_field",
 ]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
@@ -58,12 +63,12 @@ def load_scenario(
             its whole path.
     """
     path = _find(source)
-    data = _read(path)
+    data = read_mapping(path)
     data.setdefault("name", path.stem)
-    _resolve_sound(data, path.parent)
+    resolve_sound(data, path.parent)
     for override in overrides:
-        _override(data, override)
-    _resolve_sound(data, Path.cwd())
+        set_field(data, *parse_setting(override))
+    resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
 
@@ -72,7 +77,7 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise _explain(error) from None
+        raise explain(error, Scenario, "a scenario") from None
 
 
 def dump_scenario(scenario: Scenario) -> str:
@@ -104,7 +109,12 @@ def _find(source: str | Path) -> Path:
     )
 
 
-def _read(path: Path) -> dict[str, Any]:
+def read_mapping(path: Path) -> dict[str, Any]:
+    """The mapping of fields that a YAML file holds; empty where it is empty.
+
+    Raises:
+        ScenarioError: It cannot be read, or holds something else.
+    """
     try:
         data = YAML(typ="safe").load(path)
     except YAMLError as error:
@@ -121,7 +131,7 @@ def _read(path: Path) -> dict[str, Any]:
     return data
 
 
-def _resolve_sound(data: dict[str, Any], folder: Path) -> None:
+def resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """A relative sound file lies beside the scenario, or where one works."""
     interferers = data.get("interferers")
     others = interferers if isinstance(interferers, list) else []
@@ -134,7 +144,12 @@ def _resolve_sound(data: dict[str, Any], folder: Path) -> None:
             sound[key] = str((folder / sound[key]).resolve())
 
 
-def _override(data: dict[str, Any], text: str) -> None:
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Key and value of ``key=value``; the value is YAML.
+
+    Raises:
+        ScenarioError: It is not of that form.
+    """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
         raise ScenarioError(text or "--set", "is not of the form key=value, as seed=2")
@@ -142,6 +157,20 @@ def _override(data: dict[str, Any], text: str) -> None:
         value = YAML(typ="safe").load(value_text)
     except YAMLError:
         raise ScenarioError(key, f"{value_text!r} is not a YAML value") from None
+    return key, value
+
+
+def set_field(data: dict[str, Any], key: str, value: Any) -> None:
+    """Sets one field of a mapping; groups on the way to it are made.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        key: Dotted path, with indices of lists: ``obstacles.0.size_m``.
+        value: Plain value.
+
+    Raises:
+        ScenarioError: The path leads into a plain value, or past a list's end.
+    """
     *parents, last = key.split(".")
     node: Any = data
     for depth, part in enumerate(parents):
@@ -172,14 +201,20 @@ def _index(node: list[Any], part: str, key: str) -> int:
     )
 
 
-def _explain(error: ValidationError) -> ScenarioError:
-    """The first complaint, as field, value and remedy on one line."""
+def explain(error: ValidationError, model: type[BaseModel], what: str) -> ScenarioError:
+    """The first complaint, as field, value and remedy on one line.
+
+    Args:
+        error: What pydantic found.
+        model: The model that it validated.
+        what: What the model is to a user, as 'a scenario'.
+    """
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"])
     kind, message = first["type"], first["msg"]
     if kind == "extra_forbidden":
-        message = "is not a field of a scenario; remove it"
-        return ScenarioError(field, message + _near(field))
+        message = f"is not a field of {what}; remove it"
+        return ScenarioError(field, message + _near(field, model))
     if kind == "value_error":
         # A validator of several fields names the one to mend: "name: message".
         message = message.removeprefix("Value error, ")
@@ -195,12 +230,11 @@ def _explain(error: ValidationError) -> ScenarioError:
     return ScenarioError(field, f"is {value!r}; {message[0].lower()}{message[1:]}")
 
 
-def _near(field: str) -> str:
+def _near(field: str, model: Any) -> str:
     """A field of a similar name at the same place, if there is one."""
     from difflib import get_close_matches
 
     *parents, last = field.split(".")
-    model: Any = Scenario
     for part in parents:
         info = getattr(model, "model_fields", {}).get(part)
         model = info.annotation if info else None

@@ -8,6 +8,7 @@ whether the delays of all belong to a place (``systems.channel_order``).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -42,7 +43,9 @@ _LEAD = 0.1
 class ChannelFault:
     """What is wrong with some channels."""
 
-    kind: Literal["nan", "dead", "clipped", "inverted", "swapped", "near", "geometry"]
+    kind: Literal[
+        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry"
+    ]
     channels: tuple[int, ...]
     """Their numbers, from 0; empty where all are concerned."""
     message: str
@@ -75,6 +78,7 @@ def find_channel_faults(
     found = [fault for fault in faults if fault is not None]
     use = np.array([k for k, fault in enumerate(faults) if fault is None], dtype=int)
     found += [fault for k in use if (fault := _clipped(int(k), samples[k])) is not None]
+    found += _copied(samples, use)
     if use.size < 2:
         return found
     measured = correlate_pairs(
@@ -116,6 +120,20 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     return None
 
 
+def _copied(samples: NDArray[np.float64], use: NDArray[np.int64]) -> list[ChannelFault]:
+    """Channels that hold what another one does: no two microphones hear alike."""
+    return [
+        ChannelFault(
+            "copied",
+            (i, j),
+            f"channels {i + 1} and {j + 1}: the same samples in both; record every "
+            "microphone on a channel of its own",
+        )
+        for i, j in combinations(use.tolist(), 2)
+        if np.array_equal(samples[i], samples[j])
+    ]
+
+
 def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     """A channel whose samples pile up at an extreme, far above the next values."""
     _, counts = np.unique(channel, return_counts=True)
@@ -139,8 +157,10 @@ def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelF
     level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
     faults = []
     for k, channel in enumerate(use.tolist()):
-        over = float(level[k] - np.median(np.delete(level, k)))
-        if over < -_DEAD_DB:
+        others = np.sort(np.delete(level, k))
+        over = float(level[k] - np.median(others))
+        # The loudest alone may have the source at its microphone.
+        if level[k] - others[max(-2, -others.size)] < -_DEAD_DB:
             faults.append(
                 ChannelFault(
                     "dead",

@@ -225,6 +225,8 @@ class Peaks:
     """(n,) of each channel's time of arrival, samples^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
+    angular_frequency: float
+    """Root mean square of what the channels share, rad a sample; least of the pairs."""
     noise_energy: float
     """Of what the mean channel does not share with the others, within the band,
     units of the frame squared."""
@@ -277,5 +279,6 @@ def find_peaks(
         tau=tau + (whole[second] - whole[first]),
         variances=arrival_variances(r, sums, energy, tables, spectra.shape[1], padding),
         correlation=float(correlation),
+        angular_frequency=math.sqrt(float((sums[:, 0] / plain).min())),
         noise_energy=float((1.0 - r.mean()) * energy.mean() / length * padding),
     )

@@ -9,7 +9,7 @@ noise alone would reach it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
@@ -32,6 +32,9 @@ class DelaySearch:
     """Second peak over first within the gate, 0 to 1; worst edge."""
     chance: float
     """Probability that noise alone has peaks as high as these."""
+    weakest: float
+    """Probability that noise alone has a peak as high as the lowest of these: near
+    one where the sound has not reached all channels yet."""
     energy: float
     """Of the mean channel within the band, units of the frame squared."""
 
@@ -144,26 +147,27 @@ def _gated_peaks(correlation, gates):  # pragma: no cover  (compiled)
 
 def _chance_of_noise(
     heights: NDArray[np.float64], counts: NDArray[np.float64]
-) -> float:
-    """Probability that noise reaches all peaks together.
+) -> tuple[float, float]:
+    """Probability that noise reaches all peaks together, and the lowest of them.
 
     Args:
         heights: (e,) peaks over their standard deviation.
         counts: (e,) how often noise crosses zero upwards within the gate; it
             crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
     """
-    log_product = 0.0
+    log_product, weakest = 0.0, 0.0
     for z, count in zip(heights.tolist(), counts.tolist(), strict=True):
         below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(
             -count * math.exp(-0.5 * z * z) if z < 38.0 else 0.0
         )
         log_product += math.log(max(1.0 - below, 1e-300))
+        weakest = max(weakest, 1.0 - below)
     # Fisher: the product of m independent probabilities.
     term, total = 1.0, 0.0
     for k in range(len(heights)):
         total += term
         term *= -log_product / (k + 1)
-    return min(math.exp(log_product) * total, 1.0)
+    return min(math.exp(log_product) * total, 1.0), weakest
 
 
 def _correlation_search(
@@ -180,10 +184,12 @@ def _correlation_search(
     deviations = np.sqrt(2.0 * padding * moments[:, 0]) + 1e-300
     rms_bins = np.sqrt(moments[:, 1] / (moments[:, 0] + 1e-300))
     counts = 2.0 * plan.gates / plan.grid * rms_bins
+    chance, weakest = _chance_of_noise(heights / deviations, counts)
     return DelaySearch(
         arrivals=_arrivals(lags * (plan.length / plan.grid), plan),
         ambiguity=float(ambiguity),
-        chance=_chance_of_noise(heights / deviations, counts),
+        chance=chance,
+        weakest=weakest,
         energy=energy / plan.length,
     )
 
@@ -241,4 +247,4 @@ def search_delays(
         arrivals, ambiguity = _amdf_search(frame, plan)
     else:
         return found
-    return DelaySearch(arrivals, ambiguity, found.chance, found.energy)
+    return replace(found, arrivals=arrivals, ambiguity=ambiguity)

@@ -61,6 +61,8 @@ class DelayEstimate:
     """Second peak over first within the gate, 0 to 1; worst edge."""
     chance: float
     """Probability that noise alone has peaks as high as these."""
+    angular_frequency: float
+    """Root mean square over the sound that the channels share, rad/s."""
     noise_energy: float
     """Of what the mean channel does not share with the others, within the band,
     units of the frame squared."""
@@ -169,6 +171,7 @@ def _estimate(
         closure=float(np.abs(gaps).max()) / rate,
         ambiguity=search.ambiguity,
         chance=search.chance,
+        angular_frequency=peaks.angular_frequency * rate,
         noise_energy=peaks.noise_energy,
         band=band,
     )

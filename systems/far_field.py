@@ -27,6 +27,8 @@ def locate_far_source(
     shape: ArrayShape,
     c: float,
     tolerance: NDArray[np.float64] | None = None,
+    *,
+    inverse_range_std: float = 0.0,
 ) -> SourceFix:
     """Where the sound comes from, if from far away.
 
@@ -37,6 +39,9 @@ def locate_far_source(
         c: Speed of sound, m/s.
         tolerance: (n - 1, n - 1) further errors that weigh the delays and count
             in chi-square, but not in the standard deviations, s^2.
+        inverse_range_std: How uncertain it is that waves are plane: standard
+            deviation of the inverse range before anything was heard, 1/m. It
+            counts in the errors as far as the delays leave it open.
 
     Returns:
         The source on the side of ``shape.ahead``, without a range.
@@ -50,6 +55,9 @@ def locate_far_source(
         u, basis = _off_array(root @ slopes, root @ tau, shape)
     gain = np.linalg.pinv(root @ slopes @ basis) @ root
     of_u = basis @ gain @ covariance @ gain.T @ basis.T
+    if inverse_range_std > 0.0:
+        bend = _bend(u, root, slopes @ basis, shape, c, inverse_range_std)
+        of_u += basis @ np.outer(bend, bend) @ basis.T
     residual = root @ (tau - slopes @ u)
     bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
     return SourceFix(
@@ -64,6 +72,27 @@ def locate_far_source(
         covariance=of_u,
         chi_square=float(residual @ residual),
     )
+
+
+def _bend(
+    u: NDArray[np.float64],
+    root: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+    inverse_range_std: float,
+) -> NDArray[np.float64]:
+    """(k,) deviation of the direction's coordinates by an unknown curvature.
+
+    A wave front from the distance 1/w reaches a microphone at p later than a
+    plane one by w |p - (p . u) u|^2 / 2c.
+    """
+    square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
+    curved = root @ (square[1:] - square[0]) / (2.0 * c)
+    within = root @ slopes
+    turned = np.linalg.pinv(within) @ curved
+    seen = curved - within @ turned
+    return np.asarray(turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2))
 
 
 def _on_sphere(

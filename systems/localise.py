@@ -8,18 +8,19 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
-from systems.coherent import refine_source
+from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
+from systems.echo_errors import echo_errors, energy_spread
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
+from systems.steered_response import NEAREST_M
 
 __all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
 
@@ -35,26 +36,22 @@ _NOISE_MARGIN = 3.0
 # Frames over which the level of the noise is averaged.
 _NOISE_FRAMES = 8.0
 
-# A knock may raise that level no more than a noise of so many times it.
-_LOUDEST_NOISE = 2.0
-
-# Share of frames of steady white noise that are loud enough to be searched for a
-# sound; frames that are no louder than the noise are not. A sound 15 dB below it
-# would still be searched for, while none is found below 12 dB.
-_SEARCHED_SHARE = 0.1
+# A knock, or a sound that reverberates too much to be heard, may raise that level no
+# more than a noise of so many times it.
+_LOUDEST_NOISE = 1.5
 
 # Frames whose echoes were suppressed are believed from this correlation on, and up
 # to this ambiguity.
 _ECHO_CORRELATION = 0.4
 _ECHO_AMBIGUITY = 0.7
 
-# Echoes that slip through, those off the floor above all, shift each arrival by
-# itself (standard deviation, s) and the whole direction (rad). The less of a
-# frame is news, the more: from this share on they count fully. All from the
-# trials in rooms, docs/localization.md.
-_ECHO_ERROR_S = 1.2e-6
-_ECHO_ERROR_RAD = 2e-3
-_ECHO_NEWS = 0.12
+# In the first frame of a sound it may not have reached all channels: noise alone
+# would seem to be heard there with more than this probability.
+_SHARED_CHANCE = 1e-3
+
+# A sound begins within a frame whose energy is spread over less than this share
+# of it.
+_WHOLE_FRAME = 0.8
 
 
 class TDOAParameters(Parameters):
@@ -77,6 +74,10 @@ class TDOAParameters(Parameters):
     """Weigh frames with echoes by the precedence of the first wave front."""
     maximum_closure_s: Positive = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
+    maximum_misfit: Fraction = 0.05
+    """Largest disagreement of a delay with that of the place beyond
+    ``maximum_closure_s``, as a share of the longest that sound can take across the
+    array. It shows with four microphones or more."""
     maximum_ambiguity: Fraction = 0.8
     """Largest second peak over the first one."""
     maximum_bearing_std_deg: Positive = 3.0
@@ -103,6 +104,8 @@ class HearingMemory(NamedTuple):
     """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
     """(n, bins) see ``systems.precedence``."""
+    heard: bool = False
+    """Whether it held a sound."""
 
 
 def _averaged(known: float, new: float) -> float:
@@ -122,11 +125,6 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
-        # The energy of white noise scatters by the root of 2 over its samples, and
-        # what it is compared with is known as well as an average can be.
-        variance = 2.0 / (plan.shape.count * plan.frame_samples)
-        variance *= 1.0 + 1.0 / (2.0 * _NOISE_FRAMES - 1.0)
-        self._loud = 1.0 - float(ndtri(_SEARCHED_SHARE)) * math.sqrt(variance)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -166,11 +164,8 @@ class Localiser:
             ValueError: The frame is no frame of this array, or not finite.
         """
         energy = self._checked_energy(frame)
-        searched = 1.0
-        if memory.energy > 0.0:
-            if energy <= self._loud * memory.energy:
-                return None, self._after_noise(memory, energy)
-            searched = _SEARCHED_SHARE
+        if energy <= memory.energy:  # no louder than the noise
+            return None, self._after_noise(memory, energy)
         seen = look(
             frame,
             self.plan,
@@ -180,32 +175,48 @@ class Localiser:
         if seen is None:
             return None, memory
         search = seen[0]
-        if searched * search.chance > self.parameters.false_alarm_rate:
+        if search.chance > self.parameters.false_alarm_rate:
             return None, self._after_noise(memory, energy, search.energy)
-        return self._locate(frame, seen, memory)
+        after = memory._replace(heard=True)
+        if not memory.heard and search.weakest > _SHARED_CHANCE:
+            return None, after
+        if not self.parameters.suppress_echoes:
+            return self._fix(frame, self._delays(frame, seen)), after
+        begins = not memory.heard and energy_spread(frame) < _WHOLE_FRAME
+        return self._locate(frame, seen, after, begins=begins)
 
     def _locate(
         self,
         frame: NDArray[np.float32],
         seen: tuple[DelaySearch, slice],
         memory: HearingMemory,
+        *,
+        begins: bool,
     ) -> tuple[SourceFix | None, HearingMemory]:
-        """Where the sound comes from that ``look`` has seen in a frame."""
-        if not self.parameters.suppress_echoes:
-            return self._fix(frame, self._delays(frame, seen)), memory
+        """Where the sound comes from that ``look`` has seen in a frame.
+
+        A sound that begins within the frame may have met the floor, which shows in
+        no channel alone: it is never taken to be free of echoes.
+        """
         delays = self._delays(frame, seen)
-        if delays is not None and self._is_direct(delays, memory):
+        direct = delays is not None and self._is_direct(delays, memory)
+        if direct and not begins:
             return self._fix(frame, delays), memory
         dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
         memory = memory._replace(echoes=echoes)
-        delays = self._delays(dry)
+        if direct:
+            news = 1.0
+        else:
+            frame, delays = dry, self._delays(dry)
         if (
             delays is None
             or delays.correlation < _ECHO_CORRELATION
             or delays.ambiguity > _ECHO_AMBIGUITY
         ):
             return None, memory
-        return self._fix(dry, delays, self._echo_errors(news)), memory
+        plan = self.plan
+        errors = echo_errors(plan.shape, plan.c, news, delays.angular_frequency)
+        return self._fix(frame, delays, errors), memory
 
     def _checked_energy(self, frame: NDArray[np.float32]) -> float:
         expected = (self.plan.shape.count, self.plan.frame_samples)
@@ -222,6 +233,17 @@ class Localiser:
                 f"{frame[channel, sample]}; give numbers"
             )
         return energy
+
+    def _is_place(self, fix: SourceFix, tau: NDArray[np.float64]) -> bool:
+        """Whether a source could be there, and the delays be those from there."""
+        shape, c = self.plan.shape, self.plan.c
+        if fix.range_valid and fix.range < NEAREST_M:
+            return False
+        if shape.freedom <= 0:
+            return True
+        limit = self.parameters.maximum_closure_s
+        limit += self.parameters.maximum_misfit * shape.max_delay(c)
+        return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(
@@ -257,13 +279,6 @@ class Localiser:
             delays.correlation >= least or delays.noise_energy <= _NOISE_MARGIN * known
         )
 
-    def _echo_errors(self, news: float) -> NDArray[np.float64]:
-        """(n - 1, n - 1) covariance of delays, for a share of news, s^2."""
-        places = self.plan.shape.p_AM
-        turns = (places[1:] - places[0]) * (_ECHO_ERROR_RAD / self.plan.c)
-        single = _ECHO_ERROR_S**2 * (np.eye(len(turns)) + 1.0)
-        return (single + turns @ turns.T) * max(1.0, _ECHO_NEWS / news) ** 2
-
     def _fix(
         self,
         frame: NDArray[np.float32],
@@ -282,6 +297,8 @@ class Localiser:
         if echoes is not None:
             covariance = covariance + echoes
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
+        if not self._is_place(fix, delays.tau):
+            return None
         if parameters.method == "ml" and echoes is None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length

@@ -91,13 +91,11 @@ def angles_of(
     Returns:
         Standard deviation of the azimuth; elevation, and its own; rad.
     """
-    cosine = max(math.hypot(u[0], u[1]), _LEAST_COSINE)
-    variance = (
-        u[1] * u[1] * of_u[0, 0]
-        - 2.0 * u[0] * u[1] * of_u[0, 1]
-        + u[0] * u[0] * of_u[1, 1]
-    )
-    bearing_std = math.sqrt(max(variance, 0.0)) / cosine**2
+    level = math.hypot(u[0], u[1])
+    x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)
+    cosine = max(level, _LEAST_COSINE)
+    variance = y * y * of_u[0, 0] - 2.0 * x * y * of_u[0, 1] + x * x * of_u[1, 1]
+    bearing_std = math.sqrt(max(variance, 0.0)) / cosine
     if shape.dimension == 2 or shape.angles == ("bearing",):
         return bearing_std, None, None
     known = "elevation" in shape.angles

@@ -18,7 +18,10 @@ _FRAMES = 64
 
 # A frame lasts at least this, and many times what sound needs to cross the array.
 _FRAME_S = 0.05
-_CROSSINGS = 8
+_CROSSINGS = 12
+
+# Delays so many times as long as possible are looked at, to see impossible ones.
+_BEYOND = 3.0
 
 # Points of the correlation a sample.
 _DENSITY = 4
@@ -56,8 +59,8 @@ def correlate_pairs(
 
     Args:
         samples: (n, samples) channels without NaN.
-        max_delay_s: Longest delay that sound can have, s. Delays half as long
-            again are looked at, to see impossible ones.
+        max_delay_s: Longest delay that sound can have, s. Delays three times as
+            long are looked at, to see impossible ones.
         sample_rate_hz: Rate of the samples, Hz.
         band_hz: Lowest and highest frequency to use, Hz.
 
@@ -65,8 +68,9 @@ def correlate_pairs(
         The extremes, or None where the recording is too short or silent.
     """
     count, total = samples.shape
-    gate = math.ceil(1.5 * max_delay_s * sample_rate_hz) + 2
-    least = max(_FRAME_S * sample_rate_hz, _CROSSINGS * gate)
+    crossing = max_delay_s * sample_rate_hz
+    gate = math.ceil(_BEYOND * crossing) + 2
+    least = max(_FRAME_S * sample_rate_hz, _CROSSINGS * crossing)
     length = int(fft.next_fast_len(math.ceil(least), real=True))
     frames = total // length
     if frames == 0:

@@ -59,7 +59,11 @@ def _check_samples(samples: NDArray[np.float64], where: str) -> None:
     if samples.shape[1] == 0:
         raise ValueError(f"{where} holds no samples; record or copy it again")
     if not np.isfinite(samples).all():
-        raise ValueError(f"{where} holds NaN or infinite samples; export it again")
+        channel, sample = np.argwhere(~np.isfinite(samples))[0]
+        raise ValueError(
+            f"{where} holds NaN or infinite samples, the first in channel "
+            f"{channel + 1} as sample {sample}; export it again"
+        )
     if not samples.any():
         raise ValueError(f"{where} is silent throughout; give one that sounds")
 

@@ -38,8 +38,12 @@ _COARSER = 1.25
 
 # Sources are sought from this many apertures on by direction and inverse range.
 _OUTSIDE = 0.6
-#: Nearer than this to the centroid nothing is sought, m.
+#: A source nearer than this to the centroid is not believed, m.
 NEAREST_M = 0.2
+
+# Amid a large array places are sought down to this share of that, so that a
+# source which is too near is not taken for one farther off.
+_TOO_NEAR = 0.1
 
 #: Samples of a correlation for a period of the highest frequency.
 LAG_DENSITY = 16.0
@@ -217,7 +221,8 @@ def _lattice(dimension: int, steps: _Steps, *, ahead: bool) -> NDArray[np.float6
         axes[-1] = line[line > 0.0]
     points = np.stack([a.ravel() for a in np.meshgrid(*axes)], axis=1)
     distance = np.linalg.norm(points, axis=1)
-    return points[(distance < steps.nearest) & (distance >= NEAREST_M)]
+    least = _TOO_NEAR * NEAREST_M
+    return points[(distance < steps.nearest) & (distance >= least)]
 
 
 def steered_response(

@@ -91,7 +91,7 @@ class TDOAEstimator(LeafSystem):
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
         blank = self._localiser.blank()
-        self._noise = self.DeclareDiscreteState(2)
+        self._noise = self.DeclareDiscreteState(3)
         self._echoes = self.DeclareDiscreteState(blank.echoes.size)
         self._echo_shape = blank.echoes.shape
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -112,15 +112,17 @@ class TDOAEstimator(LeafSystem):
             )
         frame = audio.counts.astype(np.float32)
         echoes = context.get_discrete_state(self._echoes).value()
-        energy, noise_energy = context.get_discrete_state(self._noise).value()
+        energy, noise_energy, heard = context.get_discrete_state(self._noise).value()
         before = HearingMemory(
             float(energy),
             float(noise_energy),
             echoes.astype(np.float32).reshape(self._echo_shape),
+            bool(heard),
         )
         fix, after = self._localiser.localise(frame, before)
-        if after.energy != before.energy:
-            discrete_state.set_value(self._noise, [after.energy, after.noise_energy])
+        noise = (after.energy, after.noise_energy, after.heard)
+        if noise != (before.energy, before.noise_energy, before.heard):
+            discrete_state.set_value(self._noise, noise)
         if after.echoes is not before.echoes:
             discrete_state.set_value(self._echoes, after.echoes.ravel())
         if fix is None and not context.get_discrete_state(_DETECTED).value()[0]:

@@ -310,6 +310,57 @@ def test_clipped_channel_is_named(tmp_path):
     assert result.summary()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
 
 
+def test_channels_that_are_counted_from_one(tmp_path):
+    path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
+    with pytest.raises(ValueError, match=r"3 channels, numbers 0 to 2.*names 3"):
+        locate(path, ArrayGeometry(channels=(1, 2, 3)))
+
+
+def test_copied_channel_is_refused(tmp_path):
+    path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
+    with pytest.raises(ValueError, match="channels 1 and 2: the same samples"):
+        locate(altered(path, lambda x: x[:, [0, 0, 2]]))
+
+
+def test_digital_silence_around_a_sound(tmp_path):
+    path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
+
+    def padded(samples):
+        return np.pad(samples, ((5 * 48_000, 48_000), (0, 0)))
+
+    result = locate(altered(path, padded))
+    assert result.summary()["bearing_deg"] == pytest.approx(25.0, abs=0.1)
+    half = result.array["frame_s"] / 2.0
+    for estimate in result.estimates:
+        assert 5.0 - half <= estimate.t_s <= 5.5 + half
+
+
+@pytest.mark.parametrize("places", [ROBOT, [*polar(60.0, 0.15)[None], *ROBOT]])
+@pytest.mark.parametrize("distance", [0.02, 0.1, 0.15])
+def test_source_amid_the_array_is_at_no_other_place(tmp_path, places, distance):
+    places = np.array(places) - np.mean(places, axis=0)
+    path = record(tmp_path / "a.wav", places, polar(40.0, distance))
+    assert locate(path, array(places)).estimates == []
+
+
+@pytest.mark.parametrize("height", [0.0, 1.0])
+def test_source_right_above_a_flat_array_has_no_bearing(tmp_path, height):
+    places = np.array(ARRAYS["circle"])
+    path = record(tmp_path / "a.wav", np.pad(places, ((0, 0), (0, 1))), (0, 0, height))
+    assert locate(path, array(places)).summary()["bearing_deg"] is None
+
+
+def test_uneven_array_near_a_source_knows_what_curvature_costs(tmp_path):
+    """Four microphones in space: their delays cannot tell it from another c."""
+    places = 0.1 * np.array([[1, 1, 1], [-1, -1, 1], [-1, 1, -1], [1, -1, -1]])
+    source = np.array([*polar(100.0, 2.0), 1.0])
+    path = record(tmp_path / "a.wav", places, source)
+    summary = locate(path, array(places)).summary()
+    assert summary["range_m"] is None
+    error = abs(summary["bearing_deg"] - 100.0)
+    assert 0.5 < error < 2.0 * summary["bearing_std_deg"]
+
+
 def test_far_source_has_no_range(tmp_path):
     """At 10 km the range's standard deviation exceeds the range."""
     path = record(tmp_path / "a.wav", ROBOT, polar(30.0, 1e4), snr_db=10.0)
@@ -368,7 +419,7 @@ def test_recordings_that_cannot_be_used(tmp_path):
     (tmp_path / "empty.wav").write_bytes(b"")
     (tmp_path / "cut.wav").write_bytes(whole[: len(whole) // 2])
     (tmp_path / "text.wav").write_text("no sound")
-    three = np.stack([tone] * 3, axis=1)
+    three = np.stack([tone, 0.9 * tone, 0.8 * tone], axis=1)
     faults = {
         tmp_path / "empty.wav": "is empty",
         tmp_path / "cut.wav": "is truncated",
@@ -407,6 +458,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("microphones: [[0, 1], [0, 0]]\n", "2 given.*at least 3"),
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
+        ("microphones: [[0, 400], [0, 0], [0, -400]]\n", "800 m apart.*in m"),
         (GOOD + "channels: [0, 1]\n", "2 named for 3"),
         (GOOD + "channels: [0, 1, 1]\n", "twice"),
         (GOOD + "channels: [0, 1, -1]\n", "channels"),

@@ -56,6 +56,14 @@ def test_moving_source_has_the_bearing_of_the_middle():
     assert found["frames_of_main_source"] == 41
 
 
+def test_few_estimates_do_not_feign_certainty():
+    """One value has no scatter, and values in common error little."""
+    one = result(ROW, [estimate(0, 30.0, std=0.7)]).summary()
+    assert one["bearing_std_deg"] == pytest.approx(0.7)
+    agreed = [estimate(k, 30.0 + 0.01 * k, std=0.7) for k in range(9)]
+    assert result(ROW, agreed).summary()["bearing_std_deg"] == pytest.approx(0.7)
+
+
 def test_certain_estimates_count_more():
     bearings = [estimate(k, 10.0, std=0.3) for k in range(4)]
     bearings += [estimate(k, 14.0, std=3.0) for k in range(4, 10)]

@@ -27,12 +27,18 @@ def agrees_with(order):
 AS_GIVEN = agrees_with([0, 1, 2])
 
 
-@pytest.mark.parametrize("kind", ["nan", "dead"])
+@pytest.mark.parametrize("kind", ["nan", "dead", "copied"])
 def test_nothing_to_locate_with(kind):
     with pytest.raises(ValueError, match=rf"a.wav: {kind} \(1,\)"):
         channels_without_faults(
             SAMPLES, [fault(kind, 1)], agrees_with([0, 1, 2]), "a.wav"
         )
+
+
+def test_all_channels_that_are_of_no_use_are_named():
+    found = [fault("dead", 1), fault("clipped", 0), fault("copied", 0, 2)]
+    with pytest.raises(ValueError, match=r"dead \(1,\); see to channels 1, 3 as well"):
+        channels_without_faults(SAMPLES, found, AS_GIVEN, "")
 
 
 def test_inverted_channel_is_turned_back_and_said():

@@ -159,6 +159,27 @@ def test_a_source_at_a_microphone():
     assert faults(samples) == [("near", (2,))]
 
 
+def test_a_source_at_one_of_three_microphones_leaves_the_others_alive():
+    """1 mm from the first one, 50 to 60 dB louder there than at the others."""
+    samples = recording(ROW, ROW.p_AM[0] + np.array([0.001, 0.0]), snr_db=80.0)
+    assert faults(samples, ROW) == [("near", (0,))]
+
+
+@pytest.mark.parametrize("scale", [1 / 3, 0.5, 0.7])
+def test_delays_longer_than_the_array(scale):
+    """Positions given too small: sound would take up to three times as long."""
+    for shape in (ROW, FIVE):
+        samples = recording(shape, place(shape, 50.0, 1.5))
+        found = faults(samples, ArrayShape.of(scale * shape.p_AM))
+        assert found == [("geometry", ())]
+
+
+def test_a_channel_that_is_another_ones_copy():
+    samples = recording(FIVE, place(FIVE, 20.0, 1.5))
+    samples[3] = samples[1]
+    assert ("copied", (1, 3)) in faults(samples)
+
+
 def test_rooms_are_no_fault():
     """Image sources up to a reverberation time of 0.5 s, and a fault in them."""
     with warnings.catch_warnings():

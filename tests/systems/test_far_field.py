@@ -79,6 +79,46 @@ def test_errors_are_those_of_many_trials(name):
     )
 
 
+@pytest.mark.parametrize("name", ["row", "space"])
+def test_errors_of_curved_waves_taken_for_plane_ones(name):
+    """Sources whose inverse ranges have the stated deviation; next to no noise."""
+    shape = SHAPES[name]
+    rng = np.random.default_rng(5)
+    elevation = 0.7 if shape.dimension == 3 else 0.0
+    u = unit(0.5, elevation, shape.dimension)
+    size = shape.count - 1
+    # Errors this large hide the curvature, so that all of it must be counted.
+    covariance = 1e-6 * (np.eye(size) + 1.0)
+    errors = []
+    for w in 0.05 * rng.standard_normal(400):
+        ranges = np.linalg.norm(u / abs(w) - shape.p_AM, axis=1)
+        # A negative inverse range: the same curvature the other way round.
+        curved = (ranges[1:] - ranges[0]) / C - delays(shape, u)
+        tau = delays(shape, u) + math.copysign(1.0, w) * curved
+        fix = locate_far_source(tau, covariance, shape, C)
+        errors.append(fix.bearing - 0.5)
+    plane = locate_far_source(delays(shape, u), covariance, shape, C)
+    bent = locate_far_source(
+        delays(shape, u), covariance, shape, C, inverse_range_std=0.05
+    )
+    added = math.sqrt(bent.bearing_std**2 - plane.bearing_std**2)
+    assert added == pytest.approx(np.std(errors), rel=0.12)
+
+
+def test_curvature_that_would_be_seen_is_not_counted():
+    """Exact delays of five microphones in space leave no room for a curvature."""
+    shape = SHAPES["space"]
+    u = unit(0.5, 0.7, 3)
+    covariance = 1e-16 * (np.eye(4) + 1.0)
+    plane, bent = (
+        locate_far_source(
+            delays(shape, u), covariance, shape, C, inverse_range_std=sigma
+        )
+        for sigma in (0.0, 1.0)
+    )
+    assert bent.bearing_std < 3.0 * plane.bearing_std
+
+
 def test_same_as_a_general_least_squares():
     shape = SHAPES["space"]
     rng = np.random.default_rng(7)

@@ -236,6 +236,38 @@ def test_clipping_costs_little(name, limit):
         assert fix.bearing == pytest.approx(math.radians(25.0), abs=math.radians(0.2))
 
 
+@pytest.mark.parametrize("pair", [(0, 1), (0, 3), (1, 2), (2, 3)])
+def test_exchanged_neighbours_of_four_give_no_wrong_place(pair):
+    """Opposite ones mirror the array, which nothing tells."""
+    localiser = listener(SQUARE)
+    for seed in range(12):
+        place = polar(-165.0 + 30.0 * seed, 1.5)
+        frame = heard(SQUARE, [place], seed=seed)
+        frame[list(pair)] = frame[list(pair[::-1])]
+        fix, _ = localiser.localise(frame, localiser.blank())
+        if fix is not None:
+            error = math.remainder(fix.bearing - math.atan2(*place[::-1]), math.tau)
+            assert abs(error) < math.radians(5.0)
+
+
+def test_noise_puts_no_source_at_a_tiny_array():
+    """6 mm across: delays a little too long fit a source between the microphones."""
+    shape = ArrayShape.of([[0.002, 0.002], [-0.002, 0.002], [-0.002, -0.002]])
+    localiser = listener(shape)
+    heard_ones = 0
+    for seed in range(30):
+        place = polar(-60.0 + 4.0 * seed, 2.0)
+        fix, _ = localiser.localise(
+            heard(shape, [place], seed=seed, snr_db=30.0), localiser.blank()
+        )
+        if fix is not None:
+            heard_ones += 1
+            assert not fix.range_valid
+            error = fix.bearing - math.atan2(place[1], place[0])
+            assert abs(error) < 5.0 * fix.bearing_std
+    assert heard_ones > 10
+
+
 def test_a_range_too_uncertain_is_left_out():
     place = polar(10.0, 2.0)
     frame = heard(ROW, [place], snr_db=15.0)

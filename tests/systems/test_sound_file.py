@@ -60,7 +60,7 @@ def broken_files(folder):
         path = folder / f"{fault}.wav"
         path.write_bytes(content)
         yield path, says[fault]
-    yield wav(folder / "nan.wav", nan), "NaN"
+    yield wav(folder / "nan.wav", nan), "NaN.*first in channel 2 as sample 7"
     yield wav(folder / "silent.wav", 0 * TWO), "silent"
     yield wav(folder / "none.wav", TWO[:, :0]), "no samples"
     yield folder / "missing.wav", "not a file"

@@ -1,0 +1,73 @@
+"""Confidence intervals of rates and of statistics of samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+__all__ = ["Interval", "bootstrap_interval", "median_interval", "wilson_interval"]
+
+
+class Interval(NamedTuple):
+    """Where a figure lies, in all likelihood."""
+
+    low: float
+    high: float
+
+
+def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> Interval:
+    """Wilson's score interval of a probability (Wilson 1927), without correction.
+
+    Args:
+        successes: Runs in which it happened.
+        runs: All runs, at least one.
+        confidence: Share of such intervals that hold the true value.
+    """
+    result = stats.binomtest(successes, runs).proportion_ci(confidence, method="wilson")
+    return Interval(float(result.low), float(result.high))
+
+
+def bootstrap_interval(
+    values: ArrayLike,
+    statistic: Callable[..., NDArray[np.float64]] = np.median,
+    *,
+    seed: int,
+    confidence: float = 0.95,
+    resamples: int = 2000,
+) -> Interval:
+    """Percentile bootstrap of a statistic (Efron 1979).
+
+    Args:
+        values: (n,) independent samples, at least one.
+        statistic: Takes an ``axis``, as ``np.median``.
+        seed: Seed of the resampling.
+        confidence: As of ``wilson_interval``.
+        resamples: Number of resampled sets.
+    """
+    samples = np.asarray(values, dtype=float)
+    generator = np.random.default_rng(seed)
+    chosen = generator.integers(len(samples), size=(resamples, len(samples)))
+    tail = 0.5 * (1.0 - confidence)
+    spread = np.asarray(statistic(samples[chosen], axis=1))
+    return Interval(*np.quantile(spread, [tail, 1.0 - tail]).tolist())
+
+
+def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
+    """Interval of a median from order statistics: for any distribution.
+
+    The number of samples below the true median is binomial, which gives the
+    ranks. With fewer than six samples (at 95 %) no two of them are enough:
+    the interval is then their range.
+
+    Args:
+        values: (n,) independent samples, at least one.
+        confidence: As of ``wilson_interval``, at least.
+    """
+    ordered = np.sort(np.asarray(values, dtype=float))
+    below = int(stats.binom.ppf(0.5 * (1.0 - confidence), len(ordered), 0.5))
+    rank = max(below - 1, 0)
+    return Interval(float(ordered[rank]), float(ordered[-1 - rank]))

@@ -1,0 +1,119 @@
+"""``phonotaxis stability``, as a user meets it."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+import phonotaxis
+from analysis import stability_parts
+from analysis.html_page import paragraph
+from analysis.stability import Part
+from analysis.verdicts import Criterion, judge
+from diagrams import load_scenario
+
+MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
+
+
+def quick_parts(*, full: bool) -> tuple[Part, ...]:
+    """Stand-ins for analyses that take their time."""
+
+    def verdicts(study):
+        return (judge(MASS, study.scenario.robot.mass_kg),)
+
+    def impossible(study):
+        raise ValueError("law: has no such thing; choose another one")
+
+    def render(data, name):
+        return [paragraph(f"{len(data)} verdicts")]
+
+    return (
+        Part("verdicts", "Verdicts", verdicts, render),
+        Part("impossible", "Impossible", impossible, render),
+    )[: 2 if full else 1]
+
+
+@pytest.fixture
+def quick(monkeypatch):
+    monkeypatch.setattr(stability_parts, "parts", quick_parts)
+
+
+def run(capsys, *words: str) -> tuple[int, str, str]:
+    status = phonotaxis.main(["stability", *words])
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def test_one_law_json_and_files(quick, capsys, tmp_path):
+    out = tmp_path / "out"
+    words = ["--json", "--full", "--law", "conventional", "--seed", "4"]
+    status, printed, complaint = run(capsys, *words, "--out", str(out))
+    assert (status, complaint) == (0, "")
+    document = json.loads(printed)
+    assert json.loads((out / "summary.json").read_text()) == document
+    assert document["law"] == "conventional"
+    assert document["seed"] == 4
+    assert document["verdicts"][0]["verdict"] == "pass"
+    assert document["impossible"]["problem"].startswith("law: has no such thing")
+    page = (out / "report.html").read_text()
+    assert "Not computed: law: has no such thing" in page
+    assert load_scenario(out / "scenario.yaml").seed == 4
+
+
+def test_several_laws_stand_side_by_side(quick, capsys, tmp_path):
+    out = tmp_path / "out"
+    status, printed, _ = run(capsys, "--law", "all", "--json", "--out", str(out))
+    assert status == 0
+    document = json.loads(printed)
+    laws = ["conventional", "active", "active2017"]
+    assert [each["law"] for each in document["laws"]] == laws
+    assert list(document["comparison"][0]["verdicts"]) == laws
+
+
+def test_table_on_the_terminal(quick, capsys, tmp_path):
+    out = tmp_path / "out"
+    words = ["--law", "active", "--law", "none", "--set", "robot.mass_kg=5"]
+    status, printed, complaint = run(capsys, *words, "--out", str(out))
+    assert (status, complaint) == (0, "")
+    (row,) = [line for line in printed.splitlines() if line.startswith("mass")]
+    assert row.split() == ["mass", "\u2264", "4", "kg", "5", "fail", "5", "fail"]
+    assert str(out / "report.html") in printed
+
+
+@pytest.mark.parametrize(
+    ("words", "field", "hint"),
+    [
+        (["--law", "magic"], "law", "active2017"),
+        (["no_such"], "scenario", "obstacle_free"),
+        (["--set", "plant.motor_lag_s=0.001"], "plant.motor_lag_s", "step_s"),
+        (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
+        (["--out", "/dev/null/out"], "out", "name another"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(capsys, tmp_path, words, field, hint):
+    words = [*words] if "--out" in words else [*words, "--out", str(tmp_path / "out")]
+    status, printed, complaint = run(capsys, *words)
+    assert (status, printed) == (2, "")
+    assert len(complaint.splitlines()) == 1
+    assert f"phonotaxis: {field}" in complaint
+    assert hint in complaint
+    status, printed, complaint = run(capsys, *words, "--json")
+    assert (status, complaint) == (2, "")
+    assert json.loads(printed)["error"]["field"].startswith(field)
+    assert not (tmp_path / "out").exists()
+
+
+def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):
+    def demand(study):
+        raise SystemExit(1)
+
+    monkeypatch.setattr(
+        stability_parts,
+        "parts",
+        lambda *, full: (Part("bad", "Bad", demand, lambda data, name: []),),
+    )
+    status, printed, complaint = run(capsys, "--out", str(tmp_path / "out"))
+    assert (status, printed) == (1, "")
+    assert "Drake ended the analysis" in complaint
+    assert not (tmp_path / "out").exists()
