@@ -98,15 +98,14 @@ def _false_alarms(
         color=COLOURS["robot"],
         label=f"{alarms[0].frames} frames of noise",
     )
-    for alarm in alarms:
-        if not alarm.count:
-            axes.plot(
-                alarm.rate,
-                _interval(0, alarm.frames)[1],
-                "v",
-                color=COLOURS["robot"],
-                label="none heard: below",
-            )
+    silent = [alarm for alarm in alarms if not alarm.count]
+    axes.plot(
+        [alarm.rate for alarm in silent],
+        [_interval(0, alarm.frames)[1] for alarm in silent],
+        "v",
+        color=COLOURS["robot"],
+        label="none heard: below",
+    )
     line = np.array([default_rate / 3.0, 1.0])
     axes.plot(line, line, color=COLOURS["empty"], linewidth=1.0, label="as set")
     axes.axvline(default_rate, color=COLOURS["source"], linestyle="--", label="default")
