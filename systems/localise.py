@@ -131,6 +131,8 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+        band = plan.band.stop - plan.band.start
+        self._band_samples = plan.frame_samples * band / plan.length
         # The energy of white noise scatters by the root of 2 over its samples, and
         # what it is compared with is known as well as an average can be.
         variance = 2.0 / (plan.shape.count * plan.frame_samples)
@@ -216,7 +218,9 @@ class Localiser:
         direct = delays is not None and self._is_direct(delays, memory)
         if direct and not begins:
             return self._fix(frame, delays), memory
-        dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
+        dry, echoes, news = keep_first_wave_front(
+            frame, memory.echoes, self._sizes, memory.noise_energy / self._band_samples
+        )
         memory = memory._replace(echoes=echoes)
         if direct:
             news = 1.0
