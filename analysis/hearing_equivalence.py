@@ -24,8 +24,8 @@ def equivalent(summary: dict[str, Any]) -> bool:
     pair = _pooled(summary)
     clearance = pair["metrics"][_CLEARANCE]
     rates = (pair["success"], pair["collision"])
-    return all(-RATE < r["low"] and r["high"] < RATE for r in rates) and (
-        -CLEARANCE_M < clearance["low"] and clearance["high"] < CLEARANCE_M
+    return all(r["low"] > -RATE and r["high"] < RATE for r in rates) and (
+        clearance["low"] > -CLEARANCE_M and clearance["high"] < CLEARANCE_M
     )
 
 
@@ -36,14 +36,16 @@ def hearing_table(summary: dict[str, Any]) -> str:
         summary: JSON document of ``phonotaxis compare --grid
             hearing=[audio,ideal]``.
     """
-    lines = [
-        "| scenario, law | success, audio / ideal | collision, audio / ideal | "
-        "median clearance, audio / ideal | layouts on which one alone succeeds |",
-        "|---|---|---|---|---|",
-    ]
-    for pair in summary["pairs"]:
-        if pair["field"] == "hearing":
-            lines.append(_row(summary, pair))
+    headings = (
+        "scenario, law",
+        "success, audio / ideal",
+        "collision, audio / ideal",
+        "median clearance, audio / ideal",
+        "layouts on which one alone succeeds",
+    )
+    lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
+    pairs = [pair for pair in summary["pairs"] if pair["field"] == "hearing"]
+    lines += [_row(summary, pair) for pair in pairs]
     pair = _pooled(summary)
     clearance = pair["metrics"][_CLEARANCE]
     rates = " | ".join(
