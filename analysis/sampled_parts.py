@@ -74,7 +74,11 @@ def sampled_parts(*, full: bool) -> tuple[Part, ...]:
             document=_document,
         ),
         Part(
-            "burst_cycle", "Burst cycle", _bursts, _render_bursts, document=_burst_doc
+            "burst_cycle",
+            "Burst cycle",
+            _bursts,
+            _render_bursts,
+            document=_burst_document,
         ),
     )
 
@@ -143,7 +147,7 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
                 ["of the margin", "delay (s)", "growth (1/s)", "rad/s"],
                 checks,
                 caption="The diagram with that delay at the sensor, simulated for "
-                f"{data.check.below.duration_s:g} s after a small kick along the line to the source",
+                f"{data.check.below.duration_s:g} s after a small kick",
             )
         )
     return parts

@@ -126,6 +126,8 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+        band = plan.band.stop - plan.band.start
+        self._band_samples = plan.frame_samples * band / plan.length
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -203,7 +205,9 @@ class Localiser:
         direct = delays is not None and self._is_direct(delays, memory)
         if direct and not begins:
             return self._fix(frame, delays), memory
-        dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
+        dry, echoes, news = keep_first_wave_front(
+            frame, memory.echoes, self._sizes, memory.noise_energy / self._band_samples
+        )
         memory = memory._replace(echoes=echoes)
         if direct:
             news = 1.0
