@@ -159,8 +159,11 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
 def _refined(
     model: PointMass, point: NDArray[np.float64], cell_m: float
 ) -> tuple[float, float]:
-    """Compass search from a cell: halves its step where no neighbour is lower."""
-    step, here = cell_m, point.copy()
+    """Compass search from a cell: halves its step where no neighbour is lower.
+
+    The first step is short, lest it leave a basin of a few cells.
+    """
+    step, here = 0.125 * cell_m, point.copy()
     angle = 2.0 * np.pi * np.arange(16) / 16
     directions = np.column_stack([np.cos(angle), np.sin(angle)])
     value = float(model.potential(here[None])[0])
