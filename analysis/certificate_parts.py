@@ -8,6 +8,11 @@ from typing import Any
 from analysis.certificate_trials import CertificateTrials, try_certificate
 from analysis.diagram_trials import DiagramTrials, try_diagram
 from analysis.energy_certificate import EnergyCertificate, certify_energy
+from analysis.energy_certificate_plots import (
+    plot_certificate_trials,
+    plot_energy_balance,
+    plot_energy_certificate,
+)
 from analysis.fact_tables import fact_table
 from analysis.html_page import figure_html, paragraph
 from analysis.stability import Part, Study
@@ -28,15 +33,15 @@ class CertifiedStarts:
     certificate: EnergyCertificate
     trials: CertificateTrials
     """In the certificate's own model."""
-    diagram: DiagramTrials
-    """In the diagram of all blocks."""
+    diagram: DiagramTrials | None
+    """In the diagram of all blocks; none: left out of a short report."""
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``certificates``."""
         return {
             **self.certificate.to_dict(),
             "trials": self.trials.to_dict(),
-            "diagram": self.diagram.to_dict(),
+            "diagram": self.diagram and self.diagram.to_dict(),
         }
 
 
@@ -61,13 +66,11 @@ def _certified(study: Study, *, full: bool) -> CertifiedStarts:
     return CertifiedStarts(
         certificate,
         try_certificate(certificate, starts=10 * STARTS if full else STARTS),
-        try_diagram(certificate, starts=DIAGRAM_STARTS),
+        try_diagram(certificate, starts=DIAGRAM_STARTS) if full else None,
     )
 
 
 def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[str]:
-    from analysis.energy_certificate_plots import plot_energy_certificate
-
     (found,) = data
     facts = found.to_dict()
     return [
@@ -76,7 +79,7 @@ def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[s
             "points, bodies at rest) the energy V cannot grow. A start whose energy is "
             "below that of every path to contact never collides. The full diagram has "
             "cones, a rectangular body and motor lag, which the certificate leaves "
-            "out: its collision rate from certified starts stands below."
+            "out: a full report has its collision rate from certified starts."
         ),
         fact_table(facts, skip=["passivity", "trials", "diagram", "kind"]),
         figure_html(
@@ -86,7 +89,20 @@ def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[s
             "certified.",
         ),
         fact_table(facts["trials"], caption="Simulated starts, certificate's model"),
-        fact_table(facts["diagram"], caption="Certified starts in the full diagram"),
+        figure_html(
+            plot_certificate_trials(found.trials),
+            f"{name}-trials",
+            "Simulated starts by outcome, over the certified region.",
+        ),
+        *(
+            [
+                fact_table(
+                    facts["diagram"], caption="Certified starts in the full diagram"
+                )
+            ]
+            if found.diagram
+            else []
+        ),
     ]
 
 
@@ -102,4 +118,9 @@ def _render_balance(data: EnergyBalance, name: str) -> list[str]:
             "speed."
         ),
         fact_table(data.to_dict()),
+        figure_html(
+            plot_energy_balance(data),
+            name,
+            "Energy along a run of the point model, and the work of its parts.",
+        ),
     ]

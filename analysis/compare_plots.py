@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
-from analysis.comparison import Cell, Comparison, Estimate
+from analysis.comparison import Comparison
+from analysis.comparison_cells import Cell, Estimate
 from analysis.scene import COLOURS, bounds
 from analysis.trajectory_artists import (
     draw_collision,

@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from analysis.compare import PreparedComparison
-from analysis.comparison import Cell, Comparison, Estimate, Median, Pair
+from analysis.comparison import Comparison, Pair
+from analysis.comparison_cells import Cell, Estimate, Median
 from analysis.run_report import versions
 from diagrams import RunResult, dump_scenario, simulate
 
@@ -154,8 +155,13 @@ def _cell_lines(cells: list[Cell]) -> Iterator[str]:
             row += f"{_median(cell.metrics.get(metric), factor, form):>21}"
         yield row
     for cell in cells:
-        causes = ", ".join(f"{cause} {n}" for cause, n in cell.causes.items())
-        yield f"  {cell.label}: {causes}"
+        yield f"  {cell.label}: {_counts(cell.causes)}"
+        if cell.mechanisms:
+            yield f"      failures: {_counts(cell.mechanisms)}"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def _rate(rate: Estimate) -> str:

@@ -148,7 +148,7 @@ def check_law(
     Raises:
         ValueError: The law has no gains to choose, or see ``metres_to_go``.
     """
-    push = spring(law, scenario.repulsion)
+    push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)
     barrier = net_barrier(push, scenario, to_go)
     checks = [

@@ -39,7 +39,7 @@ def _plot_balance(axes: Axes, study: DesignStudy) -> None:
     pull = scenario.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]
-        push = spring(law, scenario.repulsion)
+        push = spring(law, scenario)
         force = np.array([push(c) for c in _DISTANCE_M.tolist()])
         axes.plot(_DISTANCE_M, force, color=colour, label=title)
         stops = (force > pull) & (nearest <= _DISTANCE_M)
@@ -77,11 +77,12 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
             label = f"{title}: {stiffness:.1f} N/m"
             axes.axhline(stiffness, color=colour, label=label)
         else:
-            axes.plot([], [], color=colour, label=f"{title}: {stiffness:.0f} N/m")
+            label = f"{title}: {stiffness:.0f} N/m, off the scale"
+            axes.plot([], [], color=colour, label=label)
     axes.axvline(attraction.damping_n_s_m, color="black", linewidth=0.8, linestyle=":")
     axes.set_xlim(_DAMPING_N_S_M[0], _DAMPING_N_S_M[-1])
     axes.set_ylim(0.0, _STIFFNESS_N_M)
     axes.set_xlabel("damping of the attraction D_r (N s/m)")
     axes.set_ylabel("stiffest slope of the push (N/m)")
     axes.set_title("the stiffness that the barrier costs, and what contact allows")
-    axes.legend(fontsize=8, loc="upper left")
+    axes.legend(fontsize=8, loc="lower right")

@@ -39,8 +39,9 @@ __all__ = [
 BOX_M = (0.05, 0.1)
 #: Place of the boxes, and what is left to go behind them, m.
 BOX_X_M, TO_GO_M = 2.0, 2.0
-#: Spacing of the grid on which energies are compared, m.
-_CELL_M = 0.02
+#: Spacing of the grid on which energies are compared, m: of gaps, and of offsets,
+#: where what holds P is as narrow as a box.
+_GAP_CELL_M, _OFFSET_CELL_M = 0.02, 0.01
 #: Spacing of the distances of ``stiffness_ratio_map``, m.
 _RATIO_STEP_M = 2e-3
 #: Follow distance of the maps, m: as printed the attraction would end in the
@@ -129,8 +130,8 @@ class RatioMap:
         }
 
 
-def local_minima(model: PointMass, *, cell_m: float = _CELL_M) -> NDArray[np.float64]:
-    """(n, 2) local minima of the potential, to a fraction of a cell, m.
+def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
+    """(n, 2) cells whose potential is no higher than that of any neighbour, m.
 
     Complete up to the grid: a minimum whose basin is narrower than two cells
     may be missed. The ring of follow points, where nothing else pushes, is one
@@ -152,15 +153,19 @@ def local_minima(model: PointMass, *, cell_m: float = _CELL_M) -> NDArray[np.flo
             if (i, j) != (1, 1):
                 shifted = potential[i : i + inner.shape[0], j : j + inner.shape[1]]
                 least &= inner <= shifted
-    return np.array([_refined(model, p, cell_m) for p in grid[1:-1, 1:-1][least]])
+    return np.asarray(grid[1:-1, 1:-1][least])
 
 
 def _refined(
     model: PointMass, point: NDArray[np.float64], cell_m: float
-) -> NDArray[np.float64]:
-    """Compass search: halves its step where no neighbour is lower."""
-    step, here = cell_m, point.copy()
-    directions = np.array([[1, 0], [-1, 0], [0, 1], [0, -1]], dtype=float)
+) -> tuple[float, float]:
+    """Compass search from a cell: halves its step where no neighbour is lower.
+
+    The first step is short, lest it leave a basin of a few cells.
+    """
+    step, here = 0.125 * cell_m, point.copy()
+    angle = 2.0 * np.pi * np.arange(16) / 16
+    directions = np.column_stack([np.cos(angle), np.sin(angle)])
     value = float(model.potential(here[None])[0])
     while step > 1e-4:
         tries = here + step * directions
@@ -170,7 +175,7 @@ def _refined(
             here, value = tries[best], float(values[best])
         else:
             step *= 0.5
-    return here
+    return float(here[0]), float(here[1])
 
 
 def gap_map(
@@ -197,7 +202,7 @@ def gap_map(
         y = 0.5 * (gap + BOX_M[1])
         return [(BOX_X_M, y), (BOX_X_M, -y)]
 
-    return _map(scenario, "gap_m", gaps_m, boxes, sensing, progress)
+    return _map(scenario, ("gap_m", gaps_m, boxes, _GAP_CELL_M), sensing, progress)
 
 
 def offset_map(
@@ -219,43 +224,56 @@ def offset_map(
         ScenarioError: The law is not known.
         ValueError: The law has no radial force, or ``sensing`` is unknown.
     """
-    return _map(
-        scenario, "offset_m", offsets_m, lambda y: [(BOX_X_M, y)], sensing, progress
-    )
+
+    def box(offset: float) -> list[tuple[float, float]]:
+        return [(BOX_X_M, offset)]
+
+    varied = ("offset_m", offsets_m, box, _OFFSET_CELL_M)
+    return _map(scenario, varied, sensing, progress)
 
 
 def _map(
     scenario: Scenario,
-    parameter: str,
-    values: Sequence[float],
-    boxes: Callable[[float], list[tuple[float, float]]],
+    varied: tuple[
+        str, Sequence[float], Callable[[float], list[tuple[float, float]]], float
+    ],
     sensing: str,
     progress: Callable[[float], None] | None,
 ) -> EquilibriumMap:
+    """Of (parameter, values, boxes by value, cell of the grid)."""
+    parameter, numbers, boxes, cell_m = varied
     if sensing not in ("exact nearest", "exact sum", "cones"):
         raise ValueError(
             f"sensing: {sensing!r} is none of 'exact nearest', 'exact sum', 'cones'"
         )
-    values = tuple(float(v) for v in values)
+    values = tuple(float(v) for v in numbers)
     points = []
     for k, value in enumerate(values):
         case = boxes_scenario(scenario, boxes(value), sensing)
-        found = _end_of_run(case) if sensing == "cones" else _minima(case)
+        found = _end_of_run(case) if sensing == "cones" else _minima(case, cell_m)
         points += [RestPoint(value, x, y, outcome) for x, y, outcome in found]
         if progress is not None:
             progress((k + 1) / len(values))
     return EquilibriumMap(scenario.law, parameter, sensing, values, tuple(points))
 
 
-def _minima(case: Scenario) -> list[tuple[float, float, str]]:
+def _minima(case: Scenario, cell_m: float) -> list[tuple[float, float, str]]:
     """The minima before the boxes, and the lowest one beyond."""
     model = point_mass(case)
-    minima = local_minima(model)
+    minima = local_minima(model, cell_m=cell_m)
     held = minima[:, 0] < BOX_X_M + BOX_M[0]
+    jams: list[tuple[float, float]] = []
+    for cell in minima[held]:
+        place = _refined(model, cell, cell_m)
+        # A search may leave a shallow cell for the goal, or for another jam.
+        if place[0] < BOX_X_M + BOX_M[0] and all(
+            math.dist(place, other) > cell_m for other in jams
+        ):
+            jams.append(place)
     beyond = minima[~held]
     goal = beyond[[np.argmin(model.potential(beyond))]] if len(beyond) else beyond
-    return [(x, y, "jam") for x, y in minima[held].tolist()] + [
-        (x, y, "goal") for x, y in goal.tolist()
+    return [(x, y, "jam") for x, y in jams] + [
+        (*_refined(model, cell, cell_m), "goal") for cell in goal
     ]
 
 

@@ -88,7 +88,7 @@ def gain_for_barrier(
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 
     unit = with_gains(scenario, law, **{field: 1.0}, **also)
-    c, push = sampled_push(spring(law, unit.repulsion), scenario)
+    c, push = sampled_push(spring(law, unit), scenario)
     pull = scenario.attraction.stiffness_n_m * (c + to_go)
 
     def missing(gain: float) -> float:
@@ -100,7 +100,7 @@ def gain_for_barrier(
 def _active_damper(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
     """d_ref from the offset by a far echo, D_0 from the energy put back."""
     attraction, active = scenario.attraction, scenario.repulsion.active
-    tail = spring("active", scenario.repulsion)(scenario.ultrasonic.maximum_range_m)
+    tail = spring("active", scenario)(scenario.ultrasonic.maximum_range_m)
     at_rest = requirements.far_offset_m * attraction.stiffness_n_m - tail
     d_ref = _rounded(at_rest / active.speed_limit_m_s)
 

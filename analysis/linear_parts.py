@@ -57,11 +57,6 @@ class LinearModels:
     routes: RouteComparison
     gradient: GradientCheck
 
-    @property
-    def exported(self) -> tuple[LinearModel, ...]:
-        """Models that are written as files."""
-        return self.continuous, self.sampled, self.at.motion
-
 
 def linear_parts() -> tuple[Part, ...]:
     """Operating points first: the report needs one to stand on."""
@@ -80,6 +75,7 @@ def linear_parts() -> tuple[Part, ...]:
             _render_models,
             fresh=True,
             document=_models_document,
+            models=lambda data: (data.continuous, data.sampled, data.at.motion),
         ),
     )
 

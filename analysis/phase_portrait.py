@@ -162,9 +162,9 @@ def _trajectories(
     model: PointMass, term: VelocityTermModel, least: float
 ) -> tuple[NDArray[np.float64], ...]:
     top = model.top_speed_m_s
-    starts = [(1.45, -top), (1.45, 0.0), (0.8, -top), (0.5, -top), (0.25, -0.5 * top)]
+    starts = [(1.45, -top), (0.8, -top), (0.25, -0.9 * top)]
     tracks = []
-    for c, rate in (*starts, (0.15, 0.0), (0.1, 0.5 * top)):
+    for c, rate in (*starts, (0.1, 0.0)):
         states = model.trajectory([-c, 0.0, -rate, 0.0], duration_s=12.0, term=term)
         track = np.column_stack([-states[:, 0], -states[:, 2]])
         hit = np.flatnonzero(track[:, 0] <= least)

@@ -13,10 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from analysis.radial_law import law_function
 from diagrams.scenario import Scenario
-from systems.active_impedance_2017_controller import active_2017_force
-from systems.active_impedance_controller import active_force
-from systems.conventional_impedance_controller import conventional_force
 from systems.repulsion import RepulsionParameters
 
 __all__ = [
@@ -47,25 +45,25 @@ _STEP_M, _FARTHEST_M = 0.005, 3.0
 _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
-def law_force(law: str, repulsion: RepulsionParameters) -> Callable[..., float]:
-    """``f(c, s)`` of a law with its gains, N."""
-    if law == "conventional":
-        return lambda c, s: conventional_force(c, s, repulsion.conventional)
-    if law == "active":
-        return lambda c, s: active_force(c, s, repulsion.active)
-    if law == "active2017":
-        return lambda c, s: active_2017_force(c, s, repulsion.active2017)
-    raise ValueError(
-        f"law: {law!r} has no gains to be chosen; use {', '.join(DESIGNED_LAWS)}"
-    )
+def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
+    """``f(c, s)`` of a law with the scenario's gains, N.
+
+    Raises:
+        ValueError: The law has no gains to choose.
+    """
+    if law not in DESIGNED_LAWS:
+        raise ValueError(
+            f"law: {law!r} has no gains to be chosen; use {', '.join(DESIGNED_LAWS)}"
+        )
+    return law_function(scenario.model_copy(update={"law": law}))
 
 
-def spring(law: str, repulsion: RepulsionParameters) -> Push:
+def spring(law: str, scenario: Scenario) -> Push:
     """A law's push at rest, without its velocity term, N."""
-    force = law_force(law, repulsion)
+    force = law_force(law, scenario)
     # That of 2019 is d_ref mu_0 at rest, and off from mu_0 on.
-    without = repulsion.active.speed_limit_m_s if law == "active" else 0.0
-    return lambda c: force(c, without)
+    speed = scenario.repulsion.active.speed_limit_m_s if law == "active" else 0.0
+    return lambda c: force(c, speed)
 
 
 def kinetic_energy(scenario: Scenario) -> float:
@@ -141,7 +139,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
     P stands behind the master robot, on its axis.
     """
-    force = law_force(law, scenario.repulsion)
+    force = law_force(law, scenario)
     K_r, follow = (
         scenario.attraction.stiffness_n_m,
         scenario.attraction.follow_distance_m,
@@ -160,7 +158,7 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 def far_offset(law: str, scenario: Scenario) -> float:
     """How far an echo at the sensors' limit pushes a resting P, m."""
-    force = law_force(law, scenario.repulsion)
+    force = law_force(law, scenario)
     farthest = scenario.ultrasonic.maximum_range_m
     return force(farthest, 0.0) / scenario.attraction.stiffness_n_m
 
@@ -172,7 +170,7 @@ def injected_share(law: str, scenario: Scenario) -> float:
     does work h(s) ds at most while P recedes at s, and D_r takes D_r s ds; the
     rest, f(c, 0), has a potential. Below 1 the motion cannot gain energy.
     """
-    force = law_force(law, scenario.repulsion)
+    force = law_force(law, scenario)
     within = 0.5 * scenario.repulsion.conventional.reach_m
     speeds = scenario.robot.top_speed_m_s * _SPEEDS
     term = np.array([force(within, s) for s in speeds.tolist()]) - force(within, 0.0)

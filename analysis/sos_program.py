@@ -115,8 +115,10 @@ def _monomials(basis: list[Monomial], y: NDArray[Any]) -> NDArray[Any]:
     return np.array([_symbolic(Polynomial({m: 1}), y) for m in basis])
 
 
-def _quadratic(P: NDArray[Any], y: NDArray[Any]) -> Expression:
-    return sum(P[i, j] * y[i] * y[j] for i in range(3) for j in range(3))
+def _form(matrix: Any, vector: Any) -> Any:
+    """z' G z; numpy's own product warns of values in arrays of symbols."""
+    size = range(len(vector))
+    return sum(matrix[i, j] * vector[i] * vector[j] for i in size for j in size)
 
 
 def _falling(model: LagModel, P: NDArray[Any], y: NDArray[Any], sign: float) -> Any:
@@ -137,9 +139,9 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
         G = program.NewSymmetricContinuousVariables(len(z))
         program.AddPositiveSemidefiniteConstraint(S)
         program.AddPositiveSemidefiniteConstraint(G)
-        gap = _falling(model, P, y, sign) - s @ S @ s * (1.0 - _quadratic(P, y))
+        gap = _falling(model, P, y, sign) - _form(S, s) * (1.0 - _form(P, y))
         program.AddEqualityConstraintBetweenPolynomials(
-            SymbolicPolynomial(gap, y), SymbolicPolynomial(z @ G @ z, y)
+            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
         )
         multipliers.append(S)
         sums.append(G)
@@ -176,9 +178,9 @@ def larger_region(
     for sign, S in zip((-1.0, 1.0), multipliers, strict=True):
         G = program.NewSymmetricContinuousVariables(len(z))
         program.AddPositiveSemidefiniteConstraint(G)
-        gap = _falling(model, new, y, sign) - s @ S @ s * (1.0 - _quadratic(new, y))
+        gap = _falling(model, new, y, sign) - _form(S, s) * (1.0 - _form(new, y))
         program.AddEqualityConstraintBetweenPolynomials(
-            SymbolicPolynomial(gap, y), SymbolicPolynomial(z @ G @ z, y)
+            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
         )
     for n in faces(model):
         block = np.empty((4, 4), dtype=object)
@@ -187,7 +189,10 @@ def larger_region(
             np.array([[Expression(v) for v in row] for row in block])
         )
     # The volume falls with log det P, here linearised about the last P.
-    program.AddLinearCost(np.trace(np.linalg.inv(P) @ new))
+    slope = np.linalg.inv(P)
+    program.AddLinearCost(
+        sum(slope[i, j] * new[i, j] for i in range(3) for j in range(3))
+    )
     result = solve(ClarabelSolver(), program)
     if result is None:
         return P

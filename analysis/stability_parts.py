@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from analysis.certificate_parts import certificate_parts
 from analysis.extended_parts import extended_parts
+from analysis.gain_parts import contact_parts, gain_parts
 from analysis.linear_parts import linear_parts
+from analysis.margin_parts import margin_parts
 from analysis.robustness_parts import robustness_parts
+from analysis.sampled_parts import sampled_parts
 from analysis.stability import Part
 from analysis.velocity_parts import velocity_parts
+from analysis.verdict_parts import verdict_parts
 
 __all__ = ["parts"]
 
@@ -20,8 +24,13 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     """
     return (
         *linear_parts(),
+        *margin_parts(),
+        *sampled_parts(full=full),
+        *contact_parts(),
         *velocity_parts(),
         *certificate_parts(full=full),
         *robustness_parts(full=full),
         *(extended_parts() if full else ()),
+        *gain_parts(),
+        *verdict_parts(),
     )

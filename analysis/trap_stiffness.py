@@ -25,8 +25,8 @@ from systems.ultrasonic_array import cone_ranges
 
 __all__ = ["TrapStiffness", "trap_stiffness"]
 
-#: Extents of the bodies, m: 1 um stands for a point.
-_BODIES_M = {"point": (1e-6, 1e-6), "face": BOX_M}
+#: Extents of the bodies, m: 1 nm stands for a point.
+_BODIES_M = {"point": (1e-9, 1e-9), "face": BOX_M}
 
 
 @dataclass(frozen=True)

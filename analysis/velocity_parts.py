@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from analysis.contact_oscillation import ContactOscillation, contact_oscillation
 from analysis.fact_tables import fact_table, row_table
-from analysis.html_page import Cell, paragraph, table
+from analysis.html_page import Cell, figure_html, paragraph, table
 from analysis.plain_values import plain
 from analysis.stability import Part
+from analysis.velocity_term_plots import plot_contact_oscillation, plot_velocity_terms
 from analysis.velocity_terms import VelocityTermAnalysis, velocity_term_analysis
 
 __all__ = ["velocity_parts"]
@@ -47,6 +48,12 @@ def _render_terms(data: VelocityTermAnalysis, name: str) -> list[str]:
         ),
         fact_table(facts, skip=["variants"]),
         row_table(sides, caption="One-sided linear models, M x'' + D x' + K x = 0"),
+        figure_html(
+            plot_velocity_terms(data),
+            name,
+            "Describing functions at the equilibrium: damping by the first harmonic "
+            "and bias, against the amplitude of the speed.",
+        ),
     ]
 
 
@@ -84,4 +91,9 @@ def _render_oscillation(data: ContactOscillation, name: str) -> list[str]:
             "or grows until the speed limit stops it."
         ),
         table(headings, rows),
+        figure_html(
+            plot_contact_oscillation(data),
+            name,
+            "The oscillation before an obstacle, predicted and simulated.",
+        ),
     ]

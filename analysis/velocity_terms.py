@@ -209,16 +209,17 @@ def velocity_term_analysis(
 
 
 def describe_velocity_term(
-    contact: HeadOn, term: Variant, *, points: int = 37
+    contact: HeadOn, term: Variant, *, points: int = 36
 ) -> DescribingFunction:
     """Describing function of a velocity term up to the top speed.
 
     Args:
         contact: Law and equilibrium distance.
         term: Which s.
-        points: Amplitudes from 0 to the top speed.
+        points: Amplitudes up to the top speed.
     """
-    amplitudes = np.linspace(0.0, contact.scenario.robot.top_speed_m_s, points)
+    top = contact.scenario.robot.top_speed_m_s
+    amplitudes = top * (np.arange(points) + 1.0) / points
     c = contact.equilibrium_m
     rest = contact.law.force(c)
 
@@ -249,8 +250,6 @@ def _harmonics(
 ) -> tuple[float, float]:
     """(bias, damping) of a force over one cycle; the phase is that of c'."""
     force = np.array([added(s) for s in speeds.tolist()])
-    if amplitude == 0.0:
-        return float(force.mean()), 0.0
     return float(force.mean()), -2.0 * float(np.mean(force * np.cos(phase))) / amplitude
 
 

@@ -45,7 +45,7 @@ def test_net_barrier_of_the_conventional_law(K_0, to_go):
     balance = (K_0 * RHO_0 - K_R * to_go) / (K_0 + K_R)
     expected = (K_0 + K_R) / 2.0 * max(0.0, balance - NEAREST) ** 2
     scenario = with_gains(SCENARIO, "conventional", stiffness_n_m=K_0)
-    push = spring("conventional", scenario.repulsion)
+    push = spring("conventional", scenario)
     # Between two samples of 5 mm the largest rise is missed by K dx^2/8 at most.
     assert net_barrier(push, scenario, to_go) == pytest.approx(expected, abs=3e-4)
 
@@ -66,13 +66,13 @@ def test_barrier_of_the_active_law_without_a_pull(ratio, factor):
         )
     )
     expected = factor * 16.0 * RHO_0**2 / 2.0 - left_out
-    push = spring("active", scenario.repulsion)
+    push = spring("active", scenario)
     assert net_barrier(push, scenario, 1.0) == pytest.approx(expected, rel=1e-3)
 
 
 @pytest.mark.parametrize("law", DESIGNED_LAWS)
 def test_net_barrier_is_the_integral_between_the_balances(law):
-    push = spring(law, SCENARIO.repulsion)
+    push = spring(law, SCENARIO)
     c = np.linspace(NEAREST, 3.0, 100_000)
     net = np.array([push(x) - K_R * (x + 2.0) for x in c])
     inside = c[net > 0.0]
@@ -90,7 +90,7 @@ def test_barrier_without_the_limit_of_speed():
 
 @pytest.mark.parametrize("law", DESIGNED_LAWS)
 def test_stiffest_slope_is_that_of_the_curve(law):
-    push = spring(law, SCENARIO.repulsion)
+    push = spring(law, SCENARIO)
     c = np.linspace(0.02, 3.0, 300_000)
     slopes = -np.diff([push(x) for x in c]) / np.diff(c)
     found = stiffest(law, SCENARIO.repulsion)
@@ -119,7 +119,7 @@ def test_offset_where_the_master_robot_covers_the_follow_point():
     """Printed: d_f = 0. P rests outside of the body, where push and pull balance."""
     scenario = with_attraction(follow_distance_m=0.0)
     offset = rest_offset("active2017", scenario)
-    push = law_force("active2017", scenario.repulsion)(offset - 0.163, 0.0)
+    push = law_force("active2017", scenario)(offset - 0.163, 0.0)
     assert offset > 0.163
     assert push == pytest.approx(K_R * offset)
 
@@ -158,7 +158,7 @@ def largest_gain(law: str, scenario: Scenario, start: list[float]) -> float:
 
     In the plane, in continuous time, exact sensing; s = |v| as printed.
     """
-    force, mass = law_force(law, scenario.repulsion), scenario.robot.mass_kg
+    force, mass = law_force(law, scenario), scenario.robot.mass_kg
     to_rest, D_r = np.array([-2.0, 0.0]), scenario.attraction.damping_n_s_m
 
     def motion(_, x):
@@ -196,4 +196,4 @@ def test_energy_grows_above_a_share_of_one(law):
 
 def test_unknown_law_is_refused():
     with pytest.raises(ValueError, match=r"'none' has no gains .* use conventional"):
-        law_force("none", SCENARIO.repulsion)
+        law_force("none", SCENARIO)
