@@ -55,6 +55,8 @@ class BurstCycle:
     """Length of a cycle, s."""
     multipliers: NDArray[np.complex128]
     """Over a cycle, largest first; those of a continuum of equilibria left out."""
+    matrices: NDArray[np.float64] = field(repr=False)
+    """(ticks, n, n) of the whole state, tick after tick of a cycle."""
     loop: IdealLoop = field(repr=False)
     """The build, with bursts."""
     state: NDArray[np.float64] = field(repr=False)
@@ -120,11 +122,13 @@ def burst_cycle(
         )
     loop = ideal_loop(_with_bursts(point.loop.scenario, hold, on, on + gap))
     state = _settled(loop, point, round(ticks))
+    matrices = _matrices(loop, state, round(ticks))
     return BurstCycle(
         hold=hold,
         on_s=on,
         period_s=on + gap,
-        multipliers=_multipliers(loop, point, state, round(ticks)),
+        multipliers=_multipliers(point, matrices, on + gap),
+        matrices=matrices,
         loop=loop,
         state=state,
         point=point,
@@ -149,15 +153,24 @@ def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.f
     return loop.period_map(state, 0.0, fixed=still, periods=_SETTLING_CYCLES * ticks)
 
 
-def _multipliers(
-    loop: IdealLoop, point: OperatingPoint, state: NDArray[np.float64], ticks: int
-) -> NDArray[np.complex128]:
-    product = np.eye(len(state))
-    start = _SETTLING_CYCLES * ticks
+def _matrices(
+    loop: IdealLoop, state: NDArray[np.float64], ticks: int
+) -> NDArray[np.float64]:
+    start, found = _SETTLING_CYCLES * ticks, []
     for k in range(start, start + ticks):
-        found = loop.period_derivatives(state, k * FRAME_PERIOD_S)
-        product, state = found.A @ product, found.next_state
-    motion = motion_model(point, product, ticks * FRAME_PERIOD_S)
+        period = loop.period_derivatives(state, k * FRAME_PERIOD_S)
+        found.append(period.A)
+        state = period.next_state
+    return np.array(found)
+
+
+def _multipliers(
+    point: OperatingPoint, matrices: NDArray[np.float64], period_s: float
+) -> NDArray[np.complex128]:
+    product = np.eye(matrices.shape[1])
+    for matrix in matrices:
+        product = matrix @ product
+    motion = motion_model(point, product, period_s)
     poles = motion.poles[np.abs(motion.poles - 1.0) > _NEUTRAL]
     return poles[np.argsort(-np.abs(poles))]
 
