@@ -84,8 +84,8 @@ def sampled_parts(*, full: bool) -> tuple[Part, ...]:
 
 
 def _sampled(study: Study, duration_s: float) -> SampledLoop:
-    at: OperatingPoint = study.found["equilibria"].at
-    existing = {(m.at, m.direction) for m in study.found["margins"].implemented}
+    at: OperatingPoint = study.need("equilibria").at
+    existing = {(m.at, m.direction) for m in study.need("margins").implemented}
     margins = tuple(
         delay_margin(at, place, direction)
         for place in DELAY_PLACES
@@ -154,7 +154,7 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
 
 
 def _bursts(study: Study) -> BurstCycles:
-    at: OperatingPoint = study.found["equilibria"].at
+    at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
     runs = tuple(simulate_burst_cycle(cycle, CYCLES) for cycle in cycles)
     return BurstCycles(study.scenario.tracker.hold, cycles, runs)
