@@ -71,7 +71,7 @@ def _document(data: RecommendedGains) -> dict[str, Any]:
 
 
 def _render_gains(data: RecommendedGains, name: str) -> list[str]:
-    t, today, best = data.thresholds, data.today, data.recommended
+    t, today = data.thresholds, data.today
     headings = [
         "K_r", "D_r", "damping ratio", "phase (deg)", "gain (dB)", "M_s", "disk",
         "delay (s)", "lag (m)", "to 2 % (s)", "stiffest law (N/m)",
@@ -94,7 +94,7 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
             "to obstacles that comes to rest."
         ),
         table(headings, rows),
-        paragraph(_advice(today, best)),
+        paragraph(data.advice),
     ]
 
 
@@ -104,29 +104,3 @@ def _figures(f: GainFigures) -> list[Cell]:
         f.gain_margin_db, f.sensitivity_peak, f.disk_margin, f.delay_margin_s,
         f.following_lag_m, f.settling_s, f.largest_law_stiffness_n_m,
     ]  # fmt: skip
-
-
-def _advice(today: GainFigures, best: GainFigures | None) -> str:
-    if best is None:
-        return (
-            "No damping meets everything: this law is too stiff before an obstacle, or "
-            "the motors are too slow. Lower the law's stiffness first."
-        )
-    if best.damping_n_s_m <= today.damping_n_s_m and (
-        best.stiffness_n_m == today.stiffness_n_m
-    ):
-        return "Today's gains meet everything asked for here."
-    settings = (
-        f"attraction.stiffness_n_m={best.stiffness_n_m:g} "
-        f"attraction.damping_n_s_m={best.damping_n_s_m:g}"
-    )
-    return (
-        f"Recommended: `{settings}`. It costs distance: P stays "
-        f"{best.following_lag_m:.2f} m behind the follow point of the moving source "
-        f"instead of {today.following_lag_m:.2f} m, which the follow distance may be "
-        f"shortened by. It gains: 2 % is reached in {best.settling_s:.1f} s instead of "
-        f"{today.settling_s:.1f} s, and laws may be as stiff as "
-        f"{best.largest_law_stiffness_n_m:.0f} N/m instead of "
-        f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A stiffer K_r "
-        "with more D_r lags less and leaves less delay margin: see the rows above."
-    )

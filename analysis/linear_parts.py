@@ -174,7 +174,7 @@ def _point_row(point: OperatingPoint) -> list[Cell]:
 
 
 def _linear_models(study: Study) -> LinearModels:
-    points: OperatingPoints = study.found["equilibria"]
+    points: OperatingPoints = study.need("equilibria")
     at = points.at
     return LinearModels(
         at,

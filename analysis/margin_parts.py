@@ -92,7 +92,7 @@ def margin_parts() -> tuple[Part, ...]:
 
 
 def _margins(study: Study) -> Margins:
-    at: OperatingPoint = study.found["equilibria"].at
+    at: OperatingPoint = study.need("equilibria").at
     models = {
         place: target_loop(study.scenario, place)
         for place in BREAK_POINTS

@@ -8,6 +8,7 @@ from analysis.gain_parts import contact_parts, gain_parts
 from analysis.linear_parts import linear_parts
 from analysis.margin_parts import margin_parts
 from analysis.robustness_parts import robustness_parts
+from analysis.sampled_parts import sampled_parts
 from analysis.stability import Part
 from analysis.velocity_parts import velocity_parts
 from analysis.verdict_parts import verdict_parts
@@ -24,6 +25,7 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     return (
         *linear_parts(),
         *margin_parts(),
+        *sampled_parts(full=full),
         *contact_parts(),
         *velocity_parts(),
         *certificate_parts(full=full),

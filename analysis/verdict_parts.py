@@ -25,7 +25,7 @@ Reading = float | str
 
 
 def _at(study: Study) -> Any:
-    return study.found["equilibria"].at
+    return study.need("equilibria").at
 
 
 def _decay(study: Study) -> Reading:
@@ -64,8 +64,23 @@ def _worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]:
     return read
 
 
+def _delay(study: Study) -> Reading:
+    data = study.found.get("sampled")
+    if not data or not data.margins:
+        return "delay margins were not computed"
+    return float(min(margin.delay_s for margin in data.margins))
+
+
+def _cycle(study: Study) -> Reading:
+    data = study.found.get("burst_cycle")
+    if not data:
+        return "the burst cycle was not computed"
+    today = next(cycle for cycle in data.cycles if cycle.hold == data.today)
+    return today.largest
+
+
 def _jams(study: Study) -> Reading:
-    points = study.found["equilibria"]
+    points = study.need("equilibria")
     band = study.scenario.stop.following_band_m
     return float(sum(p.stable and p.offset_m > band for p in points.search.points))
 
@@ -182,6 +197,24 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
+            "least delay margin", "s", "at least", 0.1,
+            "four more ticks of delay do no harm",
+            "less than four more ticks of delay make it oscillate",
+            "ours: four ticks",
+        ),
+        _delay,
+    ),
+    (
+        Criterion(
+            "left after a burst cycle", "", "below", 1.0,
+            "it settles although the source is silent most of the time",
+            "it swings ever farther because the source is silent most of the time",
+            "stability over a cycle of the sound",
+        ),
+        _cycle,
+    ),
+    (
+        Criterion(
             "growth before an obstacle", "1/s", "below", 0.0,
             "P comes to rest before an obstacle",
             "P swings before an obstacle, ever farther or in a limit cycle",
@@ -191,7 +224,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     ),
     (
         Criterion(
-            "the same, one tick late", "1/s", "below", 0.0,
+            "the same with echoes a tick late", "1/s", "below", 0.0,
             "a processor may need one tick more",
             "one more tick of latency makes P swing before an obstacle",
             _OURS,
