@@ -551,17 +551,17 @@ def _compare(options: argparse.Namespace) -> None:
     except ValueError as error:
         raise InputError.from_error(error) from None
     try:
-        with _Progress(prepared.runs, "runs") as progress:
+        with _Progress(prepared.runs, "runs", prepared.done) as progress:
             comparisons, pooled = prepared.run(progress)
         summary = compare_summary(prepared, comparisons, pooled)
         write_comparison(prepared, comparisons, summary)
-    except RuntimeError as error:
-        raise RunError(str(error)) from error
     except KeyboardInterrupt:
         raise RunError(
-            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
-            "--resume"
+            f"interrupted; {prepared.done} of {prepared.runs} runs are kept: go on "
+            f"with --out {prepared.out} --resume"
         ) from None
+    except (RuntimeError, OSError) as error:
+        raise RunError(str(error)) from error
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:

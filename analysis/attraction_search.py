@@ -105,7 +105,7 @@ def braking_overshoot(scenario: Scenario) -> float:
     )
     changes = {
         "law": "none",
-        "duration_s": 30.0,
+        "duration_s": 15.0,
         "obstacles": (),
         "start": {},
         "attraction": attraction.model_dump(),

@@ -9,6 +9,7 @@ import argparse
 import sys
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TextIO
 
 from analysis.certificate_trials import CertificateTrials, try_certificate
@@ -183,6 +184,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--starts", type=int, default=10_000, metavar="N")
     parser.add_argument("--diagram", type=int, default=200, metavar="N")
     parser.add_argument("--hearing", choices=("audio", "ideal"), default="audio")
+    parser.add_argument("--pictures", metavar="DIR", type=Path, help="draw there")
     options = parser.parse_args(arguments)
     rows = certificate_rows(
         options.scenario,
@@ -193,6 +195,28 @@ def main(arguments: Sequence[str] | None = None) -> None:
         progress=lambda text: _say(sys.stderr, text),
     )
     _say(sys.stdout, certificate_table(rows))
+    if options.pictures is not None:
+        _draw(rows, options.pictures)
+
+
+def _draw(rows: Sequence[CertificateRow], directory: Path) -> None:
+    """Map, phase plane and region of each law."""
+    from analysis.energy_certificate_plots import plot_energy_certificate
+    from analysis.phase_portrait import phase_portrait
+    from analysis.phase_portrait_plots import plot_phase_portrait
+    from analysis.sos_region_plots import plot_sos_region
+
+    directory.mkdir(parents=True, exist_ok=True)
+    for row in rows:
+        certificate = row.trials.certificate
+        figures = {
+            "certificate": plot_energy_certificate(certificate),
+            "phase": plot_phase_portrait(phase_portrait(certificate.scenario)),
+        }
+        if not isinstance(row.region, str):
+            figures["region"] = plot_sos_region(row.region)
+        for name, figure in figures.items():
+            figure.savefig(directory / f"{name}_{row.law}.png", dpi=110)
 
 
 def _say(stream: TextIO, text: str) -> None:

@@ -53,6 +53,11 @@ class PreparedComparison:
         """Runs of all experiments and laws together."""
         return sum(len(sweep.points) for sweep in self.sweeps.values())
 
+    @property
+    def done(self) -> int:
+        """Those of them that are done."""
+        return sum(len(sweep.store.done) for sweep in self.sweeps.values())
+
     def run(
         self, progress: Callable[[int], None] | None = None
     ) -> tuple[dict[str, Comparison], list[Pair]]:

@@ -77,11 +77,12 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
             label = f"{title}: {stiffness:.1f} N/m"
             axes.axhline(stiffness, color=colour, label=label)
         else:
-            axes.plot([], [], color=colour, label=f"{title}: {stiffness:.0f} N/m")
+            label = f"{title}: {stiffness:.0f} N/m, off the scale"
+            axes.plot([], [], color=colour, label=label)
     axes.axvline(attraction.damping_n_s_m, color="black", linewidth=0.8, linestyle=":")
     axes.set_xlim(_DAMPING_N_S_M[0], _DAMPING_N_S_M[-1])
     axes.set_ylim(0.0, _STIFFNESS_N_M)
     axes.set_xlabel("damping of the attraction D_r (N s/m)")
     axes.set_ylabel("stiffest slope of the push (N/m)")
     axes.set_title("the stiffness that the barrier costs, and what contact allows")
-    axes.legend(fontsize=8, loc="upper left")
+    axes.legend(fontsize=8, loc="lower right")

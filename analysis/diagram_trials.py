@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.certificate_trials import draw_starts
+from analysis.certificate_trials import BATCH, draw_starts
 from analysis.energy_certificate import EnergyCertificate
 from analysis.ideal_loop import frozen_scenario
 from analysis.intervals import Interval, wilson_interval
@@ -32,9 +32,6 @@ from systems.geometry import control_point, rectangle_clearance, rotate
 from systems.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 
 __all__ = ["DiagramTrials", "try_diagram"]
-
-#: Starts drawn at a time.
-_BATCH = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +118,7 @@ def _certified_starts(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """(n, 4) starts, (n, 3) poses, and how many were skipped."""
     rng = np.random.default_rng(scenario.seed)
-    states = draw_starts(certificate, _BATCH, rng)
+    states = draw_starts(certificate, BATCH, rng)
     states = states[certificate.certified(states)]
     bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
     kept, poses, skipped = [], [], 0
@@ -137,7 +134,7 @@ def _certified_starts(
             break
     if len(kept) < count:
         raise ValueError(
-            f"starts: only {len(kept)} of {_BATCH} random starts are certified and "
+            f"starts: only {len(kept)} of {BATCH} random starts are certified and "
             f"clear of all bodies; ask for fewer than {count}"
         )
     return np.array(kept), np.array(poses), skipped

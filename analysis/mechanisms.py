@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import pandas as pd
 
+from systems.signals import FRAME_PERIOD_S
+
 __all__ = ["failure_mechanisms"]
 
-#: A body without an echo for so long before the contact was out of sight, s.
-OUT_OF_SIGHT_S = 0.1
+#: A body without an echo for so long before the contact was out of sight, s: none
+#: at the last tick.
+OUT_OF_SIGHT_S = 1.5 * FRAME_PERIOD_S
 #: A body first heard of so shortly before the contact was heard late, s: from top
 #: speed at 0.72 m/s, less than 0.72 m.
 LATE_S = 1.0
@@ -19,8 +22,8 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     Of collisions, by the echoes of the body that was hit (docs/failures.md):
 
     - ``never heard``: there was none, the body came from where no cone looks;
-    - ``out of sight``: the last one was 0.1 s or more before the contact, the
-      body had left the cones for the side of the bar;
+    - ``out of sight``: there was none any more at the last tick, the body had left
+      the cones for the side of the bar;
     - ``heard late``: the first one was less than 1 s before the contact;
     - ``pushed too little``: heard in time and to the end.
 

@@ -163,6 +163,8 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     columns, robot = result.columns, result.scenario.robot
     force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
     wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
+    push = columns["repulsion_x"] * columns["v_WP_x"]
+    push = push + columns["repulsion_y"] * columns["v_WP_y"]
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
     pulling = np.hypot(columns["v_WP_x"], columns["v_WP_y"])
     full = 0.999
@@ -172,6 +174,7 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     impossible = np.any(speeds > 2.0 * robot.top_speed_m_s, axis=0)
     return {
         "control_effort_rms_n": _rms(np.hypot(*force)),
+        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
         "wheel_variation_m_s2": float(variation)
         * robot.wheel_radius_m
         / FRAME_PERIOD_S,

@@ -15,6 +15,7 @@ from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
+from systems.frame_energy import frame_energy
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
@@ -98,8 +99,8 @@ class HearingMemory(NamedTuple):
     """What a frame leaves behind for the next one."""
 
     energy: float
-    """Of a frame between the sounds, units of the frame squared; 0 until such a
-    frame was heard."""
+    """Of a frame between the sounds, without rumble, units of the frame squared; 0
+    until such a frame was heard."""
     noise_energy: float
     """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
@@ -125,6 +126,8 @@ class Localiser:
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
+        band = plan.band.stop - plan.band.start
+        self._band_samples = plan.frame_samples * band / plan.length
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -202,7 +205,9 @@ class Localiser:
         direct = delays is not None and self._is_direct(delays, memory)
         if direct and not begins:
             return self._fix(frame, delays), memory
-        dry, echoes, news = keep_first_wave_front(frame, memory.echoes, self._sizes)
+        dry, echoes, news = keep_first_wave_front(
+            frame, memory.echoes, self._sizes, memory.noise_energy / self._band_samples
+        )
         memory = memory._replace(echoes=echoes)
         if direct:
             news = 1.0
@@ -225,7 +230,7 @@ class Localiser:
                 f"audio: a frame of shape {frame.shape}; give a channel for each of "
                 f"the {expected[0]} microphones, of {expected[1]} samples"
             )
-        energy = float(np.vdot(frame, frame))
+        energy = frame_energy(frame)
         if not math.isfinite(energy) and not np.isfinite(frame).all():
             channel, sample = np.argwhere(~np.isfinite(frame))[0]
             raise ValueError(

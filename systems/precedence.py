@@ -27,6 +27,10 @@ _HOPS_PER_WINDOW = 4
 # docs/localization.md change little from 20 to 100 ms.
 _DECAY_S = 0.05
 
+# Only what rises this many times above the noise is news: one bin of noise in
+# exp(4) does. Others would be whitened to the size of the sound.
+_NOISE_MARGIN = 4.0
+
 # Whitening stops at this share of a channel's strongest instant.
 _WHITENING_FLOOR = 0.01
 
@@ -55,7 +59,7 @@ class EchoMemory:
 
 
 @njit(cache=True)
-def _weigh(spectra, memory, decay, floor):  # pragma: no cover  (compiled)
+def _weigh(spectra, memory, decay, floor, noise):  # pragma: no cover  (compiled)
     """Weights spectra (n, instants, bins) in place; memory becomes the last one.
 
     Returns:
@@ -76,13 +80,13 @@ def _weigh(spectra, memory, decay, floor):  # pragma: no cover  (compiled)
             for k in range(bins):
                 a = spectra[m, t, k]
                 power = a.real * a.real + a.imag * a.imag
-                past = memory[m, k]
+                past = max(memory[m, k], noise)
                 news = max(power - past, np.float32(0.0))
                 kept += news
                 all_of_it += power
                 weight = news / ((power + np.float32(1e-30)) * math.sqrt(power + least))
                 spectra[m, t, k] = a * np.float32(weight)
-                memory[m, k] = max(past * decay, power)
+                memory[m, k] = max(past * decay, power, noise)
     return kept / all_of_it
 
 
@@ -96,7 +100,10 @@ def _overlap_add(pieces, taper, hop, out):  # pragma: no cover  (compiled)
 
 
 def keep_first_wave_front(
-    frame: NDArray[np.float32], memory: NDArray[np.float32], sizes: EchoMemory
+    frame: NDArray[np.float32],
+    memory: NDArray[np.float32],
+    sizes: EchoMemory,
+    noise_density: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
     """A frame without what may be echoes.
 
@@ -104,6 +111,8 @@ def keep_first_wave_front(
         frame: (n, samples) channels, any unit.
         memory: (n, bins) what the last frame left, or ``sizes.silent()``.
         sizes: Of window and memory.
+        noise_density: Mean square of the noise a sample, were it white, units of the
+            frame squared; 0 where it is not known.
 
     Returns:
         (n, samples) weighted and whitened channels, the new memory, and the share
@@ -113,7 +122,10 @@ def keep_first_wave_front(
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)
     memory = memory.copy()
     decay = np.float32(sizes.decay_a_hop)
-    news = _weigh(spectra, memory, decay, np.float32(_WHITENING_FLOOR))
+    noise = _NOISE_MARGIN * noise_density * float(np.vdot(sizes.taper, sizes.taper))
+    news = _weigh(
+        spectra, memory, decay, np.float32(_WHITENING_FLOOR), np.float32(noise)
+    )
     pieces = fft.irfft(spectra, sizes.window, overwrite_x=True)
     out = np.zeros(frame.shape, dtype=np.float32)
     _overlap_add(pieces, sizes.taper, sizes.hop, out)

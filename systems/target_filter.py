@@ -63,6 +63,10 @@ SCATTER_RATE = 0.05
 #: Nepers by which one sighting can speak against a hypothesis: a frame that is
 #: off says little, whatever its covariance.
 LARGEST_STEP = 1.0
+#: The same for the first sighting after a silence of so many seconds, which owes
+#: nothing to the ones before.
+LARGEST_FRESH_STEP = 3.0
+SILENCE_S = 0.5
 #: Nepers by which the other hypothesis must lead before the choice turns over.
 SWITCH_MARGIN = 3.0
 #: Nepers beyond which a hypothesis becomes no less probable: what the model
@@ -347,13 +351,20 @@ def _inherit(memory, before, index, candidate, settings):
 
 
 @register_jitable
-def _choose(memory, front, back):
-    """Updates costs and choice from what ``_inherit`` says of both hypotheses."""
+def _choose(memory, front, back, largest):
+    """Updates costs and choice from what ``_inherit`` says of both hypotheses.
+
+    Args:
+        memory: Changed.
+        front: Cost, step and history of hypothesis 0.
+        back: The same of hypothesis 1.
+        largest: By how much this sighting can speak against one of them, nepers.
+    """
     lead = front[0] - back[0]
     least = min(front[1], back[1])
     if least < np.inf:
-        lead += min(front[1] - least, LARGEST_STEP)
-        lead -= min(back[1] - least, LARGEST_STEP)
+        lead += min(front[1] - least, largest)
+        lead -= min(back[1] - least, largest)
     elif _hypothesis(memory, 0)[1] <= 0.0:
         lead = 0.0  # a target that jumped may have jumped over
     _hypothesis(memory, 0)[0] = min(max(lead, 0.0), LARGEST_COST)
@@ -387,11 +398,13 @@ def fold(memory, sighting, settings):
         if both:
             _begin(_track(_hypothesis(memory, 1)), image, settings)
         return True
+    silence = chosen_track(memory)[0] - settings.measurement_age
     before = memory.copy()
     front = _inherit(memory, before, 0, sighting, settings)
     if both:
         back = _inherit(memory, before, 1, image, settings)
-        _choose(memory, front, back)
+        largest = LARGEST_FRESH_STEP if silence > SILENCE_S else LARGEST_STEP
+        _choose(memory, front, back, largest)
     return chosen_track(memory)[0] == settings.measurement_age
 
 

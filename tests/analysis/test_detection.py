@@ -27,10 +27,9 @@ def curve(levels_db, trials=12, **changes):
 def test_false_alarms_are_counted_at_every_rate_by_itself():
     """They belong to the seed, and grow with the rate."""
     rates = (0.999, 0.3, 1e-9)
-    settings = {"shape": SHAPE, "c": C, "seed": 9}
-    alarms = false_alarms(rates, 200, **settings)
+    alarms = false_alarms(rates, 200, shape=SHAPE, c=C, seed=9)
     assert [alarm.rate for alarm in alarms] == list(rates)
-    assert alarms[1:2] == false_alarms([0.3], 200, **settings)
+    assert alarms[1:2] == false_alarms([0.3], 200, shape=SHAPE, c=C, seed=9)
     most, some, none = (alarm.count for alarm in alarms)
     # Of the frames that are louder than the noise, hardly one is left at 0.999.
     assert most > 40

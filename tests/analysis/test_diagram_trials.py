@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from analysis.certificate_trials import try_certificate
 from analysis.diagram_trials import _mechanism, _pose, try_diagram
 from analysis.energy_certificate import certify_energy
 from diagrams.stop_rules import Collision
@@ -28,6 +29,18 @@ def test_runs_begin_where_and_as_fast_as_they_should(two_boxes):
         heading = np.array([math.cos(pose[2]), math.sin(pose[2])])
         np.testing.assert_allclose(pose[:2] + 0.175 * heading, state[:2])
         np.testing.assert_allclose(heading * np.hypot(*state[2:]), state[2:])
+
+
+def test_starts_are_those_of_the_certificates_own_trials(two_boxes):
+    certificate = certify_energy(
+        two_boxes("conventional", "duration_s=0.1"), cell_m=0.05
+    )
+    own = try_certificate(certificate, starts=20, duration_s=0.1).inside.starts
+    trials = try_diagram(certificate, starts=10)
+    assert trials.skipped < 10
+    np.testing.assert_array_equal(
+        trials.starts, [s for s in own.tolist() if s in trials.starts.tolist()][:10]
+    )
 
 
 def test_rate_counts_and_skips(two_boxes):
@@ -60,5 +73,5 @@ def test_too_many_starts_are_refused(two_boxes):
     certificate = certify_energy(two_boxes("conventional"), cell_m=0.05)
     with pytest.raises(ValueError, match="starts: 0 must be at least 1"):
         try_diagram(certificate, starts=0)
-    with pytest.raises(ValueError, match=r"starts: only .* ask for fewer than 5000"):
-        try_diagram(certificate, starts=5000)
+    with pytest.raises(ValueError, match=r"starts: only .* ask for fewer than 50000"):
+        try_diagram(certificate, starts=50_000)

@@ -7,14 +7,15 @@ import math
 import numpy as np
 import pytest
 
+from analysis.equilibria import find_equilibria
 from analysis.equilibrium_maps import (
     boxes_scenario,
     gap_map,
     local_minima,
     offset_map,
-    stiffness_ratio_map,
 )
 from analysis.point_mass import point_mass
+from analysis.stiffness_ratio import stiffness_ratio_map
 from analysis.trap_stiffness import trap_stiffness
 
 
@@ -47,8 +48,21 @@ def test_minima_have_no_force(two_boxes):
         force = model.force([[point.x_m, point.y_m, 0.0, 0.0]], "none")[0]
         assert np.hypot(*force) < 0.01
     coarse = local_minima(model, cell_m=0.05)
-    jam = next(p for p in found.points if p.outcome == "jam")
+    jams = [p for p in found.points if p.outcome == "jam"]
+    jam = min(jams, key=lambda p: abs(p.y_m))
     assert np.hypot(*(coarse - [jam.x_m, jam.y_m]).T).min() < 0.05
+
+
+@pytest.mark.slow
+def test_jams_are_the_sinks_of_the_global_search(two_boxes):
+    """Two ways: minima of the energy, zeros of the blocks' force."""
+    scenario = two_boxes(*stiff("active"))
+    found = gap_map(scenario, (1.2,), sensing="exact sum")
+    case = boxes_scenario(scenario, [(2.0, 0.65), (2.0, -0.65)], "exact sum")
+    search = find_equilibria(case, area_m=(0.5, 2.5, -1.5, 1.5), smallest_m=0.01)
+    sinks = [p.p_WP for p in search.points if p.kind == "sink"]
+    jams = [(p.x_m, p.y_m) for p in found.points if p.outcome == "jam"]
+    np.testing.assert_allclose(sorted(map(tuple, sinks)), sorted(jams), atol=1e-3)
 
 
 @pytest.mark.parametrize("law", ["conventional", "active"])

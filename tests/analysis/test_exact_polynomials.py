@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from fractions import Fraction
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ BASIS = [(1, 0), (0, 1), (1, 1), (2, 0)]
 number = st.floats(-3.0, 3.0)
 polynomials = st.dictionaries(
     st.tuples(st.integers(0, 3), st.integers(0, 3)), number, max_size=6
-).map(lambda terms: Polynomial({**terms}))
+).map(lambda terms: Polynomial(cast(Any, terms)))
 points = st.tuples(number, number)
 
 

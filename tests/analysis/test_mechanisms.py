@@ -18,7 +18,7 @@ KINDS = [
     ("collision", 5.0, 0.4, "out of sight"),
     ("collision", 0.5, 0.3, "out of sight"),
     ("collision", 0.5, 0.0, "heard late"),
-    ("collision", 5.0, 0.05, "pushed too little"),
+    ("collision", 5.0, 0.02, "pushed too little"),
     ("stuck", math.nan, math.nan, "jam"),
     ("timeout", math.nan, math.nan, "jam"),
     ("lost", math.nan, math.nan, "lost"),

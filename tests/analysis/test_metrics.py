@@ -190,12 +190,16 @@ def test_effort_and_saturation():
         "attraction_x": np.full(ticks, 3.0),
         "repulsion_x": np.full(ticks, 1.0),
         "repulsion_y": np.full(ticks, 3.0),
+        "v_WP_x": np.full(ticks, 0.2),
+        "v_WP_y": np.full(ticks, -0.1),
         "wheel_speed_left": 2.0 * flip,
         "wheel_speed_right": np.full(ticks, 12.0),
         "obstacle_speed_1": np.where(np.arange(ticks) < 5, 1.5, 0.1),
     }
     metrics = run_metrics(straight(ticks=ticks, columns=columns))
     assert metrics["control_effort_rms_n"] == pytest.approx(5.0)
+    # 1 N x 0.2 m/s - 3 N x 0.1 m/s at 81 ticks.
+    assert metrics["push_work_j"] == pytest.approx(-0.1 * 81 * TICK)
     # One wheel's rim changes by 4 rad/s x 0.06 m a tick, the other's never.
     assert metrics["wheel_variation_m_s2"] == pytest.approx(0.5 * 0.24 / TICK)
     assert metrics["saturated_fraction"] == 1.0

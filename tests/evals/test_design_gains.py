@@ -68,8 +68,14 @@ def test_a_fifth_less_does_not_stop_it(law):
 
 def test_command_derives_the_defaults(tmp_path, capsys):
     out = tmp_path / "design"
-    assert main(["design", "--out", str(out), "--json"]) == 0
-    summary = json.loads(capsys.readouterr().out)
+    assert main(["design", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    contact = [line for line in text.splitlines() if "contact stiffness" in line]
+    assert [line.endswith("not met") for line in contact] == [
+        *(True, False, True),
+        *(False, False, True),
+    ]
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
     laws = {law["law"]: law for law in summary["today"]["laws"]}
     for law in DESIGNED_LAWS:
         assert laws[law]["gains"] == getattr(Scenario().repulsion, law).model_dump()

@@ -1,0 +1,45 @@
+"""The closed loop in a room that reverberates, with coloured ego noise."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.metrics import run_metrics
+from benchmarks.following_in_rooms import (
+    BURST_ENDS_S,
+    behind,
+    in_a_room,
+    on_the_right_side,
+    write_ego_noise,
+)
+from diagrams import load_scenario, simulate
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def room(tmp_path_factory) -> list[str]:
+    return in_a_room(write_ego_noise(tmp_path_factory.mktemp("noise")))
+
+
+def test_the_robot_follows_as_in_the_free_field(room):
+    """Half of the scenario; docs/localization.md has all of it, and more seeds."""
+    shares = []
+    for overrides in ([], room):
+        scenario = load_scenario("obstacle_free", ["duration_s=30", *overrides])
+        result = simulate(scenario)
+        assert result.cause == "completed"
+        shares.append(run_metrics(result)["following_fraction"])
+    free, reverberant = shares
+    assert reverberant > free - 0.05
+
+
+def test_a_source_behind_is_found_within_two_bursts(room):
+    """All but one of 20 starts, as the table has it: 10 of them here."""
+    right = []
+    for seed in range(10):
+        overrides = ["obstacles=[]", f"duration_s={BURST_ENDS_S[1]}", *behind(seed)]
+        result = simulate(load_scenario("default", [*overrides, *room]))
+        right.append(on_the_right_side(result)[-1])
+    assert np.count_nonzero(right) >= 9
