@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from analysis.equilibrium_maps import BOX_X_M, EquilibriumMap, RatioMap
+from analysis.equilibrium_maps import BOX_X_M, EquilibriumMap
 from analysis.scene import COLOURS
+from analysis.stiffness_ratio import RatioMap
 
 __all__ = ["plot_equilibrium_maps", "plot_ratio_map"]
 

@@ -15,24 +15,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.head_on import head_on
 from analysis.ideal_loop import ideal_scenario
 from analysis.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
-from systems.active_impedance_controller import active_force
 
 __all__ = [
     "BOX_M",
     "BOX_X_M",
     "TO_GO_M",
     "EquilibriumMap",
-    "RatioMap",
     "RestPoint",
     "boxes_scenario",
     "gap_map",
     "local_minima",
     "offset_map",
-    "stiffness_ratio_map",
 ]
 
 #: Footprint of the boxes, m: along and across the line to the source; printed.
@@ -42,8 +38,6 @@ BOX_X_M, TO_GO_M = 2.0, 2.0
 #: Spacing of the grid on which energies are compared, m: of gaps, and of offsets,
 #: where what holds P is as narrow as a box.
 _GAP_CELL_M, _OFFSET_CELL_M = 0.02, 0.01
-#: Spacing of the distances of ``stiffness_ratio_map``, m.
-_RATIO_STEP_M = 2e-3
 #: Follow distance of the maps, m: as printed the attraction would end in the
 #: master robot, which repels as well.
 _FOLLOW_M = 1.2
@@ -101,32 +95,6 @@ class EquilibriumMap:
             "jams": list(self.jams),
             "collisions": list(self.collisions),
             "points": [vars(p) for p in self.points],
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class RatioMap:
-    """Head-on equilibria of the active law over k_ref/K_0."""
-
-    ratios: NDArray[np.float64]
-    """(n,) k_ref/K_0, K_0 and reach as in the scenario."""
-    outer_m: NDArray[np.float64]
-    """(n,) where P is held up, m; NaN: nowhere. A saddle: it slips sideways."""
-    inner_m: NDArray[np.float64]
-    """(n,) nearer in, where the vanishing force gives way, m. A source."""
-    to_go_m: float
-    """What is left to go behind the obstacle, m."""
-    today: float
-    """The scenario's ratio."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
-        return {
-            "ratios": self.ratios.tolist(),
-            "outer_m": [None if math.isnan(x) else x for x in self.outer_m.tolist()],
-            "inner_m": [None if math.isnan(x) else x for x in self.inner_m.tolist()],
-            "to_go_m": self.to_go_m,
-            "today": self.today,
         }
 
 
@@ -317,48 +285,3 @@ def boxes_scenario(
     if rule is not None:
         data["collision_vector"] = data["collision_vector"] | {"aggregation": rule}
     return Scenario.model_validate(data)
-
-
-def stiffness_ratio_map(
-    scenario: Scenario,
-    ratios: Sequence[float] = tuple(np.geomspace(1.2, 64.0, 60)),
-    *,
-    to_go_m: float | None = None,
-) -> RatioMap:
-    """Head-on equilibria of the active law as k_ref/K_0 varies.
-
-    Args:
-        scenario: Its active law's K_0, reach and velocity term.
-        ratios: k_ref/K_0, above 1.
-        to_go_m: See ``head_on``.
-    """
-    contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
-    gains = scenario.repulsion.active
-    stiffness = scenario.attraction.stiffness_n_m
-    c = np.arange(_RATIO_STEP_M, contact.law.range_m, _RATIO_STEP_M)
-    pull = stiffness * (contact.to_go_m + c)
-    outer, inner = [], []
-    for ratio in ratios:
-        k_ref = float(ratio) * gains.matched_stiffness_n_m
-        case = gains.model_copy(update={"reference_stiffness_n_m": k_ref})
-        force = np.array([active_force(value, 0.0, case) for value in c.tolist()])
-        places = _crossings(c, force - pull)
-        outer.append(max(places["down"], default=math.nan))
-        inner.append(max(places["up"], default=math.nan))
-    return RatioMap(
-        np.array(ratios, dtype=float),
-        np.array(outer),
-        np.array(inner),
-        contact.to_go_m,
-        gains.reference_stiffness_n_m / gains.matched_stiffness_n_m,
-    )
-
-
-def _crossings(
-    x: NDArray[np.float64], y: NDArray[np.float64]
-) -> dict[str, list[float]]:
-    """Where y passes through zero on its way up and down, by interpolation."""
-    at = np.flatnonzero(np.diff(np.sign(y)))
-    places = x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at])
-    up = y[at + 1] > y[at]
-    return {"up": places[up].tolist(), "down": places[~up].tolist()}

@@ -12,10 +12,8 @@ from analysis.disturbance_bounds import disturbance_bounds
 from analysis.equilibrium_map_plots import plot_equilibrium_maps, plot_ratio_map
 from analysis.equilibrium_maps import (
     EquilibriumMap,
-    RatioMap,
     gap_map,
     offset_map,
-    stiffness_ratio_map,
 )
 from analysis.fact_tables import fact_table, row_table
 from analysis.html_page import Cell, figure_html, number, paragraph, table
@@ -25,6 +23,7 @@ from analysis.plain_values import plain
 from analysis.sos_region import sos_region
 from analysis.sos_region_plots import plot_sos_region
 from analysis.stability import Part, Study
+from analysis.stiffness_ratio import RatioMap, stiffness_ratio_map
 
 __all__ = ["extended_parts"]
 

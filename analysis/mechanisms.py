@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pandas as pd
 
+from diagrams.stop_rules import SUCCESSFUL
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["failure_mechanisms"]
@@ -34,7 +35,7 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
         rows: Of ``analysis.sweep_store.load_results``, with cones.
     """
     cause = rows["cause"].astype("object")
-    names = cause.where(~cause.isin(("reached", "completed")))
+    names = cause.where(~cause.isin(SUCCESSFUL))
     names = names.replace({"stuck": "jam", "timeout": "jam"})
     hits = cause == "collision"
     warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]

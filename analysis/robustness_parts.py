@@ -106,7 +106,7 @@ def robustness_parts(*, full: bool) -> tuple[Part, ...]:
 
 
 def _following(study: Study, samples: int) -> LoopRobustness:
-    at = study.found["equilibria"].at
+    at = study.need("equilibria").at
     return loop_robustness(
         study.scenario,
         following_poles(at),

@@ -9,10 +9,10 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from diagrams.stop_rules import SUCCESSFUL
+
 __all__ = ["ALL_RUNS", "SUCCESSES", "collisions", "figure", "stream", "successes"]
 
-#: Causes of a run that did what it should.
-SUCCESSFUL = ("reached", "completed")
 #: Figures that any run has, however it ended.
 ALL_RUNS = (
     "minimum_clearance_m",

@@ -36,7 +36,19 @@ class Study:
     scenario: Scenario
     """With the law to analyse."""
     found: dict[str, Any] = field(default_factory=dict)
-    """Data objects of earlier parts, by key."""
+    """Data objects of earlier parts, by key; none where there is a problem."""
+
+    def need(self, key: str) -> Any:
+        """Data object of an earlier part.
+
+        Raises:
+            ValueError: It has none.
+        """
+        if self.found.get(key) is None:
+            raise ValueError(
+                f"{key}: has no result, on which this part is built; mend that first"
+            )
+        return self.found[key]
 
 
 @dataclass(frozen=True)

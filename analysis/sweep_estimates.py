@@ -15,10 +15,10 @@ from numpy.typing import NDArray
 from analysis.intervals import median_interval, wilson_interval
 from analysis.sweep_plan import SweepPlan
 from analysis.sweep_run import FAILED
+from diagrams.stop_rules import SUCCESSFUL
 
 __all__ = [
     "QUANTITIES",
-    "SUCCESSFUL",
     "Estimate",
     "Marginal",
     "Quantity",
@@ -29,8 +29,6 @@ __all__ = [
     "shown",
 ]
 
-#: Causes of runs that did what they should.
-SUCCESSFUL = ("reached", "completed")
 #: A drawn number is cut into at most so many bins, of so many runs or more.
 MOST_BINS, LEAST_RUNS = 8, 20
 

@@ -20,10 +20,11 @@ from analysis.html_page import (
     table,
 )
 from analysis.sweep import reproducing_command
-from analysis.sweep_estimates import QUANTITIES, SUCCESSFUL, cell_label, ended, shown
+from analysis.sweep_estimates import QUANTITIES, cell_label, ended, shown
 from analysis.sweep_plan import SweepPlan, SweepPoint
 from analysis.sweep_plots import grid_axes, plot_heat_maps, plot_line, plot_marginal
 from analysis.sweep_run import FAILED
+from diagrams.stop_rules import SUCCESSFUL
 
 __all__ = ["sweep_page", "write_sweep"]
 

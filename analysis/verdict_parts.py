@@ -25,7 +25,7 @@ Reading = float | str
 
 
 def _at(study: Study) -> Any:
-    return study.found["equilibria"].at
+    return study.need("equilibria").at
 
 
 def _decay(study: Study) -> Reading:
@@ -80,7 +80,7 @@ def _cycle(study: Study) -> Reading:
 
 
 def _jams(study: Study) -> Reading:
-    points = study.found["equilibria"]
+    points = study.need("equilibria")
     band = study.scenario.stop.following_band_m
     return float(sum(p.stable and p.offset_m > band for p in points.search.points))
 

@@ -3,9 +3,9 @@
 `obstacle_free` in the free field, and in a room of 7 m x 7 m x 3 m that
 reverberates for 0.4 s, with coloured ego noise 20 dB below the source at 1 m: how
 much of the run the robot follows; and, from starts with the source behind it, how
-often the target is on the source's side after one burst, two and three. Exit status 1 if the
-room costs more than a twentieth of the following, or a twentieth of the starts is
-not resolved after two bursts.
+often the target is on the source's side after one burst, two and three. Exit status
+1 if the room costs more than a twentieth of the following, or if a twentieth of the
+starts is not resolved after two bursts.
 """
 
 from __future__ import annotations

@@ -13,9 +13,9 @@ from analysis.equilibrium_maps import (
     gap_map,
     local_minima,
     offset_map,
-    stiffness_ratio_map,
 )
 from analysis.point_mass import point_mass
+from analysis.stiffness_ratio import stiffness_ratio_map
 from analysis.trap_stiffness import trap_stiffness
 
 

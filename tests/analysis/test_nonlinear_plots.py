@@ -18,9 +18,10 @@ from analysis.energy_certificate_plots import (
     plot_energy_certificate,
 )
 from analysis.equilibrium_map_plots import plot_equilibrium_maps, plot_ratio_map
-from analysis.equilibrium_maps import gap_map, stiffness_ratio_map
+from analysis.equilibrium_maps import gap_map
 from analysis.phase_portrait import phase_portrait
 from analysis.phase_portrait_plots import plot_phase_portrait
+from analysis.stiffness_ratio import stiffness_ratio_map
 from analysis.velocity_passivity import energy_balance
 from analysis.velocity_term_plots import plot_contact_oscillation, plot_velocity_terms
 from analysis.velocity_terms import velocity_term_analysis

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from analysis.contact_mode import contact_spectral_radius
-from analysis.contact_oscillation import contact_oscillation, predict_oscillation
+from analysis.contact_oscillation import contact_oscillation
+from analysis.harmonic_balance import predict_oscillation
 from analysis.head_on import head_on
 from diagrams import load_scenario
 
