@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Any
 
+from analysis.chart_plots import plot_contact_limits
 from analysis.contact_mode import ContactLimits, contact_limits
-from analysis.html_page import Cell, number, paragraph, table
+from analysis.html_page import Cell, figure_html, number, paragraph, table
 from analysis.plain_values import plain
 from analysis.recommended_gains import (
     GainFigures,
@@ -50,6 +51,7 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
             f"{ticks} ticks."
         ),
         table(headings, rows, caption=caption),
+        figure_html(plot_contact_limits(data), name, "Limits of the contact mode."),
     ]
 
 

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.html_page import Cell, paragraph, table
+from analysis.gang_of_four import GangOfFour, gang_of_four
+from analysis.html_page import Cell, figure_html, paragraph, table
 from analysis.linear_models import LinearModel
 from analysis.loop_margins import (
     DiskMargin,
@@ -17,6 +18,12 @@ from analysis.loop_margins import (
     PointMargins,
     all_margins,
     loop_margins,
+)
+from analysis.margin_plots import (
+    plot_bode,
+    plot_gang_of_four,
+    plot_nichols,
+    plot_nyquist,
 )
 from analysis.open_loops import BREAK_POINTS, target_loop
 from analysis.operating_points import OperatingPoint
@@ -33,8 +40,8 @@ _EXPLANATION = (
 )
 #: Faster modes are those of motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
-#: The loop whose figures are drawn.
-_DRAWN = ("sensor", "along")
+#: The loop whose margins stand for the implemented one.
+_MAIN = ("sensor", "along")
 
 
 @dataclass(frozen=True)
@@ -46,6 +53,8 @@ class Margins:
     target_model: LinearModel
     """Cut at the sensor."""
     implemented: tuple[PointMargins, ...]
+    gang: GangOfFour
+    """Along the line to the source."""
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
@@ -102,12 +111,13 @@ def _margins(study: Study) -> Margins:
         {place: loop_margins(model) for place, model in models.items()},
         models["sensor"],
         all_margins(at),
+        gang_of_four(at),
         at,
     )
 
 
 def _document(data: Margins) -> dict[str, Any]:
-    sensor = data.implemented_at(*_DRAWN) or data.implemented[0].margins
+    sensor = data.implemented_at(*_MAIN) or data.implemented[0].margins
     return {
         "target_loop": {
             **_loop_document(data.target_poles, data.target["sensor"]),
@@ -155,6 +165,7 @@ def _render(data: Margins, name: str) -> list[str]:
         "cut at", "direction", "gain up (dB)", "gain down (dB)", "phase (deg)",
         "crossover (rad/s)", "modulus", "M_s", "M_t", "delay (s)",
     ]  # fmt: skip
+    loops = [m.margins for m in data.implemented if m.direction == "along"]
     disks: list[list[Cell]] = [
         [m.at, m.direction, *_disk_cells(m.margins.disks)] for m in data.implemented
     ]
@@ -168,6 +179,18 @@ def _render(data: Margins, name: str) -> list[str]:
             ],
             disks,
             caption="Disk margins: size alpha; gain within +- dB; phase within +- deg",
+        ),
+        figure_html(plot_bode(loops), f"{name}-bode", "Bode diagram with margins."),
+        figure_html(
+            plot_nyquist(loops),
+            f"{name}-nyquist",
+            "Nyquist curves, with the disk that they must stay out of.",
+        ),
+        figure_html(plot_nichols(loops), f"{name}-nichols", "Nichols diagram."),
+        figure_html(
+            plot_gang_of_four(data.gang),
+            f"{name}-gang",
+            "Gang of four, along the line to the source.",
         ),
     ]  # fmt: skip
 

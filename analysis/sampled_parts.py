@@ -16,9 +16,11 @@ from analysis.burst_cycle import (
     burst_cycle,
     simulate_burst_cycle,
 )
+from analysis.burst_gaps import GapChart, gap_chart
+from analysis.chart_plots import plot_delay_check, plot_gap_chart
 from analysis.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.delayed_run import DelayCheck, check_delay_margin
-from analysis.html_page import Cell, paragraph, table
+from analysis.html_page import Cell, figure_html, paragraph, table
 from analysis.open_loops import DIRECTIONS
 from analysis.operating_points import OperatingPoint
 from analysis.stability import Part, Study
@@ -60,6 +62,8 @@ class BurstCycles:
     cycles: tuple[BurstCycle, ...]
     runs: tuple[BurstRun, ...]
     """Simulated, in the same order."""
+    gaps: GapChart
+    """Against the length of the silence."""
 
 
 def sampled_parts(*, full: bool) -> tuple[Part, ...]:
@@ -150,6 +154,11 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
                 f"{data.check.below.duration_s:g} s after a small kick",
             )
         )
+        parts.append(
+            figure_html(
+                plot_delay_check(data.check), name, "Just below the margin, and above."
+            )
+        )
     return parts
 
 
@@ -157,7 +166,8 @@ def _bursts(study: Study) -> BurstCycles:
     at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
     runs = tuple(simulate_burst_cycle(cycle, CYCLES) for cycle in cycles)
-    return BurstCycles(study.scenario.tracker.hold, cycles, runs)
+    gaps = gap_chart(study.scenario, point=at)
+    return BurstCycles(study.scenario.tracker.hold, cycles, runs, gaps)
 
 
 def _burst_document(data: BurstCycles) -> dict[str, Any]:
@@ -172,7 +182,8 @@ def _burst_document(data: BurstCycles) -> dict[str, Any]:
                 "simulated_largest": run.factor,
             }
             for cycle, run in zip(data.cycles, data.runs, strict=True)
-        ]
+        ],
+        "burst_gaps": data.gaps,
     }
 
 
@@ -203,4 +214,9 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
             "kick along the line to the source, which shows the motion along it only."
         ),
         table(["hold", "multipliers", "simulated, along", "stable"], rows),
+        figure_html(
+            plot_gap_chart(data.gaps),
+            name,
+            "Growth against the silence between bursts, for each way to hold.",
+        ),
     ]

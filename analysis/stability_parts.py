@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from analysis.certificate_parts import certificate_parts
+from analysis.chart_parts import chart_parts
 from analysis.extended_parts import extended_parts
 from analysis.gain_parts import contact_parts, gain_parts
 from analysis.linear_parts import linear_parts
@@ -23,9 +24,10 @@ def parts(*, full: bool) -> tuple[Part, ...]:
         full: Also those that take minutes.
     """
     return (
-        *linear_parts(),
+        *linear_parts(full=full),
         *margin_parts(),
         *sampled_parts(full=full),
+        *chart_parts(),
         *contact_parts(),
         *velocity_parts(),
         *certificate_parts(full=full),
