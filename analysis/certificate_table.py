@@ -112,7 +112,7 @@ def certificate_table(rows: Sequence[CertificateRow]) -> str:
         (
             "law",
             "proved",
-            "half extents of c, v, w",
+            "half extents of c, v",
             "starts inside",
             "touch",
             "starts by energy alone",
@@ -164,11 +164,11 @@ def _squares_row(row: CertificateRow) -> str:
     region = row.region
     if isinstance(region, str):
         return _row(f"`{row.law}`", "no: " + region.partition(": ")[2], *["-"] * 5)
-    c, v, w = region.extent()
+    c, v, _ = region.extent()
     return _row(
         f"`{row.law}`",
         "yes" if region.certified else "no",
-        f"{c:.3f} m, {v:.3f} m/s, {w:.3f} m/s",
+        f"{c:.3f} m, {v:.3f} m/s",
         region.starts,
         region.collisions,
         region.energy_starts,

@@ -55,16 +55,19 @@ _SUM_BASIS = [m for m in product(range(4), repeat=3) if 1 <= sum(m) <= 3]
 
 
 def box(model: LagModel) -> list[tuple[float, float]]:
-    """Bounds of y: the domain, and the top speed of v (the clamp) and w."""
+    """Bounds of y: the domain, the clamp of v, and the top speed of w."""
     a = model.scales[0]
     return [(model.domain_m[0] / a, model.domain_m[1] / a), (-1.0, 1.0), (-1.0, 1.0)]
 
 
 def faces(model: LagModel) -> list[NDArray[np.float64]]:
-    """n with n . y <= 1 on the box."""
+    """n with n . y <= 1 where the model holds: on the domain, below the clamp.
+
+    w follows v, and needs no bound.
+    """
     (low, high), *_ = box(model)
     eye = np.eye(3)
-    return [eye[0] / high, eye[0] / low, eye[1], -eye[1], eye[2], -eye[2]]
+    return [eye[0] / high, eye[0] / low, eye[1], -eye[1]]
 
 
 def first_region(

@@ -18,7 +18,6 @@ SCS is not used: it takes infeasible programs for solved ones.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -60,7 +59,7 @@ class SosRegion:
     exact: bool
     """Whether rational arithmetic confirms it."""
     region_share: float
-    """Volume of the region by that of the domain, |v| and |w| up to the top speed."""
+    """Share of the domain, |v| and |w| up to the top speed, that the region holds."""
     safe_share: float
     """Share of the domain's starts that do not touch, by simulation."""
     starts: int
@@ -147,9 +146,7 @@ def sos_region(
         P=P,
         solvers={name: result is not None for name, result in results.items()},
         exact=is_proved(model, P, solved, results["clarabel"]),
-        region_share=float(
-            4.0 / 3.0 * math.pi / math.sqrt(np.linalg.det(P)) / np.prod(high - low)
-        ),
+        region_share=float(np.mean(_inside(model, P, anywhere))),
         safe_share=float(np.mean(~model.simulate(anywhere, contact_m=contact))),
         starts=starts,
         collisions=int(model.simulate(inside, contact_m=contact).sum()),
@@ -172,14 +169,25 @@ def _energy_starts(
     return np.column_stack([x, v, v])[safe]
 
 
+def _inside(
+    model: LagModel, P: NDArray[np.float64], states: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(n,) whether V <= 1 at states (n, 3)."""
+    y = states / model.scales
+    return np.einsum("ni,ij,nj->n", y, P, y) <= 1.0
+
+
 def _draw_inside(
     model: LagModel, P: NDArray[np.float64], count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """(n, 3) x, v, w uniform in the region."""
-    ball = rng.standard_normal((count, 3))
-    ball *= (rng.uniform(size=count) ** (1.0 / 3.0) / np.linalg.norm(ball, axis=1))[
-        :, None
-    ]
+    """(n, 3) x, v, w uniform in the region, w no faster than the top speed."""
     # P = R R', so y = R^-T ball has y' P y = |ball|^2.
-    root = np.linalg.cholesky(P)
-    return np.linalg.solve(root.T, ball.T).T * model.scales
+    root = np.linalg.cholesky(P).T
+    kept = np.zeros((0, 3))
+    while len(kept) < count:
+        ball = rng.standard_normal((2 * count, 3))
+        radius = rng.uniform(size=2 * count) ** (1.0 / 3.0)
+        ball *= (radius / np.linalg.norm(ball, axis=1))[:, None]
+        y = np.linalg.solve(root, ball.T).T
+        kept = np.concatenate([kept, y[np.abs(y[:, 2]) <= 1.0]])
+    return kept[:count] * model.scales
