@@ -55,13 +55,15 @@ class SweepStore:
         else:
             with whole_directory(out) as directory:
                 _make(directory, plan)
+        self._journal = -1
         try:
             self._lock = _locked(out / MANIFEST)
-            self._journal = -1
-            self._open()
         except BlockingIOError:
             raise ValueError(f"out: another process works in {out}; wait") from None
+        try:
+            self._open()
         except OSError as error:
+            self.close()
             raise ValueError(
                 f"out: {out} cannot be written ({error.strerror}); name another "
                 "directory"

@@ -212,6 +212,7 @@ def test_a_run_that_fails_is_recorded_and_the_rest_goes_on(tmp_path, laws):
     assert table["seed"][0] == table["seed"][1]
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_is_recorded(tmp_path, laws):
     laws_used = ["sweep_laws:deadly", "sweep_laws:mortal", "active"]
     table = run_sweep(
@@ -280,6 +281,8 @@ def test_used_directories_are_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no sweep"):
         prepared(other, resume=True)
     assert [path.name for path in other.iterdir()] == ["mine"]
+    with pytest.raises(ValueError, match="is a file"):
+        prepared(other / "mine", resume=True)
     with pytest.raises(ValueError, match="holds no results"):
         load_results(other)
 
