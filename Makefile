@@ -37,8 +37,9 @@ lint: .venv/.installed-dev ## check style and format
 typecheck: .venv/.installed-dev ## check types
 	@$(PY) -m mypy
 
-bench: .venv/.installed ## measure speed and memory
+bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks
+	@echo "More: $(PY) -m benchmarks.hearing, .free_field, .peers (minutes each)"
 
 clean: ## remove the environment, caches and builds; keep results/
 	@rm -rf .venv .venv-newest build dist phonotaxis.egg-info

@@ -1,4 +1,4 @@
-"""The command line: simulate, scenarios, locate, localization, stability."""
+"""The command line: one subcommand for each thing to do."""
 
 from __future__ import annotations
 
@@ -84,23 +84,38 @@ def _complain(field: str, message: str, *, as_json: bool) -> None:
 def _parser() -> argparse.ArgumentParser:
     parser = _Parser(prog="phonotaxis", description="A robot that follows a sound.")
     commands = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    for add in (
+        _add_simulate,
+        _add_scenarios,
+        _add_locate,
+        _add_localization,
+        _add_compare,
+        _add_stability,
+        _add_sweep,
+        _add_design,
+    ):
+        add(commands)
+    return parser
 
+
+def _add_simulate(commands: Any) -> None:
     simulate = commands.add_parser("simulate", help="run a scenario")
     simulate.add_argument("--sound", metavar="FILE", help="sound file to play")
     simulate.add_argument("--law", help=f"{_LAWS}, or package.module:Name")
     _take_scenario(simulate)
-    simulate.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    simulate.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(simulate)
     simulate.set_defaults(run=_simulate)
 
+
+def _add_scenarios(commands: Any) -> None:
     scenarios = commands.add_parser("scenarios", help="list the library's scenarios")
     scenarios.add_argument(
         "--json", action="store_true", help="print one JSON document"
     )
     scenarios.set_defaults(run=_scenarios)
 
+
+def _add_locate(commands: Any) -> None:
     locate = commands.add_parser(
         "locate", help="bearing and range over time of a recording"
     )
@@ -114,6 +129,8 @@ def _parser() -> argparse.ArgumentParser:
     locate.add_argument("--json", action="store_true", help="print one JSON document")
     locate.set_defaults(run=_locate)
 
+
+def _add_localization(commands: Any) -> None:
     localization = commands.add_parser(
         "localization", help="the papers' localisation tables, ours, and the bound"
     )
@@ -127,14 +144,11 @@ def _parser() -> argparse.ArgumentParser:
         help="redraw errors of the array for every measurement, within 0.2 mm, "
         "0.2 us and 0.2 %% of the speed of sound",
     )
-    localization.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    localization.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
+    _take_output(localization)
     localization.set_defaults(run=_localization)
 
+
+def _add_compare(commands: Any) -> None:
     compare = commands.add_parser(
         "compare", help="laws side by side on the same random layouts"
     )
@@ -174,14 +188,13 @@ def _parser() -> argparse.ArgumentParser:
         "--workers", metavar="N", type=int, help="processes (default: one a core)"
     )
     compare.add_argument(
-        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
-    )
-    compare.add_argument(
         "--resume", action="store_true", help="go on with the runs in --out"
     )
-    compare.add_argument("--json", action="store_true", help="print one JSON document")
+    _take_output(compare)
     compare.set_defaults(run=_compare)
 
+
+def _add_stability(commands: Any) -> None:
     stability = commands.add_parser(
         "stability", help="stability of a scenario's loop: report, models, numbers"
     )
@@ -196,14 +209,42 @@ def _parser() -> argparse.ArgumentParser:
     stability.add_argument(
         "--full", action="store_true", help="everything, also what takes minutes"
     )
-    stability.add_argument(
+    _take_output(stability)
+    stability.set_defaults(run=_stability)
+
+
+def _add_sweep(commands: Any) -> None:
+    sweep = commands.add_parser(
+        "sweep", help="run many scenarios, drawn from distributions and grids"
+    )
+    sweep.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/sweeps.md")
+    sweep.add_argument(
+        "--workers", metavar="N", type=int, help="local processes (default: one a core)"
+    )
+    sweep.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster, as tcp://host:8786"
+    )
+    sweep.add_argument(
+        "--resume", action="store_true", help="go on with what --out holds"
+    )
+    _take_output(sweep)
+    sweep.set_defaults(run=_sweep)
+
+
+def _add_design(commands: Any) -> None:
+    design = commands.add_parser(
+        "design", help="the laws' gains, derived from stated requirements"
+    )
+    _take_scenario(design)
+    _take_output(design)
+    design.set_defaults(run=_design)
+
+
+def _take_output(command: argparse.ArgumentParser) -> None:
+    command.add_argument(
         "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
     )
-    stability.add_argument(
-        "--json", action="store_true", help="print one JSON document"
-    )
-    stability.set_defaults(run=_stability)
-    return parser
+    command.add_argument("--json", action="store_true", help="print one JSON document")
 
 
 def _take_scenario(command: argparse.ArgumentParser) -> None:
@@ -293,12 +334,13 @@ class _Progress:
     that strikes inside them into a SystemError.
     """
 
-    def __init__(self, total: float, unit: str) -> None:
+    def __init__(self, total: float, unit: str, done: float = 0.0) -> None:
         from tqdm import tqdm
 
         form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
         self._bar = tqdm(
             total=total,
+            initial=done,
             disable=not sys.stderr.isatty(),
             bar_format=form,
             leave=False,
@@ -447,6 +489,43 @@ def _stability(options: argparse.Namespace) -> None:
         print(f"\nreport in {out / 'report.html'}")
 
 
+def _sweep(options: argparse.Namespace) -> None:
+    from analysis.sweep import prepare_sweep
+    from analysis.sweep_page import write_sweep
+    from analysis.sweep_plan import load_sweep
+    from analysis.sweep_summary import sweep_summary, sweep_text
+
+    try:
+        plan = load_sweep(options.sweep)
+        sweep = prepare_sweep(
+            plan,
+            options.out,
+            workers=options.workers,
+            scheduler=options.scheduler,
+            resume=options.resume,
+        )
+    except ValueError as error:
+        raise InputError.from_error(error) from None
+    total, done, out = len(sweep.points), sweep.store.done, sweep.store.out
+    try:
+        with _Progress(total, "runs", len(done)) as progress:
+            results = sweep.run(progress)
+        summary = sweep_summary(plan, sweep.points, results, out)
+        write_sweep(plan, sweep.points, results, summary)
+    except KeyboardInterrupt:
+        raise RunError(
+            f"interrupted; {len(done)} of {total} runs are kept: go on with --out "
+            f"{out} --resume"
+        ) from None
+    except (RuntimeError, OSError) as error:
+        raise RunError(str(error)) from error
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(sweep_text(plan, results))
+        print(f"\nresults in {out}, report in {out / 'report.html'}")
+
+
 def _compare(options: argparse.Namespace) -> None:
     from analysis.compare import prepare_comparison
     from analysis.compare_options import comparison_plans
@@ -472,22 +551,48 @@ def _compare(options: argparse.Namespace) -> None:
     except ValueError as error:
         raise InputError.from_error(error) from None
     try:
-        with _Progress(prepared.runs, "runs") as progress:
-            comparisons = prepared.run(progress)
-        summary = compare_summary(prepared, comparisons)
+        with _Progress(prepared.runs, "runs", prepared.done) as progress:
+            comparisons, pooled = prepared.run(progress)
+        summary = compare_summary(prepared, comparisons, pooled)
         write_comparison(prepared, comparisons, summary)
-    except RuntimeError as error:
-        raise RunError(str(error)) from error
     except KeyboardInterrupt:
         raise RunError(
-            f"interrupted; the finished runs are kept: go on with --out {prepared.out} "
-            "--resume"
+            f"interrupted; {prepared.done} of {prepared.runs} runs are kept: go on "
+            f"with --out {prepared.out} --resume"
         ) from None
+    except (RuntimeError, OSError) as error:
+        raise RunError(str(error)) from error
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:
-        print(compare_text(summary, comparisons))
+        print(compare_text(summary, comparisons, pooled))
         print(f"\nresults in {prepared.out}")
+
+
+def _design(options: argparse.Namespace) -> None:
+    from analysis.design_study import STUDY_RUNS, study_design
+    from analysis.design_text import design_summary, design_text, write_design
+    from analysis.result_directory import choose_directory, whole_directory
+    from diagrams import load_scenario
+
+    with ExitStack() as stack:
+        try:
+            out = choose_directory(options.out)
+            scenario = load_scenario(options.scenario, _overrides(options))
+            directory = stack.enter_context(whole_directory(out))
+            with _Progress(STUDY_RUNS, "runs") as progress:
+                study = study_design(scenario, progress=progress)
+        except ValueError as error:
+            raise InputError.from_error(error) from None
+        except SystemExit as error:
+            raise RunError("Drake ended the design; its message is above") from error
+        summary = design_summary(study, out)
+        write_design(study, summary, directory)
+    if options.json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(design_text(study))
+        print(f"\nresults in {out}")
 
 
 if __name__ == "__main__":

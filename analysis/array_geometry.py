@@ -19,6 +19,8 @@ __all__ = ["ArrayGeometry", "load_geometry"]
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
 
+_LEAST_BAND_HZ = 500.0
+
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
@@ -33,7 +35,7 @@ class ArrayGeometry(Parameters):
     """Places (x, y) or (x, y, z) in the order of the channels, m."""
     channels: _Channels | None = None
     """Columns of the file to use, from 0; none: the first ones."""
-    sound_speed: Positive | None = None
+    sound_speed: float | None = Field(default=None, ge=100.0, le=8000.0)
     """Speed of sound, m/s; none: 340, or from the temperature."""
     temperature_c: float | None = Field(default=None, ge=-50.0, le=60.0)
     """Temperature, deg C."""
@@ -57,6 +59,11 @@ class ArrayGeometry(Parameters):
             )
         if self.band is not None and self.band[0] >= self.band[1]:
             raise ValueError("band: must rise, as [300, 8000]")
+        if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
+            raise ValueError(
+                f"band: {list(self.band)} is too narrow to tell delays; give at least "
+                f"{_LEAST_BAND_HZ:g} Hz"
+            )
         aperture = ArrayShape.of(self.microphones).aperture_m
         if aperture > _LARGEST_M:
             raise ValueError(
@@ -119,6 +126,10 @@ def _first_error(error: ValidationError) -> str:
     # Members of a union stand in the path, too, by names with brackets.
     where = ".".join(str(part) for part in first["loc"] if "[" not in str(part))
     message = first["msg"].removeprefix("Value error, ")
+    if first["type"] in {"tuple_type", "too_short", "too_long"}:
+        message = f"is {first['input']}; give [x, y] or [x, y, z] of each microphone"
+        if first["loc"][0] != "microphones":
+            message = f"is {first['input']}; give a list, as in the documentation"
     if first["type"] == "extra_forbidden":
         message = "unknown key; remove it"
     return f"{where}: {message}" if where else message

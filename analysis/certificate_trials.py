@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 from analysis.energy_certificate import EnergyCertificate
 from analysis.point_mass import PointMassRuns
 
-__all__ = ["CertificateTrials", "draw_starts", "try_certificate"]
+__all__ = ["BATCH", "CertificateTrials", "draw_starts", "try_certificate"]
 
-#: Starts drawn at a time, and batches at most: where hardly any start lies
-#: outside, not all that were asked for are found.
-_BATCH, _MOST_BATCHES = 20_000, 100
+#: Starts drawn at a time: the first batch depends on the seed alone.
+BATCH = 20_000
+#: Batches at most: where hardly any start lies outside, not all that were asked
+#: for are found.
+_MOST_BATCHES = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +128,7 @@ def try_certificate(
     outside: list[NDArray[np.float64]] = []
     drawn = certified = by_energy = 0
     for _ in range(_MOST_BATCHES):
-        states = draw_starts(certificate, _BATCH, rng)
+        states = draw_starts(certificate, BATCH, rng)
         safe = certificate.certified(states)
         drawn, certified = drawn + len(states), certified + int(safe.sum())
         by_energy += int(certificate.certified(states, clamp=False).sum())

@@ -12,7 +12,7 @@ from typing import Any
 from pydantic import ValidationError
 
 import diagrams
-from analysis.comparison import Comparison, compare_runs
+from analysis.comparison import Comparison, Pair, compare_runs, pooled_pairs
 from analysis.result_directory import choose_directory
 from analysis.sweep import PreparedSweep, prepare_sweep
 from analysis.sweep_plan import SweepPlan, load_sweep
@@ -53,15 +53,23 @@ class PreparedComparison:
         """Runs of all experiments and laws together."""
         return sum(len(sweep.points) for sweep in self.sweeps.values())
 
+    @property
+    def done(self) -> int:
+        """Those of them that are done."""
+        return sum(len(sweep.store.done) for sweep in self.sweeps.values())
+
     def run(
         self, progress: Callable[[int], None] | None = None
-    ) -> dict[str, Comparison]:
-        """Does the runs and summarises each experiment.
+    ) -> tuple[dict[str, Comparison], list[Pair]]:
+        """Does the runs and summarises each scenario.
 
         Args:
             progress: Called a few times a second with the number of runs done.
+
+        Returns:
+            Comparisons by name of the scenario, and the pairs of all together.
         """
-        comparisons, before = {}, 0
+        comparisons, tables, before = {}, [], 0
 
         def report(before: int, done: int) -> None:
             if progress is not None:
@@ -70,8 +78,9 @@ class PreparedComparison:
         for name, sweep in self.sweeps.items():
             table = sweep.run(partial(report, before))
             comparisons[name] = compare_runs(sweep.plan, table, name)
+            tables.append((sweep.plan, table))
             before += len(sweep.points)
-        return comparisons
+        return comparisons, pooled_pairs(tables)
 
 
 def library_layouts() -> dict[str, Path]:

@@ -8,8 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator
 
-from analysis.comparison import Cell, Comparison, Estimate
+from analysis.comparison import Comparison
+from analysis.comparison_cells import Cell, Estimate
 from analysis.scene import COLOURS, bounds
 from analysis.trajectory_artists import (
     draw_collision,
@@ -76,6 +78,7 @@ def _median_panel(axes: Axes, cells: Sequence[Cell], name: str) -> None:
         if median is not None:
             axes.plot([median.low, median.high], [place, place], "k-")
             axes.plot(median.median, place, "o", color=COLOURS["robot"])
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4))
     _label_laws(axes, cells)
 
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from analysis.compare import PreparedComparison
-from analysis.comparison import Cell, Comparison, Estimate, Median, Pair
+from analysis.comparison import Comparison, Pair
+from analysis.comparison_cells import Cell, Estimate, Median
 from analysis.run_report import versions
 from diagrams import RunResult, dump_scenario, simulate
 
@@ -31,7 +32,9 @@ _PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
 
 
 def compare_summary(
-    prepared: PreparedComparison, comparisons: dict[str, Comparison]
+    prepared: PreparedComparison,
+    comparisons: dict[str, Comparison],
+    pooled: Sequence[Pair],
 ) -> dict[str, Any]:
     """The JSON document of a comparison."""
     plan = next(iter(prepared.sweeps.values())).plan
@@ -54,6 +57,7 @@ def compare_summary(
         "seed": plan.seed,
         "cells": cells,
         "pairs": pairs,
+        "pooled": [asdict(pair) for pair in pooled],
         "versions": versions(),
         "out": str(prepared.out),
     }
@@ -115,7 +119,11 @@ def _command(out: Path, cell: Cell, kind: str) -> str:
     return shlex.join(["phonotaxis", "simulate", file])
 
 
-def compare_text(summary: dict[str, Any], comparisons: dict[str, Comparison]) -> str:
+def compare_text(
+    summary: dict[str, Any],
+    comparisons: dict[str, Comparison],
+    pooled: Sequence[Pair],
+) -> str:
     """Tables for a terminal."""
     lines = [
         f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
@@ -125,6 +133,8 @@ def compare_text(summary: dict[str, Any], comparisons: dict[str, Comparison]) ->
     for name, comparison in comparisons.items():
         lines += ["", name, *_cell_lines(comparison.cells)]
         lines += ["", *(line for pair in comparison.pairs for line in _pair_line(pair))]
+    if len(comparisons) > 1:
+        lines += ["", "all together", *(line for p in pooled for line in _pair_line(p))]
     lines += ["", "Runs to look at:"]
     for cell in summary["cells"]:
         lines += [
@@ -145,8 +155,13 @@ def _cell_lines(cells: list[Cell]) -> Iterator[str]:
             row += f"{_median(cell.metrics.get(metric), factor, form):>21}"
         yield row
     for cell in cells:
-        causes = ", ".join(f"{cause} {n}" for cause, n in cell.causes.items())
-        yield f"  {cell.label}: {causes}"
+        yield f"  {cell.label}: {_counts(cell.causes)}"
+        if cell.mechanisms:
+            yield f"      failures: {_counts(cell.mechanisms)}"
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
 def _rate(rate: Estimate) -> str:

@@ -6,120 +6,31 @@ differ in nothing but the law.
 
 from __future__ import annotations
 
-import json
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any, Literal
-from zlib import crc32
+from typing import Any
 
-import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
-from analysis.intervals import Interval, bootstrap_interval, wilson_interval
+from analysis.comparison_cells import Cell, make_cell
 from analysis.paired_statistics import (
     PairedMedian,
     PairedRate,
     paired_median,
     paired_rate,
 )
+from analysis.run_table import (
+    ALL_RUNS,
+    SUCCESSES,
+    collisions,
+    figure,
+    stream,
+    successes,
+)
 from analysis.sweep_plan import SweepPlan
 
-__all__ = [
-    "ALL_RUNS",
-    "SUCCESSES",
-    "Cell",
-    "Comparison",
-    "Estimate",
-    "ExampleRun",
-    "Median",
-    "Pair",
-    "compare_runs",
-]
-
-ExampleKind = Literal["worst", "typical", "best"]
-EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
-#: Causes of a run that did what it should.
-SUCCESSFUL = ("reached", "completed")
-#: Figures that any run has, however it ended.
-ALL_RUNS = (
-    "minimum_clearance_m",
-    "minimum_obstacle_clearance_m",
-    "minimum_time_to_contact_s",
-    "reaction_distance_m",
-)
-#: Figures that a collision or a jam would cut short: of successful runs alone.
-SUCCESSES = (
-    "time_to_goal_s",
-    "path_length_m",
-    "following_fraction",
-    "following_error_rms_m",
-    "following_error_p95_m",
-    "jerk_rms_m_s3",
-    "jerk_max_m_s3",
-    "angular_jerk_rms_rad_s3",
-    "sparc",
-    "ldlj",
-    "turn_reversals_per_s",
-    "heading_change_rad_m",
-    "control_effort_rms_n",
-    "wheel_variation_m_s2",
-    "saturated_fraction",
-)
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """A rate or a mean with its interval."""
-
-    estimate: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class Median:
-    """A median with its interval, over the runs that have the figure."""
-
-    median: float
-    low: float
-    high: float
-    runs: int
-
-
-@dataclass(frozen=True)
-class ExampleRun:
-    """A run to look at."""
-
-    kind: ExampleKind
-    """Its place among the cell's runs, ordered by success, then by clearance."""
-    index: int
-    """Its number in the sweep."""
-    cause: str
-
-
-@dataclass(frozen=True)
-class Cell:
-    """All runs of one law on one experiment's layouts."""
-
-    scenario: str
-    law: str
-    fields: dict[str, Any]
-    """Further fields of the grid, with their values."""
-    runs: int
-    causes: dict[str, int]
-    """How many runs ended so; collisions with whose fault it was in brackets."""
-    success: Estimate
-    collision: Estimate
-    spl: Estimate | None
-    """Success weighted by path length; none where the source moves."""
-    metrics: dict[str, Median]
-    examples: tuple[ExampleRun, ...]
-
-    @property
-    def label(self) -> str:
-        """The law, and what else sets the cell apart."""
-        return ", ".join([self.law, *(str(v) for v in self.fields.values())])
+__all__ = ["Comparison", "Pair", "compare_runs", "pooled_pairs"]
 
 
 @dataclass(frozen=True)
@@ -157,119 +68,83 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
         table: Its results; see ``analysis.sweep_store.load_results``.
         scenario: Name of the experiment.
     """
-    grid = plan.cells()
-    runs = [table[table["cell"] == k].sort_values("run") for k in range(len(grid))]
     cells = [
-        _cell(scenario, fields, rows, plan.seed)
-        for fields, rows in zip(grid, runs, strict=True)
+        make_cell(scenario, fields, rows, plan.seed)
+        for fields, rows in zip(plan.cells(), _runs(plan, table), strict=True)
     ]
-    pairs = []
-    for one, other in combinations(range(len(grid)), 2):
-        apart = [key for key in grid[one] if grid[one][key] != grid[other][key]]
-        if len(apart) == 1:
-            common = {k: v for k, v in grid[one].items() if k != apart[0]}
-            values = grid[one][apart[0]], grid[other][apart[0]]
-            rates, medians = _compare(runs[one], runs[other], plan.seed)
-            pairs.append(Pair(scenario, apart[0], *values, common, *rates, medians))
+    pairs = [
+        _pair(scenario, neighbours, plan.seed)
+        for neighbours in _neighbours(plan, table)
+    ]
     return Comparison(cells, pairs)
 
 
-def _cell(scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int) -> Cell:
-    others = {key: value for key, value in fields.items() if key != "law"}
-    success, collision = _success(rows), _collision(rows)
-    spl = _column(rows, "spl")
+def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
+    """Pairs that differ in one field, over all experiments and other fields."""
+    groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
+    for plan, table in sweeps:
+        for one in _neighbours(plan, table):
+            key = (one.field, str(one.first), str(one.second))
+            groups.setdefault(key, []).append(one)
+    seed = sweeps[0][0].seed
+    return [_pair("all", _joined(group), seed) for group in groups.values()]
+
+
+@dataclass(frozen=True)
+class _Neighbours:
+    """Runs of two cells that differ in one field, layout by layout."""
+
+    field: str
+    first: Any
+    second: Any
+    fields: dict[str, Any]
+    first_rows: pd.DataFrame
+    second_rows: pd.DataFrame
+
+
+def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
+    """Each cell's rows in the order of the layouts."""
+    count = len(plan.cells())
+    return [table[table["cell"] == k].sort_values("run") for k in range(count)]
+
+
+def _neighbours(plan: SweepPlan, table: pd.DataFrame) -> Iterator[_Neighbours]:
+    rows = list(zip(plan.cells(), _runs(plan, table), strict=True))
+    for (one, ones), (other, others) in combinations(rows, 2):
+        apart = [key for key in one if one[key] != other[key]]
+        if len(apart) == 1:
+            field = apart[0]
+            common = {key: value for key, value in one.items() if key != field}
+            yield _Neighbours(field, one[field], other[field], common, ones, others)
+
+
+def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
+    return replace(
+        group[0],
+        fields={},
+        first_rows=pd.concat([one.first_rows for one in group]),
+        second_rows=pd.concat([one.second_rows for one in group]),
+    )
+
+
+def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
+    first, second = runs.first_rows, runs.second_rows
+    both = successes(first) & successes(second)
     metrics = {}
     for name in (*ALL_RUNS, *SUCCESSES):
-        values = _column(rows, name)
-        if name in SUCCESSES:
-            values = values[success]
-        values = values[np.isfinite(values)]
-        if len(values):
-            interval = bootstrap_interval(values, seed=_stream(seed, name))
-            metrics[name] = Median(float(np.median(values)), *interval, len(values))
-    return Cell(
-        scenario=scenario,
-        law=str(fields["law"]),
-        fields=others,
-        runs=len(rows),
-        causes=_causes(rows),
-        success=_rate(success),
-        collision=_rate(collision),
-        spl=_mean(spl[np.isfinite(spl)], _stream(seed, "spl")),
-        metrics=metrics,
-        examples=_examples(rows, success),
-    )
-
-
-def _compare(
-    first: pd.DataFrame, second: pd.DataFrame, seed: int
-) -> tuple[tuple[PairedRate, PairedRate], dict[str, PairedMedian]]:
-    rates = (
-        paired_rate(_success(first), _success(second)),
-        paired_rate(_collision(first), _collision(second)),
-    )
-    both = _success(first) & _success(second)
-    medians = {}
-    for name in (*ALL_RUNS, *SUCCESSES):
-        one, other = _column(first, name), _column(second, name)
+        one, other = figure(first, name), figure(second, name)
         if name in SUCCESSES:
             one, other = one[both], other[both]
-        medians[name] = paired_median(one, other, seed=_stream(seed, name))
-    return rates, {name: m for name, m in medians.items() if m.pairs}
-
-
-def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:
-    """First, middle and last of the runs by success, then by clearance."""
-    clearance = _column(rows, "minimum_clearance_m")
-    order = np.lexsort((clearance, success))
-    # A run that raised an error has no clearance, and nothing to look at.
-    order = order[np.isfinite(clearance[order])]
-    if len(order) == 0:
-        return ()
-    return tuple(
-        ExampleRun(kind, int(rows["index"].iloc[k]), str(rows["cause"].iloc[k]))
-        for kind, k in zip(
-            EXAMPLES, (order[0], order[len(order) // 2], order[-1]), strict=True
-        )
+        median = paired_median(one, other, seed=stream(seed, name))
+        if median.pairs:
+            metrics[name] = median
+    return Pair(
+        scenario=scenario,
+        field=runs.field,
+        first=runs.first,
+        second=runs.second,
+        fields=runs.fields,
+        success=paired_rate(successes(first), successes(second)),
+        collision=paired_rate(collisions(first), collisions(second)),
+        metrics=metrics,
     )
-
-
-def _success(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    return rows["cause"].isin(SUCCESSFUL).to_numpy()
-
-
-def _collision(rows: pd.DataFrame) -> NDArray[np.bool_]:
-    return (rows["cause"] == "collision").to_numpy()
-
-
-def _causes(rows: pd.DataFrame) -> dict[str, int]:
-    fault = rows["collision_fault"]
-    names = rows["cause"].where(
-        rows["cause"] != "collision", "collision (" + fault.astype(str) + ")"
-    )
-    counts = names.value_counts()
-    return {str(name): int(count) for name, count in sorted(counts.items())}
-
-
-def _column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    """The figure of each run; NaN where it has none."""
-    if name not in rows:
-        return np.full(len(rows), np.nan)
-    return rows[name].to_numpy(dtype=float)
-
-
-def _rate(flags: NDArray[np.bool_]) -> Estimate:
-    interval = wilson_interval(int(np.sum(flags)), len(flags))
-    return Estimate(float(np.mean(flags)), *interval)
-
-
-def _mean(values: NDArray[np.float64], seed: int) -> Estimate | None:
-    if len(values) == 0:
-        return None
-    interval: Interval = bootstrap_interval(values, np.mean, seed=seed)
-    return Estimate(float(np.mean(values)), *interval)
-
-
-def _stream(seed: int, name: str) -> int:
-    """Seed of a figure's own bootstrap."""
-    return crc32(json.dumps([seed, name]).encode())

@@ -139,6 +139,7 @@ def contact_matrix(
     damping_n_s_m: float | None = None,
     motor_lag_s: float | None = None,
     latency_ticks: int = 0,
+    approach_damping_n_s_m: float = 0.0,
     period_s: float = FRAME_PERIOD_S,
 ) -> NDArray[np.float64]:
     """One-period matrix of the radial motion before an obstacle.
@@ -150,15 +151,26 @@ def contact_matrix(
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
         latency_ticks: Age of the position that the springs act on; 0 in the
             builds, where an echo drives the wheels at once.
+        approach_damping_n_s_m: Slope of a law in the obstacle's speed, which is
+            the change of that position over a tick, N s/m. For the half of an
+            oscillation in which the obstacle comes nearer.
         period_s: In place of the 25 ms tick, s.
     """
     damping = damping_n_s_m
     if damping is None:
         damping = scenario.attraction.damping_n_s_m
     chain = motion_chain(scenario, motor_lag_s=motor_lag_s, period_s=period_s)
-    chain = delayed_output(chain, "p_WP", latency_ticks)
+    now = delayed_output(chain, "p_WP", latency_ticks)
     law = np.array([[-stiffness_n_m, -damping]]) / scenario.robot.mass_kg
-    return chain.A + chain.B @ law @ chain.C
+    if approach_damping_n_s_m == 0.0:
+        return now.A + now.B @ law @ now.C
+    before = delayed_output(chain, "p_WP", latency_ticks + 1)
+    # The longer chain holds the shorter one's position too, one place earlier.
+    speed = approach_damping_n_s_m / period_s / scenario.robot.mass_kg
+    position = np.hstack([now.C[0], [0.0]])
+    row = law[0, 0] * position + law[0, 1] * before.C[1]
+    row = row - speed * (position - before.C[0])
+    return before.A + before.B @ row[None]
 
 
 def contact_spectral_radius(

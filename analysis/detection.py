@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from analysis.free_field import Loudspeaker
 from systems.array_shape import ArrayShape
-from systems.delays import look
 from systems.localise import HearingMemory, Localiser, TDOAParameters
 from systems.mic_array import FRAME_SAMPLES
 from systems.noise import tick_generator
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["DetectionPoint", "detection_curve", "noise_chances"]
+__all__ = ["DetectionPoint", "FalseAlarms", "detection_curve", "false_alarms"]
 
 #: Frames of noise alone before a sound, which tell its level.
 _NOISE_FRAMES = 8
@@ -41,24 +40,48 @@ class DetectionPoint:
     standard deviations."""
 
 
-def noise_chances(
-    frames: int, *, shape: ArrayShape, c: float, seed: int
-) -> NDArray[np.float64]:
-    """(frames,) what the search makes of white noise.
+@dataclass(frozen=True)
+class FalseAlarms:
+    """Frames of noise in which a sound was heard, at one rate."""
 
-    Each is the probability that noise has peaks as high: a false alarm of every
-    rate above it.
+    rate: float
+    """``TDOAParameters.false_alarm_rate``."""
+    frames: int
+    count: int
+
+
+def false_alarms(
+    rates: Sequence[float], frames: int, *, shape: ArrayShape, c: float, seed: int
+) -> list[FalseAlarms]:
+    """How often white noise is taken for a sound.
+
+    Whether such a sound is located as well, which is far rarer, does not count.
+
+    Args:
+        rates: To set.
+        frames: Successive frames of noise, the same for every rate.
+        shape: The microphones, in the plane.
+        c: Speed of sound, m/s.
+        seed: Of the noise.
     """
-    plan = Localiser.of(TDOAParameters(), shape, c).plan
-    chances = []
+    localisers = [
+        Localiser.of(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
+    ]
+    memories = [localiser.blank() for localiser in localisers]
+    counts = [0] * len(rates)
     for tick in range(frames):
         noise = tick_generator(seed, tick).standard_normal(
             (shape.count, FRAME_SAMPLES), dtype=np.float32
         )
-        seen = look(noise, plan)
-        assert seen is not None
-        chances.append(seen[0].chance)
-    return np.array(chances)
+        for k, localiser in enumerate(localisers):
+            _, after = localiser.localise(noise, memories[k])
+            # What is heard says nothing about the noise.
+            counts[k] += after.energy == memories[k].energy
+            memories[k] = after
+    return [
+        FalseAlarms(rate, frames, count)
+        for rate, count in zip(rates, counts, strict=True)
+    ]
 
 
 def detection_curve(

@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 
-from analysis.certificate_trials import draw_starts
+from analysis.certificate_trials import BATCH, draw_starts
 from analysis.energy_certificate import EnergyCertificate
+from analysis.ideal_loop import frozen_scenario
+from analysis.intervals import Interval, wilson_interval
 from analysis.scene import touching_point
 from diagrams import (
     Scenario,
@@ -31,9 +32,6 @@ from systems.geometry import control_point, rectangle_clearance, rotate
 from systems.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 
 __all__ = ["DiagramTrials", "try_diagram"]
-
-#: Starts drawn at a time.
-_BATCH = 2000
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +53,9 @@ class DiagramTrials:
         return self.causes.count("collision")
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Wilson's 95 % interval of the collision rate."""
-        result = binomtest(self.collisions, len(self.causes))
-        low, high = result.proportion_ci(method="wilson")
-        return float(low), float(high)
+    def interval(self) -> Interval:
+        """Of the collision rate, 95 %."""
+        return wilson_interval(self.collisions, len(self.causes))
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
@@ -87,7 +83,8 @@ def try_diagram(
 ) -> DiagramTrials:
     """Runs the scenario's diagram from random certified starts.
 
-    The same random starts as of ``try_certificate``, less those at which the
+    Source and obstacles rest where they are at 0 s, as in the certificate. The
+    same random starts as of ``try_certificate``, less those at which the
     rectangle stands on a body.
 
     Args:
@@ -102,7 +99,8 @@ def try_diagram(
     """
     if starts < 1:
         raise ValueError(f"starts: {starts} must be at least 1")
-    scenario = certificate.scenario.model_copy(update={"hearing": hearing})
+    scenario = frozen_scenario(certificate.scenario)
+    scenario = scenario.model_copy(update={"hearing": hearing})
     follower = build_sound_follower(scenario)
     states, poses, skipped = _certified_starts(certificate, scenario, starts)
     causes, mechanisms = [], []
@@ -120,7 +118,7 @@ def _certified_starts(
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
     """(n, 4) starts, (n, 3) poses, and how many were skipped."""
     rng = np.random.default_rng(scenario.seed)
-    states = draw_starts(certificate, _BATCH, rng)
+    states = draw_starts(certificate, BATCH, rng)
     states = states[certificate.certified(states)]
     bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
     kept, poses, skipped = [], [], 0
@@ -136,7 +134,7 @@ def _certified_starts(
             break
     if len(kept) < count:
         raise ValueError(
-            f"starts: only {len(kept)} of {_BATCH} random starts are certified and "
+            f"starts: only {len(kept)} of {BATCH} random starts are certified and "
             f"clear of all bodies; ask for fewer than {count}"
         )
     return np.array(kept), np.array(poses), skipped
@@ -181,7 +179,7 @@ def _run(
 def _mechanism(
     scenario: Scenario, pose: NDArray[np.float64], collision: Collision
 ) -> str:
-    """Where the contact lies as seen from P: in the cones' fan, beside, behind."""
+    """Where the contact lies: in the cones' fan before P, beside it, or behind."""
     body = scenario.bodies()[collision.object].rectangle(collision.time)
     point = touching_point(robot_rectangle(pose, scenario.robot), body)
     p_WP = control_point(pose, scenario.robot.control_point_m)
@@ -190,4 +188,6 @@ def _mechanism(
     fan += scenario.ultrasonic.beam_half_angle_deg
     if abs(math.degrees(math.atan2(y, x))) <= fan:
         return "ahead"
-    return "beside" if x > -0.5 * scenario.robot.length_m else "behind"
+    x_B = x + scenario.robot.control_point_m
+    at_an_end = abs(y) / scenario.robot.width_m >= -x_B / scenario.robot.length_m
+    return "beside" if at_an_end else "behind"

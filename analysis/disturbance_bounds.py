@@ -297,7 +297,7 @@ def encounter_contact_time(
         nearest = np.sign(gap) * np.maximum(np.abs(gap) - 0.5 * _SIDE_M, 0.0)
         c = np.hypot(*nearest.T)
         times = np.where((c <= contact_m) & np.isinf(times), k * _STEP_S, times)
-        f = np.interp(c, model.law.distances_m, model.law.forces_n, right=0.0)
+        f = model.law.at_rest(c)
         away = -nearest / np.maximum(c, 1e-9)[:, None]
         to_S = p_S - p
         r = np.maximum(np.hypot(*to_S.T), 1e-9)

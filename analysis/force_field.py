@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.autodiff import seed, value_and_gradient
 from analysis.ideal_loop import IdealLoop
+from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["ForceField"]
 
@@ -60,6 +61,17 @@ class ForceField:
         forces = self._forces(seed(p_WP), twin=True)
         return value_and_gradient(forces[:2] + forces[2:], 2)
 
+    def damping(self, p_WP: ArrayLike) -> float:
+        """Minus the force's slope in the virtual mass's own speed, N s/m."""
+        self._forces(np.asarray(p_WP, dtype=float), twin=True)
+        block, context = self._controller(twin=True)
+        port = block.GetInputPort("v_WP")
+        port.FixValue(context, seed([0.0, 0.0]))
+        forces = block.GetOutputPort("forces_W").Eval(context)
+        port.FixValue(context, np.zeros(2))
+        _, slope = value_and_gradient(forces[:2] + forces[2:], 2)
+        return -float(slope[0, 0])
+
     @cached_property
     def reach_m(self) -> float:
         """Beyond this distance no body is seen, m."""
@@ -79,6 +91,27 @@ class ForceField:
                 port.FixValue(context, [c, 0.0, 0.0, 0.0, 0.0, 0.0])
                 forces[k] = -read.Eval(context)[2]
         return forces
+
+    def approach_damping(self, distance: float, speed: float = 1e-4) -> float:
+        """Slope of the push in the speed of an obstacle that comes nearer, N s/m.
+
+        Args:
+            distance: Of the obstacle, m.
+            speed: Its speed for the difference, m/s.
+        """
+        block, context = self._controller(twin=False)
+        self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
+        port = block.GetInputPort("collision_vectors_B")
+        port.FixValue(context, [distance, 0.0, 0.0, 0.0, 0.0, 0.0])
+        state = context.get_discrete_state(0).CopyToVector()
+        pushes = []
+        for earlier in (distance, distance + speed * FRAME_PERIOD_S):
+            seen = np.zeros(len(state))
+            seen[:2] = 1.0, earlier
+            context.SetDiscreteState(0, seen)
+            pushes.append(-block.GetOutputPort("forces_W").Eval(context)[2])
+        context.SetDiscreteState(0, state)
+        return float(pushes[1] - pushes[0]) / speed
 
     def _controller(self, *, twin: bool) -> tuple[Any, Any]:
         block, made = self.loop.block("controller", twin=twin), ("controller", twin)

@@ -37,25 +37,30 @@ class HeadOn:
 
     @property
     def equilibrium_m(self) -> float:
-        """The farthest equilibrium, at which an approach is held up, m.
+        """Where an approach is held up: the farthest stable equilibrium, m.
 
         Raises:
             ValueError: There is none: the attraction overcomes the obstacle.
         """
-        if not self.equilibria_m:
+        held = [c for c in self.equilibria_m if self.slope(c) < 0.0]
+        if not held:
             raise ValueError(
                 f"law: {self.law.name!r} does not hold P before an obstacle with "
                 f"{self.to_go_m:.2f} m to go behind it; lower "
                 "attraction.stiffness_n_m, raise the law's stiffness, or bring the "
                 "source nearer"
             )
-        return self.equilibria_m[0]
+        return held[0]
 
     @property
     def stiffness_n_m(self) -> float:
         """K_r - df/dc at the equilibrium, N/m."""
-        slope, _ = self.law.gradient(self.equilibrium_m, 0.0)
-        return self.scenario.attraction.stiffness_n_m - slope
+        return -self.slope(self.equilibrium_m)
+
+    def slope(self, c: float) -> float:
+        """df/dc - K_r at a distance and at rest, N/m; negative: P is pushed back."""
+        slope, _ = self.law.gradient(c, 0.0)
+        return slope - self.scenario.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
         """f(c, s) - K_r (L + c), N: what moves P away from the face."""

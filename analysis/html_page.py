@@ -21,6 +21,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
 __all__ = [
+    "ZERO",
     "Cell",
     "bullets",
     "definitions",
@@ -39,6 +40,9 @@ _CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
 
 #: Text, or a number; none is a dash.
 Cell = str | complex | None
+
+#: Stands for a zero among numbers, so that the others are seen.
+ZERO = "\u00b7"
 
 #: Cells that are coloured, by their text.
 _VERDICT_CLASSES = {
@@ -114,6 +118,8 @@ def _row(cells: Sequence[Cell], columns: int) -> str:
 def _cell(value: Cell) -> str:
     if not isinstance(value, str):
         return f'<td class="number">{number(value)}</td>'
+    if value == ZERO:
+        return f'<td class="number">{ZERO}</td>'
     kind = _VERDICT_CLASSES.get(value.lower())
     opening = f'<td class="{kind}">' if kind else "<td>"
     return f"{opening}{_inline(value)}</td>"

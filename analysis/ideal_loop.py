@@ -34,6 +34,7 @@ __all__ = [
     "IdealLoop",
     "PeriodDerivatives",
     "Port",
+    "Runner",
     "frozen_scenario",
     "ideal_loop",
     "ideal_scenario",
@@ -164,10 +165,36 @@ class IdealLoop:
                 "TemplateSystem of float and AutoDiffXd"
             )
         self.twin: Any = twin
+        self._try_law()
         self.state_names: tuple[str, ...] = state_names(self.follower)
         self.sampled_twins: dict[str, Any] = {}
         """Continuous blocks as maps of one period, see ``analysis.block_models``."""
         self._simulators: dict[Any, Any] = {}
+
+    def _try_law(self) -> None:
+        """Lets a law that is a user's own meet a variable before all else does."""
+        if ":" not in self.scenario.law:
+            return
+        block = self.block("controller", twin=True)
+        context = block.CreateDefaultContext()
+        for name, value in (
+            ("p_WS_estimated", [2.0, 0.0]),
+            ("target_valid", [1.0]),
+            ("collision_vectors_B", [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),
+            ("features", [1.0, 0.0, 0.0]),
+            ("pose_WB_estimated", [0.0, 0.0, 0.0]),
+            ("v_WP", [0.0, 0.0]),
+        ):
+            port = block.GetInputPort(name)
+            port.FixValue(context, seed(value))
+        try:
+            block.GetOutputPort("acceleration_W").Eval(context)
+        except Exception as error:  # whatever a user's function raises
+            raise ValueError(
+                f"law: {self.scenario.law!r} cannot be differentiated "
+                f"({type(error).__name__}: {error}); write it with pydrake.math "
+                "(exp, sqrt, ...) in the place of math and numpy"
+            ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
         """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd."""
@@ -207,7 +234,7 @@ class IdealLoop:
         simulator = self._simulator(frozenset(fixed), twin=False)
         context = simulator.get_mutable_context()
         for port, value in fixed.items():
-            self._fix(context, port, np.asarray(value, dtype=float), twin=False)
+            self.fix(context, port, np.asarray(value, dtype=float))
         _run(simulator, state, time_s, periods)
         return _get_state(context)
 
@@ -238,7 +265,7 @@ class IdealLoop:
         for group, value in zip(inputs, values, strict=True):
             for port in group:
                 part = seeded[start : start + len(value)]
-                self._fix(context, port, part, twin=True)
+                self.fix(context, port, part, twin=True)
             start += len(value)
         context.SetTime(time_s)
         _set_state(context, seeded[:count])
@@ -255,6 +282,20 @@ class IdealLoop:
             y=y,
             C=by_all[:, :count],
             D=by_all[:, count:],
+        )
+
+    def runner(
+        self, state: NDArray[np.float64], time_s: float, fixed: Sequence[Port] = ()
+    ) -> Runner:
+        """A run of the float diagram from a state, to be stopped at any moment.
+
+        Args:
+            state: (n,) just before the updates of the tick at ``time_s``.
+            time_s: A multiple of the period, s.
+            fixed: Input ports that are cut off, and fed by ``Runner.fix``.
+        """
+        return Runner(
+            self, self._simulator(frozenset(fixed), twin=False), state, time_s
         )
 
     def settled_state(
@@ -312,7 +353,8 @@ class IdealLoop:
             self._simulators[key] = simulator
         return self._simulators[key]
 
-    def _fix(self, context: Any, port: Port, value: Any, *, twin: bool) -> None:
+    def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
+        """Cuts an input port off from its source and sets what it reads."""
         role, name = port
         block = self.block(role, twin=twin)
         own = block.GetMyMutableContextFromRoot(context)
@@ -322,6 +364,39 @@ class IdealLoop:
         role, name = port
         block = self.block(role, twin=True)
         return block.GetOutputPort(name).Eval(block.GetMyContextFromRoot(context))
+
+
+class Runner:
+    """A simulation whose state and cut inputs can be changed between steps.
+
+    It shares its context with other uses of the same loop: finish one first.
+    """
+
+    def __init__(
+        self, loop: IdealLoop, simulator: Any, state: NDArray[np.float64], time_s: float
+    ) -> None:
+        self._loop, self._simulator = loop, simulator
+        self._context = simulator.get_mutable_context()
+        _begin(simulator, state, time_s)
+
+    def fix(self, port: Port, value: NDArray[np.float64]) -> None:
+        """What a cut input reads from now on."""
+        self._loop.fix(self._context, port, value)
+
+    def advance(self, time_s: float) -> None:
+        """Simulates until then; a tick at that moment is still to come."""
+        if time_s > self._context.get_time():
+            self._simulator.AdvanceTo(time_s)
+
+    def state(self) -> NDArray[np.float64]:
+        """(n,) now."""
+        return np.asarray(_get_state(self._context), dtype=float)
+
+    def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
+        """Replaces elements of the state."""
+        state = self.state()
+        state[list(indices)] = values
+        _set_state(self._context, state)
 
 
 @lru_cache(maxsize=64)
@@ -342,13 +417,18 @@ def ideal_loop(scenario: Scenario) -> IdealLoop:
 
 
 def _run(simulator: Any, state: Any, time_s: float, periods: int) -> None:
+    _begin(simulator, state, time_s)
+    # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
+    simulator.AdvanceTo((round(time_s / FRAME_PERIOD_S) + periods) * FRAME_PERIOD_S)
+
+
+def _begin(simulator: Any, state: Any, time_s: float) -> None:
     context = simulator.get_mutable_context()
-    context.SetTime(time_s)
+    context.SetTime(round(time_s / FRAME_PERIOD_S) * FRAME_PERIOD_S)
     _set_state(context, state)
     quiet = InitializeParams()
     quiet.suppress_initialization_events = True
     simulator.Initialize(quiet)
-    simulator.AdvanceTo(time_s + periods * FRAME_PERIOD_S)
 
 
 def _set_state(context: Any, state: Any) -> None:

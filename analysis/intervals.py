@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
 
-__all__ = ["Interval", "bootstrap_interval", "wilson_interval"]
+__all__ = ["Interval", "bootstrap_interval", "median_interval", "wilson_interval"]
 
 
 class Interval(NamedTuple):
@@ -54,3 +54,20 @@ def bootstrap_interval(
     tail = 0.5 * (1.0 - confidence)
     spread = np.asarray(statistic(samples[chosen], axis=1))
     return Interval(*np.quantile(spread, [tail, 1.0 - tail]).tolist())
+
+
+def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
+    """Interval of a median from order statistics: for any distribution.
+
+    The number of samples below the true median is binomial, which gives the
+    ranks. With fewer than six samples (at 95 %) no two of them are enough:
+    the interval is then their range.
+
+    Args:
+        values: (n,) independent samples, at least one.
+        confidence: As of ``wilson_interval``, at least.
+    """
+    ordered = np.sort(np.asarray(values, dtype=float))
+    below = int(stats.binom.ppf(0.5 * (1.0 - confidence), len(ordered), 0.5))
+    rank = max(below - 1, 0)
+    return Interval(float(ordered[rank]), float(ordered[-1 - rank]))

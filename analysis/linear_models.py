@@ -15,6 +15,8 @@ __all__ = ["LinearModel", "Mode", "simple_poles"]
 
 #: Poles nearer to z = 0 than this are delays, which have no s-plane image.
 _DELAY = 1e-6
+#: Elements of the matrices that are solved at once.
+_CHUNK = 100_000
 
 
 @dataclass(frozen=True)
@@ -124,9 +126,12 @@ class LinearModel:
         """(p, m, k) complex frequency response at ``omega`` in rad/s."""
         omega = np.asarray(omega, dtype=float)
         points = np.exp(1j * omega * self.period_s) if self.period_s else 1j * omega
-        eye = np.eye(len(self.A))
-        rows = [self.C @ np.linalg.solve(z * eye - self.A, self.B) for z in points]
-        return np.stack(rows, axis=-1) + self.D[:, :, None]
+        eye, many = np.eye(len(self.A)), max(1, _CHUNK // max(len(self.A), 1) ** 2)
+        rows = [
+            self.C @ np.linalg.solve(z[:, None, None] * eye - self.A, self.B)
+            for z in np.split(points, range(many, len(points), many))
+        ]
+        return np.moveaxis(np.concatenate(rows), 0, -1) + self.D[:, :, None]
 
     def part(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
         """The same with some of its inputs and outputs."""

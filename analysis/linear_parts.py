@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from analysis.equilibria import EquilibriumSearch, find_equilibria
-from analysis.html_page import Cell, note, number, paragraph, table
+from analysis.html_page import ZERO, Cell, figure_html, note, number, paragraph, table
 from analysis.linear_models import LinearModel, Mode
 from analysis.linearisation import (
     GradientCheck,
@@ -19,13 +19,19 @@ from analysis.linearisation import (
     continuous_model,
     sampled_model,
 )
+from analysis.operating_point_plots import plot_equilibria, plot_step
 from analysis.operating_points import OperatingPoint, moving_equilibrium
 from analysis.stability import Part, Study
+from analysis.step_response import Oscillation, StepCheck, check_step
 
 __all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
 
 #: Elements of a matrix below this are printed as a dot.
 _ZERO = 1e-12
+#: Matrices of more columns are printed in small type.
+_WIDE = 8
+#: Slower modes than this are neutral, 1/s.
+_NEUTRAL_1_S = 1e-6
 #: Modes that are printed.
 _MODES = 12
 
@@ -53,13 +59,8 @@ class LinearModels:
     routes: RouteComparison
     gradient: GradientCheck
 
-    @property
-    def exported(self) -> tuple[LinearModel, ...]:
-        """Models that are written as files."""
-        return self.continuous, self.sampled, self.at.motion
 
-
-def linear_parts() -> tuple[Part, ...]:
+def linear_parts(*, full: bool) -> tuple[Part, ...]:
     """Operating points first: the report needs one to stand on."""
     return (
         Part(
@@ -76,6 +77,14 @@ def linear_parts() -> tuple[Part, ...]:
             _render_models,
             fresh=True,
             document=_models_document,
+            models=lambda data: (data.continuous, data.sampled, data.at.motion),
+        ),
+        Part(
+            "step",
+            "Prediction against simulation",
+            lambda study: check_step(study.scenario, full=full),
+            _render_step,
+            document=_step_document,
         ),
     )
 
@@ -156,6 +165,11 @@ def _render_points(data: OperatingPoints, name: str) -> list[str]:
         ),
         table(headings, rows, caption="Equilibria at rest"),
         moving,
+        figure_html(
+            plot_equilibria(data.search),
+            name,
+            "Equilibria of P over the floor, and the force on it.",
+        ),
     ]
 
 
@@ -174,7 +188,7 @@ def _point_row(point: OperatingPoint) -> list[Cell]:
 
 
 def _linear_models(study: Study) -> LinearModels:
-    points: OperatingPoints = study.found["equilibria"]
+    points: OperatingPoints = study.need("equilibria")
     at = points.at
     return LinearModels(
         at,
@@ -245,7 +259,7 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
             if getattr(continuous, matrix).any()
         ),
         _mode_table(continuous.modes, "Modes, continuous"),
-        _mode_table(data.at.modes, "Modes of P's motion, sampled, as ln(z)/T"),
+        _mode_table(data.sampled.modes, "Modes of the built diagram, as ln(z)/T"),
     ]
 
 
@@ -257,14 +271,15 @@ def matrix_table(model: LinearModel, matrix: str) -> str:
         [row, *(_element(value) for value in values)]
         for row, values in zip(rows, getattr(model, matrix), strict=True)
     ]
-    return table([matrix, *columns], body, dense=True)
+    return table([matrix, *columns], body, dense=len(columns) > _WIDE)
 
 
 def _element(value: float) -> Cell:
-    return "\u00b7" if abs(value) < _ZERO else float(np.round(value, 12))
+    return ZERO if abs(value) < _ZERO else float(np.round(value, 12))
 
 
 def _mode_table(modes: Sequence[Mode], caption: str) -> str:
+    moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
     rows: list[list[Cell]] = [
         [
             mode.eigenvalue,
@@ -275,18 +290,48 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
             mode.settling_s,
             ", ".join(f"{k} {100.0 * v:.0f} %" for k, v in top(mode.participation)),
         ]
-        for mode in modes[:_MODES]
+        for mode in moving[:_MODES]
     ]
-    left = len(modes) - len(rows)
-    more = f"; {left} faster ones left out" if left > 0 else ""
+    faster = len(moving) - len(rows)
+    left = f"; left out: {len(modes) - len(moving)} neutral"
+    left += f" and {faster} faster ones" if faster else ""
     return table(
         ["pole (1/s)", "z", "damping ratio", "rad/s", "time constant (s)",
          "to 2 % (s)", "participation"],
         rows,
-        caption=caption + more,
+        caption=caption + left,
     )  # fmt: skip
 
 
 def top(shares: dict[str, float], count: int = 3) -> list[tuple[str, float]]:
     """The largest shares."""
     return sorted(shares.items(), key=lambda item: -item[1])[:count]
+
+
+def _step_document(data: StepCheck) -> dict[str, Any]:
+    names = ("predicted", "ideal", "full", "step_m", "frequency_error", "damping_error")
+    return {"step": {name: getattr(data, name) for name in names}}
+
+
+def _render_step(data: StepCheck, name: str) -> list[str]:
+    found: list[tuple[str, Oscillation | None]] = [
+        ("predicted by the linear model", data.predicted),
+        ("simulated, exact sensors", data.ideal),
+        ("simulated, the scenario's own sensors", data.full),
+    ]
+    rows: list[list[Cell]] = [
+        [title, each.frequency_rad_s, each.damping_ratio]
+        for title, each in found
+        if each
+    ]
+    return [
+        paragraph(
+            f"P starts {data.step_m:g} m off the operating point, along the line to "
+            f"the source. Exact sensors: {100.0 * data.frequency_error:.2f} % off in "
+            f"frequency and {100.0 * data.damping_error:.2f} % in damping. The "
+            "scenario's own sensors (in a full report) differ more: echoes of cones "
+            "are not nearest points, and hearing has its noise and its silences."
+        ),
+        table(["", "rad/s", "damping ratio"], rows),
+        figure_html(plot_step(data), name, "A small step, predicted and simulated."),
+    ]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.autodiff import seed, value_and_gradient
 from analysis.block_models import join_blocks, sampled_blocks
-from analysis.ideal_loop import IdealLoop, Port
+from analysis.ideal_loop import Port
 from analysis.linear_models import LinearModel, simple_poles
 from analysis.operating_points import OperatingPoint
 from systems.signals import FRAME_PERIOD_S
@@ -27,6 +27,7 @@ __all__ = [
     "check_gradient",
     "compare_routes",
     "continuous_model",
+    "plant_derivatives",
     "sampled_model",
 ]
 
@@ -207,7 +208,9 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
         next(model for model in models if model.name == role)
         for role in ("collision", "controller", "command")
     )
-    A_plant, B_plant = _plant_derivatives(loop, point)
+    A_plant, B_plant = plant_derivatives(point)
+    moving = [0, 1, 2, 5, 6]  # the wheels' angles move nothing
+    A_plant, B_plant = A_plant[np.ix_(moving, moving)], B_plant[moving]
     seen = _signals(controller, "output", "acceleration_W")
     by = {
         name: controller.D[np.ix_(seen, _signals(controller, "input", name))]
@@ -258,10 +261,14 @@ def _signals(model: LinearModel, kind: str, port: str) -> list[int]:
     return [k for k, name in enumerate(names) if name.partition("[")[0] == port]
 
 
-def _plant_derivatives(
-    loop: IdealLoop, point: OperatingPoint
+def plant_derivatives(
+    point: OperatingPoint,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """A and B of x, y, theta and the wheel speeds; the angles move nothing."""
+    """A (7, 7) and B (7, 2) of the plant in continuous time.
+
+    They do not change along the operating point: it rests or goes straight.
+    """
+    loop = point.loop
     plant = loop.block("plant", twin=True)
     context = plant.CreateDefaultContext()
     state = point.state[loop.indices("plant")]
@@ -271,5 +278,4 @@ def _plant_derivatives(
     plant.GetInputPort("wheel_speeds").FixValue(context, seeded[len(state) :])
     rates = plant.EvalTimeDerivatives(context).CopyToVector()
     _, slope = value_and_gradient(rates, len(seeded))
-    moving = [0, 1, 2, 5, 6]
-    return slope[np.ix_(moving, moving)], slope[np.ix_(moving, [7, 8])]
+    return slope[:, : len(state)], slope[:, len(state) :]

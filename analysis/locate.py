@@ -55,7 +55,8 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     where = f"recording: {str(path)!r}"
     _check_recording(samples, rate, geometry, where)
     shape = ArrayShape.of(geometry.microphones)
-    channels = samples[list(geometry.columns)]
+    whole = geometry.columns == tuple(range(len(samples)))
+    channels = samples if whole else samples[list(geometry.columns)]
     recording, faults = _recording(channels, rate, shape, geometry, where)
     if not recording.starts.size:
         raise ValueError(
@@ -87,9 +88,9 @@ def _recording(
     low, high = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
 
     def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
-        channels = channels - channels.mean(axis=1, keepdims=True)
-        level = np.sqrt(np.mean(channels**2, axis=1, keepdims=True))
-        equal = np.ascontiguousarray(channels / level, dtype=np.float32)
+        equal = np.empty(channels.shape, dtype=np.float32)
+        for row, channel in zip(equal, channels, strict=True):
+            row[:] = (channel - channel.mean()) / channel.std()
         return RecordingSpectra(
             equal, float(rate), low, high, shape.max_delay(geometry.c)
         )

@@ -59,30 +59,21 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
 
 
 def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
-    attraction, robot, lag = (
-        scenario.attraction,
-        scenario.robot,
-        scenario.plant.motor_lag_s,
-    )
+    gains, robot = scenario.attraction, scenario.robot
+    printed = "printed without unit"
+    lag_reason = "not printed; load, battery"
+    shares = (
+        ("robot.mass_kg", "M", "kg", robot.mass_kg, 0.1, "virtual mass, as set"),
+        ("attraction.stiffness_n_m", "K_r", "N/m", gains.stiffness_n_m, 0.1, printed),
+        ("attraction.damping_n_s_m", "D_r", "N s/m", gains.damping_n_s_m, 0.1, printed),
+        (
+            "plant.motor_lag_s", "lag", "s", scenario.plant.motor_lag_s, 0.4,
+            lag_reason,
+        ),
+    )  # fmt: skip
     return (
-        _share("robot.mass_kg", "M", "kg", robot.mass_kg, 0.1, "virtual mass, as set"),
-        _share(
-            "attraction.stiffness_n_m",
-            "K_r",
-            "N/m",
-            attraction.stiffness_n_m,
-            0.1,
-            "printed without unit",
-        ),
-        _share(
-            "attraction.damping_n_s_m",
-            "D_r",
-            "N s/m",
-            attraction.damping_n_s_m,
-            0.1,
-            "printed without unit",
-        ),
-        _share("plant.motor_lag_s", "lag", "s", lag, 0.4, "not printed; load, battery"),
+        # What is absent is not uncertain.
+        *(_share(*row) for row in shares if row[3] > 0.0),
         UncertainParameter(
             "wheel_radius_share",
             "r",

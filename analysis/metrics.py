@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from analysis.proximity import Proximity
 from analysis.shortest_path import shortest_path_length
+from analysis.sightings import sightings
 from analysis.smoothness import (
     jerk,
     log_dimensionless_jerk,
@@ -45,6 +46,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_smoothness_metrics(result),
         **_effort_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
+        **_collision_metrics(result),
         **_hearing_metrics(result),
     }
 
@@ -161,6 +163,8 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     columns, robot = result.columns, result.scenario.robot
     force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
     wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
+    push = columns["repulsion_x"] * columns["v_WP_x"]
+    push = push + columns["repulsion_y"] * columns["v_WP_y"]
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
     pulling = np.hypot(columns["v_WP_x"], columns["v_WP_y"])
     full = 0.999
@@ -170,6 +174,7 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     impossible = np.any(speeds > 2.0 * robot.top_speed_m_s, axis=0)
     return {
         "control_effort_rms_n": _rms(np.hypot(*force)),
+        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
         "wheel_variation_m_s2": float(variation)
         * robot.wheel_radius_m
         / FRAME_PERIOD_S,
@@ -198,6 +203,16 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
     first = np.flatnonzero(reacting)
     return float(nearest[first[0]]) if len(first) else None
+
+
+def _collision_metrics(result: RunResult) -> dict[str, float | None]:
+    """What the cones knew of the body that was hit."""
+    before = sightings(result)
+    return {
+        "contact_warning_s": before.warning_s if before else None,
+        "contact_unseen_s": before.unseen_s if before else None,
+        "contact_push_n": before.push_n if before else None,
+    }
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:

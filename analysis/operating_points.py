@@ -23,7 +23,13 @@ from diagrams.scenario import Scenario
 from systems.geometry import control_point, nearest_point_on_rectangle
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["NO_FORCE_N", "OperatingPoint", "moving_equilibrium", "resting_equilibrium"]
+__all__ = [
+    "NO_FORCE_N",
+    "OperatingPoint",
+    "motion_model",
+    "moving_equilibrium",
+    "resting_equilibrium",
+]
 
 Kind = Literal["sink", "saddle", "source"]
 
@@ -89,29 +95,8 @@ class OperatingPoint:
         Inputs: a kick to the velocity of the virtual mass, m/s. Outputs:
         position of P, m; and the heading, rad, where the robot moves.
         """
-        loop = self.loop
-        A = loop.period_derivatives(self.state, self.time_s).A
-        names = loop.state_names
-        kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
-        x, y, theta = (names.index(f"plant.{name}") for name in ("x", "y", "theta"))
-        epsilon = loop.scenario.robot.control_point_m
-        C = np.zeros((3, len(A)))
-        C[0, x] = C[1, y] = C[2, theta] = 1.0
-        C[0, theta] = -epsilon * math.sin(self.theta_WB)
-        C[1, theta] = epsilon * math.cos(self.theta_WB)
-        shown = 3 if self.moves else 2
-        whole = LinearModel(
-            name="motion of P",
-            A=A,
-            B=np.eye(len(A))[:, kick],
-            C=C[:shown],
-            D=np.zeros((shown, 2)),
-            state_names=names,
-            input_names=("kick_x", "kick_y"),
-            output_names=("p_WP_x", "p_WP_y", "theta_WB")[:shown],
-            period_s=FRAME_PERIOD_S,
-        )
-        return minimal_model(whole)
+        A = self.loop.period_derivatives(self.state, self.time_s).A
+        return motion_model(self, A, FRAME_PERIOD_S)
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
@@ -168,6 +153,43 @@ class OperatingPoint:
             )
             for name, body in self.loop.scenario.bodies().items()
         ]
+
+
+def motion_model(
+    point: OperatingPoint, A: NDArray[np.float64], period_s: float
+) -> LinearModel:
+    """What a matrix of the whole state says of P's motion.
+
+    Args:
+        point: The operating point.
+        A: (n, n) map of the whole state over a period.
+        period_s: The period, s.
+
+    Returns:
+        A model with as few states as the motion has; see
+        ``OperatingPoint.motion`` for its signals.
+    """
+    names = point.loop.state_names
+    kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
+    x, y, theta = (names.index(f"plant.{name}") for name in ("x", "y", "theta"))
+    epsilon = point.loop.scenario.robot.control_point_m
+    C = np.zeros((3, len(A)))
+    C[0, x] = C[1, y] = C[2, theta] = 1.0
+    C[0, theta] = -epsilon * math.sin(point.theta_WB)
+    C[1, theta] = epsilon * math.cos(point.theta_WB)
+    shown = 3 if point.moves else 2
+    whole = LinearModel(
+        name="motion of P",
+        A=A,
+        B=np.eye(len(A))[:, kick],
+        C=C[:shown],
+        D=np.zeros((shown, 2)),
+        state_names=names,
+        input_names=("kick_x", "kick_y"),
+        output_names=("p_WP_x", "p_WP_y", "theta_WB")[:shown],
+        period_s=period_s,
+    )
+    return minimal_model(whole)
 
 
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 __all__ = ["PairedMedian", "PairedRate", "paired_median", "paired_rate"]
 
@@ -34,6 +34,10 @@ class PairedMedian:
 
     pairs: int
     """Layouts on which both have the figure."""
+    first: float | None
+    """Median of the first method over the pairs."""
+    second: float | None
+    """Median of the second."""
     difference: float | None
     """Median over the pairs of the first's figure less the second's."""
     low: float | None
@@ -93,20 +97,18 @@ def paired_median(
     from analysis.intervals import bootstrap_interval
 
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
-    differences = _differences(a, b)
+    both = np.isfinite(a) & np.isfinite(b)
+    differences = a[both] - b[both]
     if len(differences) == 0:
-        return PairedMedian(0, None, None, None, None)
+        return PairedMedian(0, None, None, None, None, None, None)
     low, high = bootstrap_interval(differences, seed=seed, confidence=confidence)
     apart = np.any(differences != 0.0)
     return PairedMedian(
         pairs=len(differences),
+        first=float(np.median(a[both])),
+        second=float(np.median(b[both])),
         difference=float(np.median(differences)),
         low=low,
         high=high,
         p_value=float(wilcoxon(differences).pvalue) if apart else 1.0,
     )
-
-
-def _differences(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
-    both = np.isfinite(a) & np.isfinite(b)
-    return a[both] - b[both]

@@ -12,7 +12,7 @@ from analysis.head_on import HeadOn, head_on
 from analysis.point_mass import PointMass, VelocityTermModel
 from diagrams import Scenario
 
-__all__ = ["PhasePortrait", "head_on_model", "phase_portrait"]
+__all__ = ["PhasePortrait", "certified_speeds", "head_on_model", "phase_portrait"]
 
 #: Half the width of the obstacle's face, m, and its depth.
 _FACE_M = (4.0, 0.1)
@@ -130,19 +130,19 @@ def phase_portrait(
         rates_m_s=rate,
         accelerations_m_s2=-force.reshape(shape) / model.mass_kg,
         collides=runs.collided.reshape(shape),
-        certified_speed_m_s=_certified_speeds(model, c, least),
+        certified_speed_m_s=certified_speeds(model, c, least),
         trajectories=_trajectories(model, term, least),
     )
 
 
-def _certified_speeds(
+def certified_speeds(
     model: PointMass, clearances: NDArray[np.float64], least: float
 ) -> NDArray[np.float64]:
     """Speed whose energy does not reach contact from each clearance, m/s.
 
-    On the line the highest level on the way to contact is the greatest of the
-    potential between; beyond a place that even the top speed cannot pass every
-    speed is certified.
+    NaN where not even rest is certified. On the line the highest level on the
+    way to contact is the greatest of the potential between; beyond a place that
+    even the top speed cannot pass every speed is certified.
     """
     fine = np.arange(least, clearances[-1] + 1e-3, 1e-3)
     points = np.column_stack([-fine, np.zeros_like(fine)])
@@ -162,9 +162,9 @@ def _trajectories(
     model: PointMass, term: VelocityTermModel, least: float
 ) -> tuple[NDArray[np.float64], ...]:
     top = model.top_speed_m_s
-    starts = [(1.45, -top), (1.45, 0.0), (0.8, -top), (0.5, -top), (0.25, -0.5 * top)]
+    starts = [(1.45, -top), (0.8, -top), (0.25, -0.9 * top)]
     tracks = []
-    for c, rate in (*starts, (0.15, 0.0), (0.1, 0.5 * top)):
+    for c, rate in (*starts, (0.1, 0.0)):
         states = model.trajectory([-c, 0.0, -rate, 0.0], duration_s=12.0, term=term)
         track = np.column_stack([-states[:, 0], -states[:, 2]])
         hit = np.flatnonzero(track[:, 0] <= least)

@@ -53,17 +53,28 @@ class RadialLaw:
         """f(c, s) in N; 0 beyond the range."""
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
+    def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
+        """f(c, 0) in N of many distances, by interpolation."""
+        return _interpolate(self.forces_n, c)
+
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
         """U(c) in J, by interpolation."""
-        return np.asarray(
-            np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
-        )
+        return _interpolate(self.energies_j, c)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
         """(df/dc, df/ds) in N/m and N s/m; at s = 0 the slope towards s > 0."""
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
         return (float(slopes[0]), float(slopes[1])) if len(slopes) else (0.0, 0.0)
+
+
+def _interpolate(table: NDArray[np.float64], c: ArrayLike) -> NDArray[np.float64]:
+    """Linear between entries DISTANCE_STEP_M apart; 0 beyond the last."""
+    place = np.maximum(np.asarray(c, dtype=float), 0.0) / DISTANCE_STEP_M
+    index = np.minimum(place.astype(int), len(table) - 2)
+    part = place - index
+    value = table[index] + part * (table[index + 1] - table[index])
+    return np.where(place < len(table) - 1, value, 0.0)
 
 
 def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:

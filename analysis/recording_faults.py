@@ -47,10 +47,10 @@ def channels_without_faults(
         names = ", ".join(map(str, further))
         more = f"; see to channels {names} as well" if rest else ""
         raise ValueError(f"{where}: {first.message}{more}")
-    samples = samples.copy()
-    for fault in faults:
-        if fault.kind == "inverted":
-            samples[list(fault.channels)] *= -1.0
+    inverted = [k for f in faults if f.kind == "inverted" for k in f.channels]
+    if inverted:
+        samples = samples.copy()
+        samples[inverted] *= -1.0
     kept = []
     for fault in faults:
         if fault.kind != "swapped":

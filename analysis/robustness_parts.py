@@ -106,7 +106,7 @@ def robustness_parts(*, full: bool) -> tuple[Part, ...]:
 
 
 def _following(study: Study, samples: int) -> LoopRobustness:
-    at = study.found["equilibria"].at
+    at = study.need("equilibria").at
     return loop_robustness(
         study.scenario,
         following_poles(at),
@@ -137,7 +137,7 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
             p.low,
             p.nominal,
             p.high,
-            p.unit,
+            p.unit.replace(" ", "\u00a0"),
             cloud.worst_values[p.name],
             p.reason,
         ]
@@ -146,7 +146,12 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
     headings = ["parameter", "least", "nominal", "most", "unit", "worst case", "why"]
     nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
     shares: list[list[Cell]] = [
-        [row.parameter.symbol, row.derivative, row.parameter.unit, row.per_interval]
+        [
+            row.parameter.symbol,
+            row.derivative,
+            row.parameter.unit.replace(" ", "\u00a0"),
+            row.per_interval,
+        ]
         for row in sorted(data.sensitivities, key=lambda r: -abs(r.per_interval))
     ]
     return [

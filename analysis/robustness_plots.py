@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from analysis.robustness import PoleCloud, PoleSensitivity
@@ -67,4 +68,5 @@ def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
         axes.set_title(title, fontsize=10)
         axes.grid(color="#E5E5E5", linewidth=0.6, axis="x")
         axes.set_axisbelow(True)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
     return figure

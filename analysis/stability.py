@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from analysis.linear_models import LinearModel
 from analysis.model_sheet import ModelSheet, model_sheet
 from diagrams import Scenario
 from diagrams.laws import LAWS, make_controller
@@ -35,7 +36,19 @@ class Study:
     scenario: Scenario
     """With the law to analyse."""
     found: dict[str, Any] = field(default_factory=dict)
-    """Data objects of earlier parts, by key."""
+    """Data objects of earlier parts, by key; none where there is a problem."""
+
+    def need(self, key: str) -> Any:
+        """Data object of an earlier part.
+
+        Raises:
+            ValueError: It has none.
+        """
+        if self.found.get(key) is None:
+            raise ValueError(
+                f"{key}: has no result, on which this part is built; mend that first"
+            )
+        return self.found[key]
 
 
 @dataclass(frozen=True)
@@ -53,6 +66,8 @@ class Part:
     """Whether it begins a sheet of paper."""
     document: Callable[[Any], dict[str, Any]] | None = None
     """Entries of the JSON document; none: the data as it is, under the key."""
+    models: Callable[[Any], Sequence[LinearModel]] | None = None
+    """Linear models that are written as files."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +94,16 @@ class LawAnalysis:
     def law(self) -> str:
         """As the scenario names it."""
         return self.scenario.law
+
+    @property
+    def models(self) -> tuple[LinearModel, ...]:
+        """Of all parts, for files."""
+        return tuple(
+            model
+            for finding in self.findings.values()
+            if finding.part.models and not finding.problem
+            for model in finding.part.models(finding.data)
+        )
 
     def data(self, key: str) -> Any | None:
         """Data object of a part, none if it was left out or failed."""

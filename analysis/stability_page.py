@@ -59,10 +59,17 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
             ("Versions", ", ".join(f"{k} {v}" for k, v in sheet.versions.items())),
         ]
     )
-    parts = [about, _verdict_table(rows, list(verdicts))]
-    if len(analyses) == 1:
-        sources = [(v.name, v.source) for v in verdicts[analyses[0].law]]
-        parts.append(table(["criterion", "source of the threshold"], sources))
+    counts = [
+        f"{_NAMES.get(law, law)}: {sum(v.verdict == 'pass' for v in found)} of "
+        f"{sum(v.verdict != 'not applicable' for v in found)} criteria pass."
+        for law, found in verdicts.items()
+    ]
+    parts = [about, bullets(counts), _verdict_table(rows, list(verdicts))]
+    parts += [
+        paragraph(f"{_NAMES.get(a.law, a.law)}: {gains.advice}")
+        for a in analyses
+        if (gains := a.data("recommended_gains"))
+    ]
     return section("summary", "Summary", parts)
 
 

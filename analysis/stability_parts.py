@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from analysis.certificate_parts import certificate_parts
+from analysis.chart_parts import chart_parts
+from analysis.extended_parts import extended_parts
+from analysis.gain_parts import contact_parts, gain_parts
 from analysis.linear_parts import linear_parts
+from analysis.margin_parts import margin_parts
 from analysis.robustness_parts import robustness_parts
+from analysis.sampled_parts import sampled_parts
 from analysis.stability import Part
+from analysis.velocity_parts import velocity_parts
+from analysis.verdict_parts import verdict_parts
 
 __all__ = ["parts"]
 
@@ -15,4 +23,16 @@ def parts(*, full: bool) -> tuple[Part, ...]:
     Args:
         full: Also those that take minutes.
     """
-    return (*linear_parts(), *robustness_parts(full=full))
+    return (
+        *linear_parts(full=full),
+        *margin_parts(),
+        *sampled_parts(full=full),
+        *chart_parts(),
+        *contact_parts(),
+        *velocity_parts(),
+        *certificate_parts(full=full),
+        *robustness_parts(full=full),
+        *(extended_parts() if full else ()),
+        *gain_parts(),
+        *verdict_parts(),
+    )

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
+from analysis.model_export import write_models
 from analysis.plain_values import plain
 from analysis.run_report import SCHEMA_VERSION, versions
 from analysis.stability import LawAnalysis
+from analysis.stability_page import stability_page
 from analysis.verdicts import Verdict, compare_verdicts
 from diagrams import dump_scenario
 
@@ -57,7 +59,9 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
         elif part.document is None:
             parts[part.key] = plain(finding.data)
         else:
-            parts |= plain(part.document(finding.data))
+            for key, value in plain(part.document(finding.data)).items():
+                # Parts may add to a list of an earlier one.
+                parts[key] = parts[key] + value if key in parts else value
     return {
         "law": analysis.law,
         **parts,
@@ -105,9 +109,14 @@ def write_stability(
 
     Linear models go to ``models.mat`` and to ``models/*.csv``.
     """
-    from analysis.stability_page import stability_page
-
+    several = len(analyses) > 1
+    models = [
+        replace(model, name=f"{analysis.law} {model.name}") if several else model
+        for analysis in analyses
+        for model in analysis.models
+    ]
+    write_models(models, directory)
     scenario = analyses[0].scenario
     (directory / "scenario.yaml").write_text(dump_scenario(scenario))
-    (directory / "summary.json").write_text(json.dumps(document, indent=1) + "\n")
+    (directory / "summary.json").write_text(json.dumps(document) + "\n")
     (directory / "report.html").write_text(stability_page(analyses))

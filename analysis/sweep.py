@@ -141,15 +141,17 @@ def reproducing_command(out: Path, point: SweepPoint) -> str:
 
 
 def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> None:
-    """What only a build finds, as a law that is unknown: once for each text."""
-    seen: set[tuple[str, str]] = set()
+    """What only a build finds, as an unknown law: once for each text or group."""
+    seen: set[str] = set()
     for point in points:
-        texts = {
-            (path, value) for path, value in point.fields.items() if type(value) is str
+        kinds = {
+            json.dumps([path, value])
+            for path, value in point.fields.items()
+            if type(value) in (str, dict)
         }
-        if point.index == 0 or not texts <= seen:
+        if point.index == 0 or not kinds <= seen:
             build_sound_follower(plan.scenario_of(point))
-        seen |= texts
+        seen |= kinds
 
 
 def _cores() -> int:

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
 from itertools import islice
 from queue import Empty, SimpleQueue
 from typing import Any
@@ -48,39 +50,32 @@ def connect(scheduler: str) -> Any:
         # Dask's own client is noisy about an address at which nobody listens.
         with socket.create_connection((address.hostname, address.port), _CONNECT_S):
             client = distributed.Client(scheduler, timeout=_CONNECT_S)
+        trouble = _trouble(client)
     except (OSError, ValueError, TypeError) as error:
         raise ValueError(
             f"scheduler: {scheduler} cannot be reached ({error}); give the address "
             "that `dask scheduler` prints, as tcp://host:8786"
         ) from None
-    try:
-        _check_workers(scheduler, client)
-    except BaseException:
+    if trouble:
         client.close()
-        raise
+        raise ValueError(f"scheduler: {scheduler} {trouble}")
     return client
 
 
-def _check_workers(scheduler: str, client: Any) -> None:
+def _trouble(client: Any) -> str:
+    """Why the cluster's workers cannot run a sweep; empty if they can."""
     found = client.run(versions, on_error="return")
     if not found:
-        raise ValueError(
-            f"scheduler: {scheduler} has no workers; start some: dask worker "
-            f"{scheduler}"
-        )
+        return "has no workers; start some with `dask worker` and that address"
     for worker, theirs in found.items():
-        trouble = _trouble(theirs)
-        if trouble:
-            raise ValueError(f"scheduler: the worker {worker} {trouble}")
-
-
-def _trouble(theirs: Any) -> str:
-    """What is wrong with a worker, by its versions or an error in their place."""
-    if isinstance(theirs, Exception):
-        return f"cannot import phonotaxis ({theirs}); install it there"
-    for name, version in versions().items():
-        if theirs.get(name) != version:
-            return f"has {name} {theirs.get(name)}, we {version}; install the same"
+        if isinstance(theirs, Exception):
+            return f"has a worker {worker} without phonotaxis ({theirs}); install it"
+        for name, version in versions().items():
+            if theirs.get(name) != version:
+                return (
+                    f"has a worker {worker} with {name} {theirs.get(name)}, where we "
+                    f"have {version}; install the same"
+                )
     return ""
 
 
@@ -120,10 +115,14 @@ def run_on_cluster(
             for future in done:
                 yield _outcome(future, futures.pop(future))
             pulse()
+    except (OSError, CancelledError) as error:
+        raise WorkerError("the Dask cluster is gone") from error
     finally:
-        client.cancel(list(futures), force=True)
-        client.run(_dismiss_idle, on_error="ignore")
-        client.close()
+        with suppress(OSError, CancelledError):
+            client.cancel(list(futures), force=True)
+            client.run(_dismiss_idle, on_error="ignore")
+        with suppress(OSError, CancelledError):
+            client.close()
 
 
 def _threads(client: Any) -> int:

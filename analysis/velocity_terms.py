@@ -53,7 +53,8 @@ class OneSidedModel:
     @property
     def poles(self) -> NDArray[np.complex128]:
         """(2,) 1/s."""
-        return np.roots([self.mass_kg, self.damping_n_s_m, self.stiffness_n_m])
+        roots = np.roots([self.mass_kg, self.damping_n_s_m, self.stiffness_n_m])
+        return roots.astype(complex)
 
     @property
     def natural_frequency_rad_s(self) -> float:
@@ -188,7 +189,7 @@ def velocity_term_analysis(
     contact = head_on(scenario, to_go_m=to_go_m)
     _, slope = contact.law.gradient(contact.equilibrium_m, 0.0)
     damping = scenario.attraction.damping_n_s_m
-    variants = {}
+    variants: dict[str, VelocityTermVariant] = {}
     for term in VARIANTS:
         sides = [
             OneSidedModel(
@@ -208,16 +209,17 @@ def velocity_term_analysis(
 
 
 def describe_velocity_term(
-    contact: HeadOn, term: Variant, *, points: int = 37
+    contact: HeadOn, term: Variant, *, points: int = 36
 ) -> DescribingFunction:
     """Describing function of a velocity term up to the top speed.
 
     Args:
         contact: Law and equilibrium distance.
         term: Which s.
-        points: Amplitudes from 0 to the top speed.
+        points: Amplitudes up to the top speed.
     """
-    amplitudes = np.linspace(0.0, contact.scenario.robot.top_speed_m_s, points)
+    top = contact.scenario.robot.top_speed_m_s
+    amplitudes = top * (np.arange(points) + 1.0) / points
     c = contact.equilibrium_m
     rest = contact.law.force(c)
 
@@ -248,8 +250,6 @@ def _harmonics(
 ) -> tuple[float, float]:
     """(bias, damping) of a force over one cycle; the phase is that of c'."""
     force = np.array([added(s) for s in speeds.tolist()])
-    if amplitude == 0.0:
-        return float(force.mean()), 0.0
     return float(force.mean()), -2.0 * float(np.mean(force * np.cos(phase))) / amplitude
 
 
@@ -260,7 +260,7 @@ def _sampled_harmonics(
     omega = 2.0 * np.pi / (_CYCLE_TICKS * FRAME_PERIOD_S)
     turn = omega * FRAME_PERIOD_S
     # Ticks fall between those of the exact integral's symmetric grid.
-    phase = turn * (np.arange(_CYCLE_TICKS) + 0.25)
+    phase = turn * (np.arange(_CYCLE_TICKS, dtype=float) + 0.25)
     c = contact.equilibrium_m + amplitude / omega * np.sin(phase)
     before = contact.equilibrium_m + amplitude / omega * np.sin(phase - turn)
     speeds = np.array(

@@ -30,7 +30,7 @@ class Criterion:
     def threshold(self) -> str:
         """In signs, with the unit."""
         sign = {"at least": "\u2265", "above": ">", "at most": "\u2264", "below": "<"}
-        return f"{sign[self.sense]} {self.limit:g} {self.unit}".rstrip()
+        return f"{sign[self.sense]} {self.limit:.4g} {self.unit}".rstrip()
 
     def met_by(self, value: float) -> bool:
         """Whether a number meets the limit; an infinite one may."""
@@ -126,6 +126,8 @@ def _together(found: dict[str, Verdict]) -> str:
     groups: dict[str, list[str]] = {}
     for law, verdict in found.items():
         groups.setdefault(verdict.text, []).append(law)
+    if len(found) == 1:
+        return f"{next(iter(groups))}."
     if len(groups) == 1:
         subject = "All" if len(found) > 2 else " and ".join(found)
         return f"{subject}: {next(iter(groups))}."

@@ -9,6 +9,7 @@ from __future__ import annotations
 import sys
 
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
+from benchmarks.hearing import frame_figures
 from benchmarks.memory import memory_growth_mb
 from benchmarks.speed import diagram_overhead, real_time_factor
 
@@ -28,6 +29,7 @@ def main() -> int:
                 "diagram over plain loop, full audio", diagram_overhead(), "<=", 1.5
             ),
             Figure("memory, minute 1 to 10, MB", memory_growth_mb(), "<=", 20.0),
+            *frame_figures(),
         ]
     )
 

@@ -1,19 +1,27 @@
 """``python -m benchmarks.hearing``: time a frame, and what is heard in noise.
 
-Times are processor time on one core, the best of several rounds; exit status 1
-if one misses its bound.
+``--picture FILE.png`` draws the detection curve, too, as in
+``docs/localization.md``. Times are processor time on one core, the best of
+several rounds; exit status 1 if one misses its bound.
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
+from pathlib import Path
 from time import process_time
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.detection import detection_curve, noise_chances
+from analysis.detection import (
+    DetectionPoint,
+    FalseAlarms,
+    detection_curve,
+    false_alarms,
+)
+from analysis.detection_plots import plot_detection
 from analysis.free_field import Loudspeaker
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from systems.array_shape import ArrayShape
@@ -24,7 +32,7 @@ from systems.robot import RobotParameters
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)
 LEVELS_DB = [float(level) for level in range(-16, 13, 2)]
-RATES = (1e-1, 1e-2, 1e-3)
+RATES = (1e-1, 1e-2, 1e-3, 1e-4)
 
 #: Frames a round, and rounds; the fastest counts.
 FRAMES, ROUNDS = 40, 7
@@ -84,8 +92,13 @@ def frame_figures() -> list[Figure]:
     ]
 
 
-def print_detection(trials: int) -> None:
-    """Share of frames heard, with a range, and wrong, against the level."""
+def print_detection(trials: int) -> dict[str, list[DetectionPoint]]:
+    """Share of frames heard, with a range, and wrong, against the level.
+
+    Returns:
+        The points by sound.
+    """
+    curves = {}
     print("| sound | " + " | ".join(f"{level:g} dB" for level in LEVELS_DB) + " |")
     print("|---" * (len(LEVELS_DB) + 1) + "|")
     for kind in ("chirp", "band_noise"):
@@ -101,15 +114,18 @@ def print_detection(trials: int) -> None:
             shares = (getattr(point, what) / point.trials for point in points)
             row = " | ".join(f"{100.0 * share:.1f}" for share in shares)
             print(f"| {kind}, {what}, % | {row} |", flush=True)
+        curves[kind] = points
+    return curves
 
 
-def print_false_alarms(frames: int) -> None:
+def print_false_alarms(frames: int) -> list[FalseAlarms]:
     """Measured beside set rates, in noise alone."""
-    chances = noise_chances(frames, shape=SHAPE, c=C, seed=9)
+    rates = (*RATES, TDOAParameters().false_alarm_rate)
+    alarms = false_alarms(rates, frames, shape=SHAPE, c=C, seed=9)
     print(f"| set rate | share of {frames} frames of noise |\n|---|---|")
-    for rate in (*RATES, TDOAParameters().false_alarm_rate):
-        count = np.count_nonzero(chances <= rate)
-        print(f"| {rate:g} | {count / frames:.2g} ({count}) |")
+    for alarm in alarms:
+        print(f"| {alarm.rate:g} | {alarm.count / frames:.2g} ({alarm.count}) |")
+    return alarms
 
 
 def main() -> int:
@@ -117,15 +133,19 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--trials", type=int, default=500, help="frames a level")
     parser.add_argument("--noise-frames", type=int, default=24_000, help="10 minutes")
+    parser.add_argument("--picture", type=Path, help="PNG file to draw")
     arguments = parser.parse_args()
     if min(arguments.trials, arguments.noise_frames) < 1:
         parser.error("--trials and --noise-frames must be at least 1")
     stay_on_one_core()
     status = print_figures(frame_figures())
     print()
-    print_detection(arguments.trials)
+    curves = print_detection(arguments.trials)
     print()
-    print_false_alarms(arguments.noise_frames)
+    alarms = print_false_alarms(arguments.noise_frames)
+    if arguments.picture is not None:
+        rate = TDOAParameters().false_alarm_rate
+        plot_detection(curves, alarms, rate).savefig(arguments.picture, dpi=110)
     return status
 
 

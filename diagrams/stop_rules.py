@@ -15,7 +15,10 @@ from diagrams.scenario import Body, robot_rectangle
 from systems.geometry import control_point, rectangle_clearance
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["Collision", "StopRules"]
+__all__ = ["SUCCESSFUL", "Collision", "StopRules"]
+
+#: Causes of runs that did what they should.
+SUCCESSFUL = ("reached", "completed")
 
 #: Contacts are looked for between ticks when the last clearance was below this:
 #: more than robot and obstacle cover in a tick.

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["ArrayShape"]
+__all__ = ["ArrayShape", "EqualRow"]
 
 # Nearer than this, two microphones are one, m.
 _LEAST_DISTANCE_M = 1e-3
 
 # Off a line or a plane by less than this share of the aperture is on it.
 _FLATNESS = 0.01
+
+
+class EqualRow(NamedTuple):
+    """Three microphones M1, M2, M3 from left to right for one who looks ahead."""
+
+    spacing_m: float
+    """Distance between neighbours, m."""
+    to_delays: NDArray[np.float64]
+    """(2, 2) tau_12 and tau_13 from the delays t_k - t_0 in the array's order."""
+    axes: NDArray[np.float64]
+    """(d, 2) ahead and left, unit vectors as columns."""
 
 
 @dataclass(frozen=True)
@@ -135,14 +146,10 @@ class ArrayShape:
         return self.aperture_m / c
 
     @cached_property
-    def equal_row(self) -> tuple[tuple[int, int, int], float] | None:
-        """Three microphones equally spaced in a row: order and spacing.
-
-        Returns:
-            Numbers of the left, middle and right microphone of one who looks
-            ahead, and the distance between neighbours in m; None otherwise.
-        """
-        if self.kind != "row" or self.count != 3:
+    def equal_row(self) -> EqualRow | None:
+        """Three microphones equally spaced in a row; None for all others."""
+        ahead = self.ahead
+        if ahead is None or self.kind != "row" or self.count != 3:
             return None
         along = self.p_AM @ self.span[0]
         right, middle, left = (int(k) for k in np.argsort(along))
@@ -150,7 +157,12 @@ class ArrayShape:
         # The closed form is exact only for an exact row.
         if max(off, abs(along[middle])) > 1e-9 * self.aperture_m:
             return None
-        return (left, middle, right), float(along[left] - along[right]) / 2.0
+        arrivals = np.vstack((np.zeros((1, 2)), np.eye(2)))  # by the delays
+        return EqualRow(
+            spacing_m=float(along[left] - along[right]) / 2.0,
+            to_delays=arrivals[[middle, right]] - arrivals[left],
+            axes=np.stack((ahead, self.span[0]), axis=1),
+        )
 
 
 def _check(p: NDArray[np.float64]) -> None:

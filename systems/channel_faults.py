@@ -82,7 +82,7 @@ def find_channel_faults(
     if use.size < 2:
         return found
     measured = correlate_pairs(
-        np.asarray(samples, dtype=np.float64)[use],
+        samples if use.size == len(samples) else samples[use],
         shape.max_delay(c),
         sample_rate_hz,
         band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz)),

@@ -198,16 +198,24 @@ def arrival_variances(
     sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2: for equal
     weights and much signal that is the bound of Knapp and Carter (1976).
     """
-    channels = len(energy)
     shares = np.exp(tables.to_shares @ np.log(np.clip(r, 1e-3, 1.0)))
-    q = np.clip(shares, 1e-3, 1.0 - 1e-9)
-    n = (1.0 - q) * energy / bins
-    s = q * energy
+    return padding * _arrival_variances(shares, sums, energy, tables.pairs, bins)
+
+
+@njit(cache=True)
+def _arrival_variances(
+    shares, sums, energy, pairs, bins
+):  # pragma: no cover  (compiled)
+    channels = energy.size
+    n, s = np.empty(channels), np.empty(channels)
+    for m in range(channels):
+        q = min(max(shares[m], 1e-3), 1.0 - 1e-9)
+        n[m], s[m] = (1.0 - q) * energy[m] / bins, q * energy[m]
     parts = np.zeros(channels)
-    for (i, j), (curve, squares, noise) in zip(
-        tables.pairs.tolist(), sums.tolist(), strict=True
-    ):
-        scale = padding / (2.0 * curve * curve)
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        curve, squares, noise = sums[p]
+        scale = 1.0 / (2.0 * curve * curve)
         cross = 0.5 * n[i] * n[j] * noise
         # Each channel's part: noise of one against the signal of the other.
         parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)

@@ -8,7 +8,6 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
-from scipy.special import ndtri
 
 from systems.array_shape import ArrayShape
 from systems.coherent import arrival_delays, refine_source
@@ -16,6 +15,7 @@ from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
+from systems.frame_energy import frame_energy
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
@@ -40,11 +40,6 @@ _NOISE_FRAMES = 8.0
 # A knock, or a sound that reverberates too much to be heard, may raise that level no
 # more than a noise of so many times it.
 _LOUDEST_NOISE = 1.5
-
-# Share of frames of steady white noise that are loud enough to be searched for a
-# sound; frames that are no louder than the noise are not. A sound 15 dB below it
-# would still be searched for, while none is found below 12 dB.
-_SEARCHED_SHARE = 0.1
 
 # Frames whose echoes were suppressed are believed from this correlation on, and up
 # to this ambiguity.
@@ -104,8 +99,8 @@ class HearingMemory(NamedTuple):
     """What a frame leaves behind for the next one."""
 
     energy: float
-    """Of a frame between the sounds, units of the frame squared; 0 until such a
-    frame was heard."""
+    """Of a frame between the sounds, without rumble, units of the frame squared; 0
+    until such a frame was heard."""
     noise_energy: float
     """Of its mean channel within the band."""
     echoes: NDArray[np.float32]
@@ -133,11 +128,6 @@ class Localiser:
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
-        # The energy of white noise scatters by the root of 2 over its samples, and
-        # what it is compared with is known as well as an average can be.
-        variance = 2.0 / (plan.shape.count * plan.frame_samples)
-        variance *= 1.0 + 1.0 / (2.0 * _NOISE_FRAMES - 1.0)
-        self._loud = 1.0 - float(ndtri(_SEARCHED_SHARE)) * math.sqrt(variance)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -177,11 +167,8 @@ class Localiser:
             ValueError: The frame is no frame of this array, or not finite.
         """
         energy = self._checked_energy(frame)
-        searched = 1.0
-        if memory.energy > 0.0:
-            if energy <= self._loud * memory.energy:
-                return None, self._after_noise(memory, energy)
-            searched = _SEARCHED_SHARE
+        if energy <= memory.energy:  # no louder than the noise
+            return None, self._after_noise(memory, energy)
         seen = look(
             frame,
             self.plan,
@@ -191,7 +178,7 @@ class Localiser:
         if seen is None:
             return None, memory
         search = seen[0]
-        if searched * search.chance > self.parameters.false_alarm_rate:
+        if search.chance > self.parameters.false_alarm_rate:
             return None, self._after_noise(memory, energy, search.energy)
         after = memory._replace(heard=True)
         if not memory.heard and search.weakest > _SHARED_CHANCE:
@@ -243,7 +230,7 @@ class Localiser:
                 f"audio: a frame of shape {frame.shape}; give a channel for each of "
                 f"the {expected[0]} microphones, of {expected[1]} samples"
             )
-        energy = float(np.vdot(frame, frame))
+        energy = frame_energy(frame)
         if not math.isfinite(energy) and not np.isfinite(frame).all():
             channel, sample = np.argwhere(~np.isfinite(frame))[0]
             raise ValueError(

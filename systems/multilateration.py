@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems import near_field
-from systems.array_shape import ArrayShape
+from systems.array_shape import ArrayShape, EqualRow
 from systems.delay_fit import DelayProblem, fit_delays
 from systems.source_fix import SourceFix
 
@@ -44,7 +44,7 @@ def locate_source(
         rarely less than two apertures.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
-        return _from_equal_row(tau, covariance, shape, c)
+        return _from_equal_row(tau, covariance, shape.equal_row, c)
     u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
         DelayProblem(
             c * np.asarray(tau, dtype=np.float64),
@@ -109,21 +109,17 @@ def angles_of(
 def _from_equal_row(
     tau: NDArray[np.float64],
     covariance: NDArray[np.float64],
-    shape: ArrayShape,
+    row: EqualRow,
     c: float,
 ) -> SourceFix:
-    assert shape.equal_row is not None
-    assert shape.ahead is not None
-    order, spacing = shape.equal_row
-    times = np.vstack((np.zeros((1, 2)), np.eye(2)))  # of arrival, by the delays
-    turn = times[list(order[1:])] - times[order[0]]
+    turn = row.to_delays
     tau_12, tau_13 = (turn @ tau).tolist()
     fix = near_field.locate_source(
-        tau_12, tau_13, turn @ covariance @ turn.T, spacing, c
+        tau_12, tau_13, turn @ covariance @ turn.T, row.spacing_m, c
     )
     if fix.range_valid and fix.range_std >= fix.range:
         fix = fix.without_range()
-    axes = np.stack((shape.ahead, shape.span[0]), axis=1)
+    axes = row.axes
     p_AS = axes @ fix.p_AS
     return replace(
         fix,

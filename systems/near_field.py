@@ -104,23 +104,22 @@ def locate_source(
     a, b = c * tau_12, c * tau_13
     r1, r3 = r2 - a, r2 - a + b
     gap = b - 2.0 * a
-    to_range = c * np.array([r1 + r3, -r3]) / gap
-    to_y = c * np.array([b * r2, -a * r3]) / (spacing * gap)
-    to_bearing = (to_y - sine * to_range) / (r2 * safe)
-    to_position = np.vstack(
-        (
-            cosine * to_range - r2 * sine * to_bearing,
-            sine * to_range + r2 * cosine * to_bearing,
-        )
-    )
+    # Rows: what the two delays' errors do to range, bearing, x and y.
+    slopes = np.empty((4, 2))
+    slopes[0] = c * (r1 + r3) / gap, -c * r3 / gap
+    to_y = c * b * r2 / (spacing * gap), -c * a * r3 / (spacing * gap)
+    slopes[1] = (to_y - sine * slopes[0]) / (r2 * safe)
+    slopes[2] = cosine * slopes[0] - r2 * sine * slopes[1]
+    slopes[3] = sine * slopes[0] + r2 * cosine * slopes[1]
+    errors = slopes @ covariance @ slopes.T
     return SourceFix(
         bearing=bearing,
-        bearing_std=math.sqrt(to_bearing @ covariance @ to_bearing),
+        bearing_std=math.sqrt(errors[1, 1]),
         elevation=None,
         elevation_std=None,
         range=r2,
         range_valid=True,
-        range_std=math.sqrt(to_range @ covariance @ to_range),
+        range_std=math.sqrt(errors[0, 0]),
         p_AS=np.array([r2 * cosine, r2 * sine]),
-        covariance=to_position @ covariance @ to_position.T,
+        covariance=errors[2:, 2:],
     )

@@ -75,13 +75,15 @@ def correlate_pairs(
     frames = total // length
     if frames == 0:
         return None
-    cut = np.reshape(samples[:, : frames * length], (count, frames, length))
-    energy = np.var(cut, axis=2)
+    # A view of each channel: recordings may be long.
+    cut = [row[: frames * length].reshape(frames, length) for row in samples]
+    energy = np.array([np.var(channel, axis=1) for channel in cut])
     mean = energy.mean(axis=1, keepdims=True)
     loudness = np.mean(energy / np.maximum(mean, 1e-300), axis=0)
     chosen = np.sort(np.argsort(-loudness)[:_FRAMES])
     window = np.hanning(length)
-    spectra = fft.rfft(cut[:, chosen] * window, 2 * length)
+    loudest = np.array([channel[chosen] for channel in cut])
+    spectra = fft.rfft(loudest * window, 2 * length)
     f = fft.rfftfreq(2 * length, 1.0 / sample_rate_hz)
     outside = (f < band_hz[0]) | (f > band_hz[1])
     spectra[:, :, outside] = 0.0

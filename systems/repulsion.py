@@ -1,7 +1,8 @@
 """Gains of the repulsion laws, one set a law.
 
-K_0, k_ref, D_0 and d_ref are not printed in the papers; these defaults are
-ours, see docs/model.md. The same requirements give each law gains of its own.
+K_0, k_ref, D_0 and d_ref are not printed in the papers. These defaults are what
+``phonotaxis design`` derives from stated requirements, the same for each law;
+docs/design.md explains.
 """
 
 from __future__ import annotations
@@ -33,7 +34,7 @@ def matched_decay(limit: float, ratio: float) -> float:
 class ConventionalParameters(Parameters):
     """Spring and damper within a reach (Han 2019, eq. 19-a)."""
 
-    stiffness_n_m: Positive = 16.0
+    stiffness_n_m: Positive = 12.3
     """K_0, N/m."""
     damping_n_s_m: Positive = 0.8
     """D_0, N s/m."""
@@ -48,15 +49,15 @@ class ActiveParameters(Parameters):
     gains at half the reach and at half the speed limit.
     """
 
-    reference_stiffness_n_m: Positive = 64.0
+    reference_stiffness_n_m: Positive = 84.5
     """k_ref, N/m, above K_0."""
-    matched_stiffness_n_m: Positive = 16.0
+    matched_stiffness_n_m: Positive = 17.1
     """K_0, N/m: the push at rho_0/2 is K_0 rho_0/2."""
     reach_m: Positive = 0.8
     """rho_0, m (Han 2019, 5.2); the law itself has no end."""
-    reference_damping_n_s_m: Positive = 0.2
+    reference_damping_n_s_m: Positive = 0.0811
     """d_ref, N s/m, below D_0."""
-    matched_damping_n_s_m: Positive = 0.8
+    matched_damping_n_s_m: Positive = 0.839
     """D_0, N s/m: the velocity term at mu_0/2 is D_0 mu_0/2."""
     speed_limit_m_s: Positive = 0.72
     """mu_0: the velocity term acts below this speed, m/s (5.3)."""
@@ -96,7 +97,7 @@ class Active2017Parameters(Parameters):
     Kim 2017 prints no number for any of these.
     """
 
-    distance_gain_j: Positive = 1.1
+    distance_gain_j: Positive = 1.22
     """K_0, N m: the push is K_0/c. Not the K_0 of the other laws."""
     saturation_distance_m: Positive = 0.1
     """rho_1: nearer than this the push stays at K_0/rho_1, m."""

@@ -66,6 +66,7 @@ def test_scenarios_lists_the_papers_experiments(capsys):
         "two_moving_obstacles",
         "corridor",
         "u_trap",
+        "wall",
     } <= set(listed)
 
 

@@ -130,6 +130,7 @@ def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_a_comparison_from_end_to_end(tmp_path):
     """Two laws on two short layouts; examples run again as they ran."""
     short = IDEAL | {"duration_s": 3.0}
@@ -140,9 +141,9 @@ def test_a_comparison_from_end_to_end(tmp_path):
     }
     prepared = prepare_comparison(plans, tmp_path / "out", workers=1)
     seen: list[int] = []
-    comparisons = prepared.run(seen.append)
+    comparisons, pooled = prepared.run(seen.append)
     assert seen[-1] == prepared.runs == 4
-    summary = compare_summary(prepared, comparisons)
+    summary = compare_summary(prepared, comparisons, pooled)
     write_comparison(prepared, comparisons, summary)
     assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
     cells = summary["cells"]
@@ -156,7 +157,8 @@ def test_a_comparison_from_end_to_end(tmp_path):
         for example in cell["examples"]:
             again = load_scenario(tmp_path / "out" / example["scenario_file"])
             assert simulate(again).cause == example["cause"]
-            assert example["command"] in compare_text(summary, comparisons)
+            text = compare_text(summary, comparisons, pooled)
+            assert example["command"] in text
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "summary.json",
         "rates.png",

@@ -8,7 +8,7 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.comparison import Comparison, compare_runs
+from analysis.comparison import Comparison, compare_runs, pooled_pairs
 from analysis.sweep_plan import SweepPlan
 
 #: Cause and clearance of each law's runs, layout by layout.
@@ -112,6 +112,19 @@ def test_examples_are_ordered_by_success_then_by_clearance(comparison):
     assert runs == [1, 3, 4]
     # The run that raised an error is not among them.
     assert [e.index // 2 for e in comparison.cells[1].examples] == [1, 2, 3]
+
+
+def test_pooled_pairs_are_those_of_all_experiments():
+    """The same table twice: counts double, rates and medians stay."""
+    plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
+    (once,) = compare_runs(plan, table(), "here").pairs
+    (twice,) = pooled_pairs([(plan, table()), (plan, table())])
+    assert twice.success.pairs == 2 * once.success.pairs
+    assert twice.success.only_second == 2 * once.success.only_second
+    assert twice.success.difference == once.success.difference
+    name = "minimum_obstacle_clearance_m"
+    assert twice.metrics[name].difference == once.metrics[name].difference
+    assert twice.metrics[name].pairs == 8
 
 
 def test_pairs_differ_in_one_field_alone():

@@ -17,6 +17,7 @@ from analysis.contact_mode import (
     largest_contact_stiffness,
     motion_chain,
 )
+from analysis.equilibria import find_equilibria
 from diagrams.scenario import Scenario
 
 T, MASS, LAG = 0.025, 3.94, 0.05
@@ -91,6 +92,34 @@ def test_without_lag_the_held_velocity_condition_decides(period, damping):
     exact = (4.0 - 2.0 * damping / MASS * period) / period**2 * MASS
     if exact < 1e5:
         assert limit == pytest.approx(exact, rel=1e-3)
+
+
+@pytest.mark.parametrize("stiffness", [10.0, 17.8, 18.7])
+def test_radial_modes_of_the_whole_diagram_are_those_of_the_chain(stiffness):
+    """At the saddle before a corner that points at P: AutoDiff of one period."""
+    scenario = Scenario.model_validate(
+        {
+            "law": "conventional",
+            "source": {"waypoints_m": [[3.0, 0.0]], "length_m": 1e-3, "width_m": 1e-3},
+            "attraction": {"follow_distance_m": 0.0},
+            "repulsion": {"conventional": {"stiffness_n_m": stiffness}},
+            "obstacles": [
+                {
+                    "waypoints_m": [[1.0, 0.0]],
+                    "size_m": [1e-6, 1e-6],
+                    "heading_deg": 45.0,
+                }
+            ],
+        }
+    )
+    points = find_equilibria(scenario, area_m=(-1.0, 0.99, -1.0, 1.0)).points
+    (point,) = [p for p in points if p.p_WP[1] == pytest.approx(0.0, abs=1e-6)]
+    radial = np.log(np.linalg.eigvals(contact_matrix(SCENARIO, stiffness + 2.0))) / T
+    # The lag's own pole is off by the third-order step: exp(-0.5) as 0.6042.
+    for pole in radial[np.abs(radial) < 5.0]:
+        assert np.abs(point.eigenvalues - pole).min() < 5e-3
+    radius = contact_spectral_radius(SCENARIO, stiffness + 2.0)
+    assert (radius < 1.0) == (stiffness < 18.25)
 
 
 def test_no_damping_no_spring():

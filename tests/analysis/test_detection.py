@@ -6,9 +6,10 @@ import math
 
 import numpy as np
 
-from analysis.detection import detection_curve, noise_chances
+from analysis.detection import detection_curve, false_alarms
 from analysis.free_field import Loudspeaker
 from systems.array_shape import ArrayShape
+from systems.delays import look
 from systems.localise import Localiser, TDOAParameters
 from systems.noise import tick_generator
 from systems.robot import RobotParameters
@@ -23,27 +24,31 @@ def curve(levels_db, trials=12, **changes):
     return detection_curve(CHIRP, levels_db, **settings)
 
 
-def test_chances_belong_to_the_seed_and_to_each_frame():
-    """The first frames of a longer run are those of a shorter one."""
-    few = noise_chances(20, shape=SHAPE, c=C, seed=9)
-    many = noise_chances(40, shape=SHAPE, c=C, seed=9)
-    np.testing.assert_array_equal(many[:20], few)
-    assert np.unique(many).size == 40
-    assert ((many > 0.0) & (many <= 1.0)).all()
-    assert not np.isin(noise_chances(20, shape=SHAPE, c=C, seed=8), few).any()
+def test_false_alarms_are_counted_at_every_rate_by_itself():
+    """They belong to the seed, and grow with the rate."""
+    rates = (0.999, 0.3, 1e-9)
+    alarms = false_alarms(rates, 200, shape=SHAPE, c=C, seed=9)
+    assert [alarm.rate for alarm in alarms] == list(rates)
+    assert alarms[1:2] == false_alarms([0.3], 200, shape=SHAPE, c=C, seed=9)
+    most, some, none = (alarm.count for alarm in alarms)
+    # Of the frames that are louder than the noise, hardly one is left at 0.999.
+    assert most > 40
+    assert 0 < some < 0.3 * 200
+    assert none == 0
 
 
 def test_a_chance_is_a_false_alarm_of_every_rate_above_it():
-    """The localiser hears something in a frame if and only if its rate is higher."""
-    seed, tick = 9, 3
-    chance = float(noise_chances(tick + 1, shape=SHAPE, c=C, seed=seed)[tick])
-    noise = tick_generator(seed, tick).standard_normal((3, 2500), dtype=np.float32)
+    """Something is heard in a first frame if and only if its rate is higher."""
+    noise = tick_generator(9, 3).standard_normal((3, 2500), dtype=np.float32)
+    default = Localiser.of(TDOAParameters(), SHAPE, C)
+    seen = look(noise, default.plan)
+    assert seen is not None
     for factor, heard in ((1.01, True), (0.99, False)):
-        rate = factor * chance
+        rate = factor * seen[0].chance
         localiser = Localiser.of(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
         _, memory = localiser.localise(noise, localiser.blank())
         # What is noise leaves its level behind.
-        assert (memory.noise_energy == 0.0) == heard
+        assert (memory.energy == 0.0) == heard
 
 
 def test_loud_is_heard_and_faint_is_not():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+import sys
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -118,3 +121,43 @@ def test_what_has_no_derivative_is_refused_with_a_remedy(change, message):
     data = ideal_scenario(Scenario()).model_dump() | change
     with pytest.raises(ValueError, match=rf"{message}.*ideal_scenario"):
         require_ideal(Scenario.model_validate(data))
+
+
+OWN_LAWS = """
+import math
+from pydrake.math import exp
+from pydrake.systems.framework import LeafSystem
+
+
+def smooth(c, s, repulsion):
+    return 3.0 * exp(-2.0 * c)
+
+
+def rough(c, s, repulsion):
+    return 3.0 * math.exp(-2.0 * c)
+"""
+
+
+@pytest.fixture
+def own_laws(tmp_path, monkeypatch):
+    (tmp_path / "own_laws_for_loops.py").write_text(OWN_LAWS, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", list(sys.path))
+    monkeypatch.delitem(sys.modules, "own_laws_for_loops", raising=False)
+    return "own_laws_for_loops"
+
+
+def test_a_users_law_is_linearised_like_ours(own_laws):
+    loop = rest(f"{own_laws}:smooth")
+    state, time_s = loop.settled_state((0.6, 0.0, 0.0))
+    found = loop.period_derivatives(
+        state, time_s, outputs=[("controller", "acceleration_W")]
+    )
+    c = 2.0 - 0.163 - 0.775
+    force = 2.0 * (1.225 - 1.2) - 3.0 * math.exp(-2.0 * c)
+    assert found.y[0] == pytest.approx(force / 3.94, rel=1e-9)
+
+
+def test_a_law_without_derivative_is_refused_with_a_remedy(own_laws):
+    with pytest.raises(ValueError, match=r"law: .*rough.*pydrake\.math"):
+        rest(f"{own_laws}:rough")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from analysis.intervals import bootstrap_interval, wilson_interval
+from analysis.intervals import bootstrap_interval, median_interval, wilson_interval
 
 
 def test_wilson_interval_of_newcombe():
@@ -26,3 +26,21 @@ def test_bootstrap_interval_of_a_mean_is_that_of_the_normal_law():
 
 def test_bootstrap_interval_of_one_value_is_that_value():
     assert bootstrap_interval([4.5], seed=1) == (4.5, 4.5)
+
+
+@pytest.mark.parametrize(
+    ("count", "ranks"), [(5, (1, 5)), (6, (1, 6)), (10, (2, 9)), (25, (8, 18))]
+)
+def test_median_interval_has_the_ranks_of_the_sign_test(count, ranks):
+    # Conover, Practical Nonparametric Statistics, 3.2: ranks for 95 %.
+    values = np.random.default_rng(1).permutation(np.arange(1.0, count + 1.0))
+    assert median_interval(values) == ranks
+
+
+def test_median_interval_covers():
+    generator = np.random.default_rng(3)
+    samples = generator.exponential(size=(2000, 40))
+    intervals = np.array([median_interval(values) for values in samples])
+    covered = (intervals[:, 0] <= np.log(2.0)) & (np.log(2.0) <= intervals[:, 1])
+    # Exactly 1 - 2 P(Binomial(40, 1/2) <= 13) = 0.9615.
+    assert covered.mean() == pytest.approx(0.9615, abs=0.015)

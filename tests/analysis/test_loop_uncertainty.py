@@ -45,11 +45,14 @@ def test_range_slope_is_that_of_the_estimators_closed_form(distance, true_speed)
 
 def test_stiffness_of_the_laws_is_their_closed_form():
     # K_0; k_ref / e^2 at c = 2 alpha; K_0 / rho_1^2 where the force stops growing.
-    assert law_stiffness(scenario()) == pytest.approx(16.0, rel=1e-6)
-    active = law_stiffness(scenario("active"))
-    assert active == pytest.approx(64.0 * math.exp(-2.0), rel=1e-4)
-    at_2017 = law_stiffness(scenario("active2017"))
-    assert at_2017 == pytest.approx(1.1 / 0.1**2, rel=5e-3)
+    gains = scenario().repulsion
+    K_0 = gains.conventional.stiffness_n_m
+    assert law_stiffness(scenario()) == pytest.approx(K_0, rel=1e-6)
+    peak = gains.active.reference_stiffness_n_m * math.exp(-2.0)
+    assert law_stiffness(scenario("active")) == pytest.approx(peak, rel=1e-4)
+    kim = gains.active2017
+    steepest = kim.distance_gain_j / kim.saturation_distance_m**2
+    assert law_stiffness(scenario("active2017")) == pytest.approx(steepest, rel=5e-3)
     assert law_stiffness(scenario("none")) == 0.0
 
 

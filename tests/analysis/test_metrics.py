@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,8 @@ from analysis.metrics import run_metrics
 from analysis.proximity import Proximity
 from diagrams.scenario import Scenario
 from diagrams.simulation import COLUMNS, RunResult
+from diagrams.stop_rules import Collision
+from systems.ultrasonic_array import UltrasonicParameters, cone_ranges
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.
@@ -187,12 +190,16 @@ def test_effort_and_saturation():
         "attraction_x": np.full(ticks, 3.0),
         "repulsion_x": np.full(ticks, 1.0),
         "repulsion_y": np.full(ticks, 3.0),
+        "v_WP_x": np.full(ticks, 0.2),
+        "v_WP_y": np.full(ticks, -0.1),
         "wheel_speed_left": 2.0 * flip,
         "wheel_speed_right": np.full(ticks, 12.0),
         "obstacle_speed_1": np.where(np.arange(ticks) < 5, 1.5, 0.1),
     }
     metrics = run_metrics(straight(ticks=ticks, columns=columns))
     assert metrics["control_effort_rms_n"] == pytest.approx(5.0)
+    # 1 N x 0.2 m/s - 3 N x 0.1 m/s at 81 ticks.
+    assert metrics["push_work_j"] == pytest.approx(-0.1 * 81 * TICK)
     # One wheel's rim changes by 4 rad/s x 0.06 m a tick, the other's never.
     assert metrics["wheel_variation_m_s2"] == pytest.approx(0.5 * 0.24 / TICK)
     assert metrics["saturated_fraction"] == 1.0
@@ -228,9 +235,59 @@ def test_figures_of_a_whole_run(crossing_run):
     """Each one applies, and what must be in an interval is."""
     metrics = run_metrics(crossing_run)
     moving_source = {"shortest_path_m", "spl"}
-    assert {name for name, value in metrics.items() if value is None} == moving_source
+    no_collision = {"contact_warning_s", "contact_unseen_s", "contact_push_n"}
+    without = {name for name, value in metrics.items() if value is None}
+    assert without == moving_source | no_collision
     value = {name: float(x) for name, x in metrics.items() if x is not None}
     assert value["jerk_max_m_s3"] >= value["jerk_rms_m_s3"]
     assert value["minimum_clearance_m"] <= value["clearance_p05_m"]
     assert value["sparc"] < -1.0
     assert 0.0 <= value["saturated_fraction"] <= 1.0
+
+
+def collision(x: float, y: float, theta: float, *, ticks: int = 81) -> RunResult:
+    """A straight drive from there at 0.5 m/s into a box at (2, 0), with cones."""
+    box = {"name": "box", "size_m": [0.1, 0.1], "waypoints_m": [[2.0, 0.0]]}
+    s = 0.5 * TICK * np.arange(ticks)
+    result = motion(
+        x + s * math.cos(theta),
+        y + s * math.sin(theta),
+        np.full(ticks, theta),
+        cause="collision",
+        obstacles=[box],
+        source={"waypoints_m": [[0.0, 5.0]]},
+    )
+    array = UltrasonicParameters()
+    body = np.array([[2.0, 0.0, 0.0, 0.1, 0.1]])
+    for tick, pose in enumerate(result.poses("WB")):
+        ranges = cone_ranges(pose, body, array, FRONT)
+        echo = ranges <= array.maximum_range_m
+        for k in range(3):
+            result.columns[f"range_{k + 1}"][tick] = ranges[k] if echo[k] else 3.0
+            result.columns[f"echo_{k + 1}"][tick] = echo[k]
+    hit = Collision("box", "robot", float(result.time[-1]))
+    return replace(result, collision=hit)
+
+
+def test_a_box_straight_ahead_is_heard_to_the_end():
+    metrics = run_metrics(collision(0.0, 0.0, 0.0))
+    assert metrics["contact_unseen_s"] == 0.0
+    assert metrics["contact_warning_s"] == pytest.approx(2.0)
+
+
+def test_a_box_before_the_end_of_the_bar_is_lost_from_the_cones():
+    """0.35 m aside: the outer cone ends at 45 deg, where the box's far side
+    (y - 0.3 from the bar's middle) is nearer than 0.4 m ahead of P."""
+    metrics = run_metrics(collision(0.0, -0.35, 0.0, ticks=142))
+    # P's x when the corner (2.05, -0.05) of the box leaves at 45 deg: 0.3 aside.
+    left = (2.05 - 0.3 - FRONT) / 0.5
+    last = 141 * TICK
+    assert metrics["contact_unseen_s"] == pytest.approx(last - left, abs=TICK)
+    assert metrics["contact_warning_s"] == pytest.approx(last)
+
+
+def test_a_box_from_behind_was_never_heard_of():
+    metrics = run_metrics(collision(4.0, 0.0, 0.0))
+    assert metrics["contact_warning_s"] is None
+    assert metrics["contact_unseen_s"] is None
+    assert metrics["contact_push_n"] == 0.0

@@ -78,6 +78,7 @@ def test_pairs_in_which_one_has_no_figure_are_left_out():
     median = paired_median(first, second, seed=1)
     assert median.pairs == 2
     assert median.difference == 0.5
+    assert (median.first, median.second) == (2.5, 2.0)
 
 
 def test_no_pair_at_all():

@@ -25,7 +25,8 @@ def refuse(study):
 
 
 MASS = Part("mass", "Mass", lambda study: study.scenario.robot.mass_kg, render)
-TWICE = Part("twice", "Twice", lambda study: 2.0 * study.found["mass"], render)
+TWICE = Part("twice", "Twice", lambda study: 2.0 * study.need("mass"), render)
+BUILT = Part("built", "Built", lambda study: study.need("refused"), render)
 REFUSED = Part("refused", "Refused", refuse, render)
 VERDICTS = Part(
     "verdicts", "Verdicts", lambda study: (judge(LIGHT, study.found["mass"]),), render
@@ -37,11 +38,14 @@ SPREAD = Part(
 
 def test_parts_run_in_order_and_see_what_was_found():
     titles: list[str] = []
-    analysis = analyse_law(load_scenario(), [MASS, REFUSED, TWICE], step=titles.append)
-    assert titles == ["Mass", "Refused", "Twice"]
+    analysis = analyse_law(
+        load_scenario(), [MASS, REFUSED, TWICE, BUILT], step=titles.append
+    )
+    assert titles == ["Mass", "Refused", "Twice", "Built"]
     assert analysis.data("twice") == 2.0 * 3.94
     assert analysis.findings["refused"].problem == "law: cannot; choose another"
     assert analysis.data("refused") is None
+    assert analysis.findings["built"].problem.startswith("refused: has no result")
 
 
 def test_nothing_stands_without_the_first_part():

@@ -35,7 +35,8 @@ def test_obstacle_free():
         [metrics["source_error_median_m"], metrics["source_error_p95_m"]]
     )
     median, p95, *_ = (x for x in numbers("error of the") if x != 95.0)
-    np.testing.assert_allclose([median, p95], error_mm, atol=1.0)
+    # The 95 % is that of few frames with the source abeam: a fifth, or 1 mm.
+    np.testing.assert_allclose([median, p95], error_mm, atol=1.0, rtol=0.2)
     expected = [distance[moving].min(), distance[moving].max(), distance[moving].mean()]
     stated = numbers("distance from the source while")
     np.testing.assert_allclose(stated, expected, atol=TOLERANCE_M)

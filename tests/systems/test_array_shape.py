@@ -92,10 +92,11 @@ def test_flat_to_one_per_cent_is_flat():
 def test_three_in_a_row_are_known_in_any_order():
     places = [[0.5, 0.0], [0.1, 0.0], [0.3, 0.0]]
     row = ArrayShape.of(places).equal_row
-    # Ahead is +y: left is -x.
+    # Ahead is +y, left is -x: from left to right 1, 2, 0.
     assert row is not None
-    assert row[0] == (1, 2, 0)
-    assert row[1] == pytest.approx(0.2)
+    assert row.spacing_m == pytest.approx(0.2)
+    np.testing.assert_array_equal(row.to_delays, [[-1.0, 1.0], [-1.0, 0.0]])
+    np.testing.assert_allclose(row.axes, [[0.0, -1.0], [1.0, 0.0]], atol=1e-12)
     for other in ([*places[:2], [0.31, 0.0]], SQUARE[:3], [*places, [0.7, 0.0]]):
         assert ArrayShape.of(other).equal_row is None
 

@@ -1,0 +1,123 @@
+"""Polynomials and quadratic forms in rational arithmetic.
+
+Enough to check a sum of squares without trusting any solver or rounding: a
+float is a rational number, and sums and products of those are exact.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from fractions import Fraction
+
+__all__ = ["Polynomial", "gram_polynomial", "is_positive_definite", "match_gram"]
+
+#: Exponents of the variables.
+Monomial = tuple[int, ...]
+
+
+class Polynomial:
+    """A polynomial with rational coefficients.
+
+    Args:
+        terms: Coefficient by exponents; floats are taken as they are stored.
+    """
+
+    def __init__(self, terms: dict[Monomial, Fraction | float | int]) -> None:
+        fractions = {m: Fraction(c) for m, c in terms.items()}
+        self.terms = {m: c for m, c in fractions.items() if c != 0}
+
+    def __add__(self, other: Polynomial) -> Polynomial:
+        keys = self.terms.keys() | other.terms.keys()
+        zero = Fraction(0)
+        return Polynomial(
+            {m: self.terms.get(m, zero) + other.terms.get(m, zero) for m in keys}
+        )
+
+    def __neg__(self) -> Polynomial:
+        return Polynomial({m: -c for m, c in self.terms.items()})
+
+    def __sub__(self, other: Polynomial) -> Polynomial:
+        return self + (-other)
+
+    def __mul__(self, other: Polynomial) -> Polynomial:
+        out: dict[Monomial, Fraction | float | int] = {}
+        for m, c in self.terms.items():
+            for n, d in other.terms.items():
+                key = tuple(a + b for a, b in zip(m, n, strict=True))
+                out[key] = out.get(key, Fraction(0)) + c * d
+        return Polynomial(out)
+
+    def derivative(self, variable: int) -> Polynomial:
+        """With respect to a variable, counted from 0."""
+        out: dict[Monomial, Fraction | float | int] = {}
+        for m, c in self.terms.items():
+            if m[variable]:
+                lowered = (*m[:variable], m[variable] - 1, *m[variable + 1 :])
+                out[lowered] = c * m[variable]
+        return Polynomial(out)
+
+    def __call__(self, point: Sequence[float]) -> float:
+        """Value at a point, in floating point."""
+        total = 0.0
+        for m, c in self.terms.items():
+            product = float(c)
+            for x, k in zip(point, m, strict=True):
+                product *= x**k
+            total += product
+        return total
+
+
+def gram_polynomial(
+    basis: Sequence[Monomial], gram: Sequence[Sequence[Fraction]]
+) -> Polynomial:
+    """z' G z of monomials z."""
+    out: dict[Monomial, Fraction | float | int] = {}
+    for i, m in enumerate(basis):
+        for j, n in enumerate(basis):
+            key = tuple(a + b for a, b in zip(m, n, strict=True))
+            out[key] = out.get(key, Fraction(0)) + gram[i][j]
+    return Polynomial(out)
+
+
+def match_gram(
+    target: Polynomial, basis: Sequence[Monomial], gram: Iterable[Iterable[float]]
+) -> list[list[Fraction]] | None:
+    """The Gram matrix near ``gram`` whose z' G z is exactly the target.
+
+    What is missing in a coefficient is spread evenly over the entries that make
+    it.
+
+    Returns:
+        Symmetric rows, or None where the basis cannot make the target.
+    """
+    rows = [[Fraction(value) for value in row] for row in gram]
+    size = len(basis)
+    rows = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
+    places: dict[Monomial, list[tuple[int, int]]] = {}
+    for i in range(size):
+        for j in range(size):
+            key = tuple(a + b for a, b in zip(basis[i], basis[j], strict=True))
+            places.setdefault(key, []).append((i, j))
+    missing = target - gram_polynomial(basis, rows)
+    for monomial, value in missing.terms.items():
+        if monomial not in places:
+            return None
+        share = value / len(places[monomial])
+        for i, j in places[monomial]:
+            rows[i][j] += share
+    return rows
+
+
+def is_positive_definite(rows: Sequence[Sequence[Fraction]]) -> bool:
+    """Whether a symmetric rational matrix is, by exact elimination."""
+    work = [list(row) for row in rows]
+    size = len(work)
+    for k in range(size):
+        pivot = work[k][k]
+        if pivot <= 0:
+            return False
+        for i in range(k + 1, size):
+            factor = work[i][k] / pivot
+            for j in range(k + 1, size):
+                work[i][j] -= factor * work[k][j]
+    return True

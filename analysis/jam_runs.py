@@ -1,0 +1,73 @@
+"""Whether a law jams before the two obstacles of the papers' experiment."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagrams import load_scenario, simulate
+from diagrams.scenario import Scenario
+
+__all__ = ["JAM_STARTS_M", "JamRuns", "jam_runs"]
+
+#: Lateral offsets of the start, m: from before one obstacle to before the other.
+JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())
+
+
+@dataclass(frozen=True)
+class JamRuns:
+    """How the runs of one law ended."""
+
+    law: str
+    causes: dict[str, int]
+    """Runs by cause."""
+
+    @property
+    def jams(self) -> int:
+        """Runs that stopped or circled short of the goal."""
+        return self.causes.get("stuck", 0) + self.causes.get("timeout", 0)
+
+
+def jam_runs(
+    scenario: Scenario,
+    laws: Sequence[str],
+    *,
+    starts_m: Sequence[float] = JAM_STARTS_M,
+    progress: Callable[[float], None] | None = None,
+) -> list[JamRuns]:
+    """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
+
+    Args:
+        scenario: Its attraction and repulsion are used.
+        laws: As ``Scenario.law``.
+        starts_m: Where the robot starts, across the line to the source, m.
+        progress: Called with the number of runs done.
+    """
+    layout = load_scenario("two_static_obstacles", ["hearing=ideal"])
+    static = layout.repulsion.active.speed_limit_m_s
+    active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
+    repulsion = scenario.repulsion.model_copy(update={"active": active})
+    done, found = 0, []
+    for law in laws:
+        causes: Counter[str] = Counter()
+        for start in starts_m:
+            place = layout.start.model_copy(update={"position_m": (0.0, start)})
+            run = simulate(
+                layout.model_copy(
+                    update={
+                        "law": law,
+                        "start": place,
+                        "attraction": scenario.attraction,
+                        "repulsion": repulsion,
+                    }
+                )
+            )
+            causes[run.cause] += 1
+            done += 1
+            if progress is not None:
+                progress(done)
+        found.append(JamRuns(law, dict(causes)))
+    return found

@@ -1,0 +1,62 @@
+"""Columns of a sweep's table, and which runs they are of."""
+
+from __future__ import annotations
+
+import json
+from zlib import crc32
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from diagrams.stop_rules import SUCCESSFUL
+
+__all__ = ["ALL_RUNS", "SUCCESSES", "collisions", "figure", "stream", "successes"]
+
+#: Figures that any run has, however it ended.
+ALL_RUNS = (
+    "minimum_clearance_m",
+    "minimum_obstacle_clearance_m",
+    "minimum_time_to_contact_s",
+    "reaction_distance_m",
+)
+#: Figures that a collision or a jam would cut short: of successful runs alone.
+SUCCESSES = (
+    "time_to_goal_s",
+    "path_length_m",
+    "following_fraction",
+    "following_error_rms_m",
+    "following_error_p95_m",
+    "jerk_rms_m_s3",
+    "jerk_max_m_s3",
+    "angular_jerk_rms_rad_s3",
+    "sparc",
+    "ldlj",
+    "turn_reversals_per_s",
+    "heading_change_rad_m",
+    "control_effort_rms_n",
+    "wheel_variation_m_s2",
+    "saturated_fraction",
+)
+
+
+def successes(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """(n,) whether each run did what it should."""
+    return rows["cause"].isin(SUCCESSFUL).to_numpy()
+
+
+def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """(n,) whether each run ended in a collision."""
+    return (rows["cause"] == "collision").to_numpy()
+
+
+def figure(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
+    """The figure of each run; NaN where it has none."""
+    if name not in rows:
+        return np.full(len(rows), np.nan)
+    return rows[name].to_numpy(dtype=float)
+
+
+def stream(seed: int, name: str) -> int:
+    """Seed of a figure's own bootstrap."""
+    return crc32(json.dumps([seed, name]).encode())

@@ -1,0 +1,99 @@
+"""The designed gains in the diagram: the barrier holds, and not by luck."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from analysis.design import DesignRequirements, metres_to_go
+from analysis.push_and_pull import DESIGNED_LAWS
+from diagrams import simulate
+from diagrams.scenario import Scenario
+from phonotaxis import main
+
+pytestmark = pytest.mark.slow
+
+WALL_X = 2.5
+#: Fields that a law's push is proportional to.
+SPRINGS = {
+    "conventional": ("stiffness_n_m",),
+    "active": ("reference_stiffness_n_m", "matched_stiffness_n_m"),
+    "active2017": ("distance_gain_j",),
+}
+
+
+def run_at_wall(law: str, share: float):
+    """Head-on at a wall, the target as far behind it as the design allows for."""
+    repulsion = Scenario().repulsion.model_dump()
+    for field in SPRINGS[law]:
+        repulsion[law][field] *= share
+    to_go = metres_to_go(Scenario(), DesignRequirements())
+    source = WALL_X + to_go + Scenario().attraction.follow_distance_m
+    return simulate(
+        Scenario.model_validate(
+            {
+                "law": law,
+                "hearing": "ideal",
+                "ideal_hearing": {"burst_gaps": False},
+                "obstacle_sensing": "ideal",
+                "odometry": {"rounding": False},
+                "duration_s": 15.0,
+                "source": {"waypoints_m": [[source, 0.0]]},
+                "obstacles": [
+                    {"waypoints_m": [[WALL_X + 0.05, 0.0]], "size_m": [0.1, 3.0]}
+                ],
+                "repulsion": repulsion,
+            }
+        )
+    )
+
+
+@pytest.mark.parametrize("law", DESIGNED_LAWS)
+def test_P_stops_before_a_wall(law):
+    run = run_at_wall(law, share=1.0)
+    speed = np.hypot(run.columns["v_WB_x"], run.columns["v_WB_y"])
+    assert speed.max() == pytest.approx(0.72, abs=1e-6), "it must come at top speed"
+    assert run.cause == "timeout"
+    ahead = run.columns["p_WB_x"] + 0.175 * np.cos(run.columns["theta_WB"])
+    assert WALL_X - ahead.max() > 0.03
+
+
+@pytest.mark.parametrize("law", DESIGNED_LAWS)
+def test_a_fifth_less_does_not_stop_it(law):
+    run = run_at_wall(law, share=0.8)
+    assert run.cause == "collision"
+
+
+def test_command_derives_the_defaults(tmp_path, capsys):
+    out = tmp_path / "design"
+    assert main(["design", "--out", str(out)]) == 0
+    text = capsys.readouterr().out
+    contact = [line for line in text.splitlines() if "contact stiffness" in line]
+    assert [line.endswith("not met") for line in contact] == [
+        *(True, False, True),
+        *(False, False, True),
+    ]
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    laws = {law["law"]: law for law in summary["today"]["laws"]}
+    for law in DESIGNED_LAWS:
+        assert laws[law]["gains"] == getattr(Scenario().repulsion, law).model_dump()
+    assert all(runs["jams"] == 0 for runs in summary["today"]["jams"])
+    better = summary["recommended"]
+    assert [law["met"] for law in better["laws"]] == [True, True, False]
+    assert better["damping_ratio"] >= 0.7
+    assert {path.name for path in out.iterdir()} == {
+        "summary.json",
+        "scenario.yaml",
+        "recommended.yaml",
+        "design.png",
+        "law_curves.png",
+    }
+
+
+def test_command_refuses_what_cannot_be_designed(tmp_path, capsys):
+    words = ["design", "--set", "attraction.follow_distance_m=3.5"]
+    assert main([*words, "--out", str(tmp_path / "x")]) == 2
+    assert "attraction.follow_distance_m: 3.5 m" in capsys.readouterr().err
+    assert not (tmp_path / "x").exists()

@@ -1,0 +1,90 @@
+"""The whole report of one law: what others rely on, and what it says."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+import phonotaxis
+from diagrams import load_scenario
+
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("stability") / "out"
+    words = ["stability", "obstacle_free", "--law", "conventional", "--json"]
+    assert phonotaxis.main([*words, "--out", str(out)]) == 0
+    return out
+
+
+@pytest.fixture(scope="module")
+def document(report: Path) -> dict[str, Any]:
+    return json.loads((report / "summary.json").read_text())
+
+
+def test_keys_that_others_rely_on(document):
+    point = document["equilibria"][0]
+    assert {"position_W", "kind", "eigenvalues"} <= set(point)
+    assert np.shape(point["eigenvalues"])[1] == 2
+    for loop in ("target_loop", "implemented_loop"):
+        assert {
+            "poles", "damping_ratio", "natural_frequency_rad_s", "phase_margin_deg",
+            "delay_margin_s", "disk_margin",
+        } <= set(document[loop])  # fmt: skip
+    assert document["certificates"][0]["kind"] == "energy"
+    verdicts = document["verdicts"]
+    assert {"name", "value", "threshold", "verdict"} <= set(verdicts[0])
+    assert len({row["name"] for row in verdicts}) == len(verdicts)
+
+
+def test_ideal_target_loop_is_the_closed_form(document):
+    # M s^2 + D s + K = 0 and L = K / (M s^2 + D s) with 3.94, 1 and 2.
+    loop = document["target_loop"]
+    assert loop["poles"][0] == pytest.approx([-0.1269036, 0.7010775], rel=1e-6)
+    assert loop["damping_ratio"] == pytest.approx(0.17812, rel=1e-4)
+    assert loop["phase_margin_deg"] == pytest.approx(20.19, abs=0.005)
+    assert loop["delay_margin_s"] == pytest.approx(0.5105, abs=5e-5)
+
+
+def test_nothing_failed_and_the_printed_gains_do_not_pass(document):
+    assert not [key for key, part in document.items() if "problem" in str(part)[:12]]
+    verdicts = {row["name"]: row["verdict"] for row in document["verdicts"]}
+    assert verdicts["growth at rest"] == "pass"
+    assert verdicts["damping ratio at rest"] == "fail"
+    assert verdicts["collisions from certified starts"] == "pass"
+
+
+def test_page_holds_everything_and_loads_nothing(report):
+    page = (report / "report.html").read_text()
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
+    assert not re.findall(r'(?:src|href)="(?!#|data:)', page)
+    assert not re.findall(r"url\((?!#)|@import|<script", page)
+    assert page.count("<figure>") > 8
+    assert (
+        "nan" not in re.sub(r"<svg.*?</svg>", "", page, flags=re.DOTALL).lower().split()
+    )
+
+
+def test_exported_models_have_the_poles_of_the_document(report, document):
+    models = loadmat(report / "models.mat", simplify_cells=True)
+    A = models["closed_loop_continuous"]["A"]
+    expected = document["linear_models"]["continuous"]["poles"]
+    found = np.linalg.eigvals(A)
+    for re_part, im_part in expected:
+        assert np.abs(found - complex(re_part, im_part)).min() < 1e-9
+    assert models["closed_loop"]["Ts"] == 0.025
+    assert len(models["closed_loop"]["StateName"]) == len(models["closed_loop"]["A"])
+
+
+def test_effective_scenario_can_be_analysed_again(report):
+    assert load_scenario(report / "scenario.yaml").law == "conventional"

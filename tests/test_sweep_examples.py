@@ -1,0 +1,52 @@
+"""docs/sweeps.md shows what works."""
+
+from __future__ import annotations
+
+import re
+import shlex
+from pathlib import Path
+
+import pandas as pd
+import pytest
+from ruamel.yaml import YAML
+
+import phonotaxis
+from analysis.sweep_plan import SweepPlan, load_sweep
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
+EXAMPLE = ROOT / "docs" / "examples" / "crossing.yaml"
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"(?ms)^```{language}\n(.*?)^```$", PAGE)
+
+
+def test_the_example_is_the_file():
+    yaml = YAML(typ="safe")
+    assert yaml.load(blocks("yaml")[0]) == yaml.load(EXAMPLE)
+    assert len(load_sweep(EXAMPLE).points()) == 240
+
+
+def test_the_table_of_fields_is_that_of_the_plan():
+    table = PAGE.partition("## The file")[2].partition("\n\nFields")[0]
+    named = re.findall(r"(?m)^\| `(\w+)` \|", table)
+    assert named == [name for name in SweepPlan.model_fields if name != "folder"]
+
+
+@pytest.mark.slow
+def test_the_commands_and_the_script_run(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    example = tmp_path / EXAMPLE.relative_to(ROOT)
+    example.parent.mkdir(parents=True)
+    text = EXAMPLE.read_text("utf-8").replace("runs: 40", "runs: 1")
+    example.write_text(text.replace("hearing: ideal", "hearing: ideal, duration_s: 1"))
+    commands = blocks("sh")[0].splitlines()
+    assert len(commands) == 2
+    for command in commands:
+        program, *words = shlex.split(command)
+        assert program == "phonotaxis"
+        assert phonotaxis.main(words) == 0
+    assert len(pd.read_parquet("results/crossing/runs.parquet")) == 6
+    exec(blocks("python")[0], {})
+    assert "completed" in capsys.readouterr().out
