@@ -8,7 +8,7 @@ what is left after a cycle of what was off before it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from analysis.equilibria import follow_equilibrium
 from analysis.ideal_loop import IdealLoop, ideal_loop
+from analysis.model_reduction import minimal_model
+from analysis.open_loops import DIRECTIONS, Direction
 from analysis.operating_points import OperatingPoint, motion_model
 from diagrams.scenario import Scenario
 from systems.geometry import control_point
@@ -53,8 +55,11 @@ class BurstCycle:
     """Sound in each cycle, s."""
     period_s: float
     """Length of a cycle, s."""
-    multipliers: NDArray[np.complex128]
-    """Over a cycle, largest first; those of a continuum of equilibria left out."""
+    along: NDArray[np.complex128]
+    """Multipliers over a cycle along the line to the source, largest first; those
+    of a continuum of equilibria left out."""
+    across: NDArray[np.complex128]
+    """The same across the line."""
     matrices: NDArray[np.float64] = field(repr=False)
     """(ticks, n, n) of the whole state, tick after tick of a cycle."""
     loop: IdealLoop = field(repr=False)
@@ -63,6 +68,12 @@ class BurstCycle:
     """At the beginning of a cycle."""
     point: OperatingPoint = field(repr=False)
     """The same equilibrium with a sound that never stops."""
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Of both directions, largest first."""
+        both = np.concatenate([self.along, self.across])
+        return both[np.argsort(-np.abs(both))]
 
     @property
     def largest(self) -> float:
@@ -82,11 +93,11 @@ class BurstRun:
     hold: Hold
     """What the target does between bursts."""
     factor: float
-    """Fitted growth over a cycle, to compare with ``BurstCycle.largest``."""
+    """Fitted growth over a cycle: the largest |multiplier| of that direction."""
     time_s: NDArray[np.float64] = field(repr=False)
     """(n,) s, every tick."""
     offset_m: NDArray[np.float64] = field(repr=False)
-    """(n,) of P from the equilibrium along the line to the source, m."""
+    """(n,) of P from the equilibrium in the direction of the kick, m."""
 
 
 def burst_cycle(
@@ -127,7 +138,8 @@ def burst_cycle(
         hold=hold,
         on_s=on,
         period_s=on + gap,
-        multipliers=_multipliers(point, matrices, on + gap),
+        along=_multipliers(point, matrices, 0),
+        across=_multipliers(point, matrices, 1),
         matrices=matrices,
         loop=loop,
         state=state,
@@ -165,25 +177,43 @@ def _matrices(
 
 
 def _multipliers(
-    point: OperatingPoint, matrices: NDArray[np.float64], period_s: float
+    point: OperatingPoint, matrices: NDArray[np.float64], direction: int
 ) -> NDArray[np.complex128]:
     product = np.eye(matrices.shape[1])
     for matrix in matrices:
         product = matrix @ product
-    motion = motion_model(point, product, period_s)
-    poles = motion.poles[np.abs(motion.poles - 1.0) > _NEUTRAL]
+    motion = motion_model(point, product, 1.0)
+    axis = _axes(point)[direction]
+    line = minimal_model(
+        replace(
+            motion,
+            B=motion.B @ axis[:, None],
+            C=axis[None] @ motion.C,
+            D=np.zeros((1, 1)),
+        )
+    )
+    poles = line.poles[np.abs(line.poles - 1.0) > _NEUTRAL]
     return poles[np.argsort(-np.abs(poles))]
 
 
-def simulate_burst_cycle(cycle: BurstCycle, cycles: int = 40) -> BurstRun:
-    """Runs the diagram after a kick along the line to the source.
+def _axes(point: OperatingPoint) -> NDArray[np.float64]:
+    """(2, 2) rows: along the line to the source, and across it, in W."""
+    c, s = math.cos(point.theta_WB), math.sin(point.theta_WB)
+    return np.array([[c, s], [-s, c]])
+
+
+def simulate_burst_cycle(
+    cycle: BurstCycle, cycles: int = 40, *, direction: Direction = "along"
+) -> BurstRun:
+    """Runs the diagram after a kick.
 
     Args:
         cycle: The analysed cycle.
         cycles: To simulate; the first quarter does not count.
+        direction: Of the kick: along the line to the source, or across it.
     """
     loop, point = cycle.loop, cycle.point
-    axis = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
+    axis = _axes(point)[DIRECTIONS.index(direction)]
     state = cycle.state.copy()
     kick = [loop.state_names.index(f"command.v_WP_{k}") for k in "xy"]
     state[kick] += _KICK_M_S * axis

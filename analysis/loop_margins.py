@@ -42,6 +42,8 @@ SKEWS = (-1.0, 0.0, 1.0)
 _POINTS = 1500
 #: Lowest and highest frequency, rad/s; a sampled loop ends at its Nyquist frequency.
 _LOWEST, _HIGHEST = 1e-3, 1e3
+#: A frequency that counts as none, rad/s.
+_AT_REST = 1e-6
 #: A response below this everywhere is no loop.
 _NO_LOOP = 1e-9
 
@@ -198,6 +200,9 @@ def _gain_margins(
         L(omega)
         for omega in _zeros(response.omega, response.L.imag, lambda w: L(w).imag)
     ]
+    at_rest = L(_AT_REST)
+    if abs(at_rest.imag) < 1e-2 * abs(at_rest.real):
+        values.append(at_rest)
     if period:
         values.append(L(math.pi / period))
     for value in values:

@@ -93,6 +93,16 @@ def test_simulation_shows_the_largest_multiplier(hold):
     assert run.factor == pytest.approx(cycle.largest, rel=5e-3)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("direction", ["along", "across"])
+def test_simulation_with_the_active_law_shows_both_directions(direction):
+    cycle = burst_cycle(scenario(law="active"), "robot")
+    run = simulate_burst_cycle(cycle, 24, direction=direction)
+    largest = abs(getattr(cycle, direction)[0])
+    assert run.factor == pytest.approx(largest, rel=0.05)
+    assert set(np.abs(cycle.multipliers)) >= {largest}
+
+
 @pytest.mark.parametrize(("on", "gap"), [(0.0, 2.0), (0.5, -0.1), (0.51, 1.5)])
 def test_a_cycle_of_no_whole_ticks_is_refused(on, gap):
     with pytest.raises(ValueError, match=r"sound: .* multiples of 0.025"):

@@ -81,6 +81,18 @@ def test_gain_margin_of_a_known_loop(margin):
     assert found.stable
 
 
+def test_an_unstable_plant_needs_a_least_gain():
+    """L = 2 / (s - 1): stable for gains above a half."""
+    from analysis.linear_models import LinearModel
+
+    one = np.ones((1, 1))
+    model = LinearModel("L", one, one, 2 * one, 0 * one, ("x",), ("u",), ("y",))
+    found = loop_margins(model)
+    assert found.stable
+    assert found.gain_reduction_margin == pytest.approx(0.5, rel=1e-6)
+    assert found.gain_margin == math.inf
+
+
 def test_sampled_margins_are_those_of_control():
     model = open_loop(follow_equilibrium(Scenario(law="none")), "actuator")
     ours = loop_margins(model)
