@@ -110,7 +110,9 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
             "Poles against the sample period.",
         ),
         *(
-            figure_html(plot_chart(chart), f"{name}-chart{k}", f"{chart.title}.")
+            figure_html(
+                plot_chart(chart), f"{name}-chart{k}", f"Growth: {chart.title}."
+            )
             for k, chart in enumerate(data.charts)
         ),
     ]

@@ -185,12 +185,18 @@ def equation(tex: str, name: str, text: str) -> str:
 def _embed(svg: str, name: str, label: str) -> str:
     """An SVG file as an element that shares its page with others.
 
-    Identifiers get the figure's name in front, for they must differ on a page.
+    Identifiers must differ on a page: those that are referred to get the figure's
+    name in front, others are dropped.
     """
     svg = svg[svg.index("<svg") :].strip()
     svg = re.sub(r"(?s)<metadata>.*?</metadata>", "", svg)
     svg = re.sub(r"<!--.*?-->", "", svg)
-    svg = re.sub(r'\bid="([^"]+)"', rf'id="{name}-\1"', svg)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg))
+
+    def kept(match: re.Match[str]) -> str:
+        return f' id="{name}-{match[1]}"' if match[1] in used else ""
+
+    svg = re.sub(r' id="([^"]+)"', kept, svg)
     svg = re.sub(r'(href=")#', rf"\1#{name}-", svg)
     svg = svg.replace("url(#", f"url(#{name}-")
     label = html.escape(label.replace("`", ""))

@@ -42,7 +42,13 @@ def plot_pole_cloud(cloud: PoleCloud) -> Figure:
     axes.set_xlabel("real part of ln(z)/T (1/s); left of 0 decays")
     axes.set_ylabel("imaginary part (rad/s)")
     axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.legend(loc="upper left", fontsize=9)
+    axes.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=3,
+        fontsize=9,
+        frameon=False,
+    )
     return figure
 
 

@@ -13,7 +13,7 @@ signs of e
 
 Clarabel finds P and the multipliers in turn; CSDP repeats the last step, and
 rational arithmetic checks it without either (``analysis.exact_polynomials``).
-SCS is not used: it takes infeasible programs for solved ones.
+SCS is not used: its tolerance is too loose for a proof.
 """
 
 from __future__ import annotations

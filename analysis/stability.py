@@ -166,6 +166,7 @@ def _run(part: Part, study: Study) -> Finding:
     start = time.perf_counter()
     try:
         data, problem = part.compute(study), ""
-    except ValueError as error:
-        data, problem = None, str(error)
+    except (ValueError, ArithmeticError, RuntimeError) as error:
+        # The last two are a computation's that broke down, Drake's among them.
+        data, problem = None, str(error) or type(error).__name__
     return Finding(part, data, problem, time.perf_counter() - start)
