@@ -18,13 +18,24 @@ from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.analysis import (
     ApplySimulatorConfig,
-    InitializeParams,
     Simulator,
     Simulator_,
     SimulatorConfig,
 )
 
 from analysis.autodiff import seed, value_and_gradient
+from analysis.diagram_state import (
+    Port,
+    Runner,
+    get_state,
+    run_periods,
+    set_state,
+)
+from analysis.ideal_scenarios import (
+    frozen_scenario,
+    ideal_scenario,
+    require_ideal,
+)
 from analysis.state_names import state_names
 from diagrams import build_sound_follower
 from diagrams.scenario import Scenario
@@ -41,84 +52,8 @@ __all__ = [
     "require_ideal",
 ]
 
-#: A port of a block: (role in ``SoundFollower.blocks``, name of the port).
-Port = tuple[str, str]
-
 #: The tracker's slowest mode decays as 0.27 a tick where hearing is exact.
 SETTLING_TICKS = 40
-
-_ALL_IDEAL: dict[str, Any] = {
-    "hearing": "ideal",
-    "obstacle_sensing": "ideal",
-    "ideal_hearing": {
-        "burst_gaps": False,
-        "bearing_noise_deg": 0.0,
-        "range_noise_fraction": 0.0,
-    },
-    "odometry": {"rounding": False},
-}
-
-
-def ideal_scenario(scenario: Scenario) -> Scenario:
-    """The same scenario with exact sensors and a sound that never stops."""
-    return _updated(scenario, _ALL_IDEAL)
-
-
-def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
-    """The same scenario with source and obstacles at rest, where they are then.
-
-    Args:
-        scenario: Any scenario.
-        time_s: The moment, s.
-    """
-    x, y, theta = scenario.source.path().pose(time_s)
-    source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
-    obstacles = []
-    for obstacle in scenario.obstacles:
-        x, y, theta = obstacle.path().pose(time_s)
-        rest = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
-        obstacles.append(obstacle.model_dump() | rest)
-    return _updated(scenario, {"source": source, "obstacles": obstacles})
-
-
-def _updated(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
-    data = scenario.model_dump()
-    for key, value in changes.items():
-        data[key] = data[key] | value if isinstance(value, dict) else value
-    return Scenario.model_validate(data)
-
-
-def require_ideal(scenario: Scenario) -> None:
-    """Raises what to do instead where a scenario has no linear model.
-
-    Raises:
-        ValueError: Some block has no derivative.
-    """
-    hearing = scenario.ideal_hearing
-    checks = (
-        (
-            scenario.hearing == "ideal",
-            "hearing: 'audio' has no linear model, for a waveform has no equilibrium",
-        ),
-        (
-            scenario.obstacle_sensing == "ideal",
-            "obstacle_sensing: 'ultrasonic' has no linear model, for cones jump",
-        ),
-        (
-            not scenario.odometry.rounding,
-            "odometry.rounding: a rounded wheel angle has no derivative",
-        ),
-        (
-            hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
-            "ideal_hearing: noise has no derivative",
-        ),
-    )
-    for holds, reason in checks:
-        if not holds:
-            raise ValueError(
-                f"{reason}; linearise ideal_scenario(scenario), which differs in "
-                "sensing alone"
-            )
 
 
 @dataclass(frozen=True)
@@ -211,7 +146,7 @@ class IdealLoop:
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
         context.SetTime(time_s)
-        _set_state(context, state)
+        set_state(context, state)
         return context
 
     def period_map(
@@ -235,8 +170,8 @@ class IdealLoop:
         context = simulator.get_mutable_context()
         for port, value in fixed.items():
             self.fix(context, port, np.asarray(value, dtype=float))
-        _run(simulator, state, time_s, periods)
-        return _get_state(context)
+        run_periods(simulator, state, time_s, periods)
+        return get_state(context)
 
     def period_derivatives(
         self,
@@ -268,13 +203,13 @@ class IdealLoop:
                 self.fix(context, port, part, twin=True)
             start += len(value)
         context.SetTime(time_s)
-        _set_state(context, seeded[:count])
+        set_state(context, seeded[:count])
         read = [self._read(context, port) for port in outputs]
         y, by_all = value_and_gradient(
             np.concatenate(read) if read else np.empty(0), start
         )
-        _run(simulator, seeded[:count], time_s, 1)
-        after, jacobian = value_and_gradient(_get_state(context), start)
+        run_periods(simulator, seeded[:count], time_s, 1)
+        after, jacobian = value_and_gradient(get_state(context), start)
         return PeriodDerivatives(
             next_state=after,
             A=jacobian[:, :count],
@@ -294,9 +229,8 @@ class IdealLoop:
             time_s: A multiple of the period, s.
             fixed: Input ports that are cut off, and fed by ``Runner.fix``.
         """
-        return Runner(
-            self, self._simulator(frozenset(fixed), twin=False), state, time_s
-        )
+        simulator = self._simulator(frozenset(fixed), twin=False)
+        return Runner(simulator, self.fix, state, time_s)
 
     def settled_state(
         self,
@@ -316,7 +250,7 @@ class IdealLoop:
             State and its time in s.
         """
         context = self.follower.diagram.CreateDefaultContext()
-        state = _get_state(context)
+        state = get_state(context)
         speed = math.hypot(*v_WP)
         wheel = speed / self.scenario.robot.wheel_radius_m
         still = [*pose_WB, 0.0, 0.0]
@@ -366,39 +300,6 @@ class IdealLoop:
         return block.GetOutputPort(name).Eval(block.GetMyContextFromRoot(context))
 
 
-class Runner:
-    """A simulation whose state and cut inputs can be changed between steps.
-
-    It shares its context with other uses of the same loop: finish one first.
-    """
-
-    def __init__(
-        self, loop: IdealLoop, simulator: Any, state: NDArray[np.float64], time_s: float
-    ) -> None:
-        self._loop, self._simulator = loop, simulator
-        self._context = simulator.get_mutable_context()
-        _begin(simulator, state, time_s)
-
-    def fix(self, port: Port, value: NDArray[np.float64]) -> None:
-        """What a cut input reads from now on."""
-        self._loop.fix(self._context, port, value)
-
-    def advance(self, time_s: float) -> None:
-        """Simulates until then; a tick at that moment is still to come."""
-        if time_s > self._context.get_time():
-            self._simulator.AdvanceTo(time_s)
-
-    def state(self) -> NDArray[np.float64]:
-        """(n,) now."""
-        return np.asarray(_get_state(self._context), dtype=float)
-
-    def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
-        """Replaces elements of the state."""
-        state = self.state()
-        state[list(indices)] = values
-        _set_state(self._context, state)
-
-
 @lru_cache(maxsize=64)
 def _cached_loop(key: str) -> IdealLoop:
     return IdealLoop(Scenario.model_validate_json(key))
@@ -414,36 +315,3 @@ def ideal_loop(scenario: Scenario) -> IdealLoop:
         ValueError: The scenario has no linear model.
     """
     return _cached_loop(scenario.model_dump_json())
-
-
-def _run(simulator: Any, state: Any, time_s: float, periods: int) -> None:
-    _begin(simulator, state, time_s)
-    # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
-    simulator.AdvanceTo((round(time_s / FRAME_PERIOD_S) + periods) * FRAME_PERIOD_S)
-
-
-def _begin(simulator: Any, state: Any, time_s: float) -> None:
-    context = simulator.get_mutable_context()
-    context.SetTime(round(time_s / FRAME_PERIOD_S) * FRAME_PERIOD_S)
-    _set_state(context, state)
-    quiet = InitializeParams()
-    quiet.suppress_initialization_events = True
-    simulator.Initialize(quiet)
-
-
-def _set_state(context: Any, state: Any) -> None:
-    start = context.num_continuous_states()
-    context.SetContinuousState(state[:start])
-    for group in range(context.num_discrete_state_groups()):
-        size = context.get_discrete_state(group).size()
-        context.SetDiscreteState(group, state[start : start + size])
-        start += size
-
-
-def _get_state(context: Any) -> Any:
-    groups = [
-        context.get_discrete_state(k).CopyToVector()
-        for k in range(context.num_discrete_state_groups())
-    ]
-    continuous = context.get_continuous_state_vector().CopyToVector()
-    return np.concatenate([continuous, *groups])

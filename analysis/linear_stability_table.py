@@ -26,7 +26,15 @@ from diagrams import load_scenario
 from diagrams.scenario import Scenario
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["main"]
+__all__ = [
+    "contact_rows",
+    "draw",
+    "equilibrium_rows",
+    "main",
+    "margin_rows",
+    "mode_rows",
+    "tables",
+]
 
 LAWS = ("none", "conventional", "active", "active2017")
 #: Slower modes are of the motion, faster ones of motors and filters, rad/s.
@@ -61,7 +69,8 @@ def _routes() -> Iterator[Sequence[str]]:
         )
 
 
-def _modes() -> Iterator[Sequence[str]]:
+def mode_rows() -> Iterator[Sequence[str]]:
+    """Modes at rest and following, law by law."""
     for law, state, point in _points():
         for mode in point.modes:
             s = mode.eigenvalue
@@ -70,7 +79,7 @@ def _modes() -> Iterator[Sequence[str]]:
                 yield (
                     law,
                     state,
-                    f"{point.offset_m:.3f}",
+                    f"{abs(point.offset_m):.3f}",
                     f"{s.real:.4f}{tail}",
                     f"{mode.damping_ratio:.3f}",
                     f"{mode.frequency_rad_s:.3f}",
@@ -89,7 +98,8 @@ def _margin_cells(found: LoopMargins) -> Sequence[str]:
     )
 
 
-def _margins() -> Iterator[Sequence[str]]:
+def margin_rows() -> Iterator[Sequence[str]]:
+    """Margins of the ideal target loop, and of every cut of each law's loop."""
     ideal: tuple[BreakPoint, ...] = ("sensor", "actuator")
     for at in ideal:
         margins = loop_margins(target_loop(Scenario(), at))
@@ -133,7 +143,8 @@ def _bursts() -> Iterator[Sequence[str]]:
                     yield law, hold, direction, *cells
 
 
-def _contact() -> Iterator[Sequence[str]]:
+def contact_rows() -> Iterator[Sequence[str]]:
+    """Largest K_0 and k_ref, a motor lag a row."""
     limits = contact_limits(Scenario())
     for lag, soft, stiff in zip(
         limits.motor_lags_s,
@@ -157,7 +168,8 @@ def _steps() -> Iterator[Sequence[str]]:
         yield law, *cells, errors
 
 
-def _equilibria() -> Iterator[Sequence[str]]:
+def equilibrium_rows() -> Iterator[Sequence[str]]:
+    """Numbers of equilibria by kind."""
     for name in ("default", "two_static_obstacles"):
         for law in LAWS[1:]:
             search = find_equilibria(load_scenario(name, [f"law={law}"]))
@@ -167,7 +179,6 @@ def _equilibria() -> Iterator[Sequence[str]]:
                 law,
                 *(f"{kinds.count(kind)}" for kind in ("sink", "saddle", "source")),
                 f"{len(search.switching)}",
-                f"{search.cells}",
                 "yes" if search.complete else "no",
             )
 
@@ -179,9 +190,9 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
         duration_s: Of the runs that check delay margins, s.
     """
     yield from _table(
-        ("scenario", "law", "sinks", "saddles", "sources", "switching", "cells",
+        ("scenario", "law", "sinks", "saddles", "sources", "switching",
          "complete"),
-        _equilibria(),
+        equilibrium_rows(),
     )  # fmt: skip
     yield ""
     yield from _table(
@@ -193,7 +204,7 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
     yield from _table(
         ("law", "operating point", "offset (m)", "pole (rad/s)", "damping ratio",
          "frequency (rad/s)"),
-        _modes(),
+        mode_rows(),
     )  # fmt: skip
     yield ""
     yield from _table(
@@ -205,7 +216,7 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
     yield from _table(
         ("loop", "cut at", "gain margin", "phase margin (deg)", "crossover (rad/s)",
          "modulus margin", "disk"),
-        _margins(),
+        margin_rows(),
     )  # fmt: skip
     yield ""
     yield from _table(
@@ -229,7 +240,7 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
     yield ""
     latencies = contact_limits(Scenario()).latency_ticks
     yield from _table(
-        ("motor lag", *(f"{25 * ticks} ms late" for ticks in latencies)), _contact()
+        ("motor lag", *(f"{25 * ticks} ms late" for ticks in latencies)), contact_rows()
     )
 
 
