@@ -186,14 +186,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--hearing", choices=("audio", "ideal"), default="audio")
     parser.add_argument("--pictures", metavar="DIR", type=Path, help="draw there")
     options = parser.parse_args(arguments)
-    rows = certificate_rows(
-        options.scenario,
-        options.laws,
-        starts=options.starts,
-        diagram_starts=options.diagram,
-        hearing=options.hearing,
-        progress=lambda text: _say(sys.stderr, text),
-    )
+    try:
+        rows = certificate_rows(
+            options.scenario,
+            options.laws,
+            starts=options.starts,
+            diagram_starts=options.diagram,
+            hearing=options.hearing,
+            progress=lambda text: _say(sys.stderr, text),
+        )
+    except ValueError as error:
+        parser.error(str(error))
     _say(sys.stdout, certificate_table(rows))
     if options.pictures is not None:
         _draw(rows, options.pictures)

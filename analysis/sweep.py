@@ -103,7 +103,10 @@ def prepare_sweep(
         raise ValueError("workers: a cluster has its own; leave out --workers")
     if resume and out is None:
         raise ValueError("out: --resume needs the directory to go on with; name it")
-    directory = Path(out) if resume and out is not None else choose_directory(out)
+    begun = (
+        resume and out is not None and Path(out).is_dir() and any(Path(out).iterdir())
+    )
+    directory = Path(out) if begun and out is not None else choose_directory(out)
     points = plan.points()
     _build_each_kind(plan, points)
     runner: Runner

@@ -30,6 +30,8 @@ __all__ = ["sweep_page", "write_sweep"]
 
 #: Pages stay readable: so many maps, and so many commands for errors and others.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
+#: With more cells their tables come last.
+MOST_CELLS = 24
 
 
 def write_sweep(
@@ -54,12 +56,15 @@ def sweep_page(
     summary: dict[str, Any],
 ) -> str:
     """The whole page; arguments as of ``sweep_summary``."""
+    cells = {"How the runs ended": [_causes(plan, results), _figures(plan, results)]}
+    few = len(plan.cells()) <= MOST_CELLS
     parts = {
         "Summary": _about(plan, results, summary),
-        "How the runs ended": [_causes(plan, results), _figures(plan, results)],
+        **(cells if few else {}),
         "Over the grid": _maps(plan, results),
         "Over the draws": _marginals(plan, results),
         "Runs to look at": _commands(points, results, Path(summary["out"])),
+        **({} if few else cells),
     }
     shown = {title: inner for title, inner in parts.items() if inner}
     contents = [(_anchor(title), title) for title in shown]
@@ -77,11 +82,13 @@ def _anchor(title: str) -> str:
 def _about(
     plan: SweepPlan, results: pd.DataFrame, summary: dict[str, Any]
 ) -> list[str]:
-    draws = "the same draws in every cell" if plan.pair else "draws of its own"
+    causes = results["cause"].value_counts()
+    draws = "all cells have the same" if plan.pair else "each cell has its own"
     rows = [
         ("Scenario", plan.scenario),
         ("Runs", f"{len(results)}: {plan.runs} in each of {len(plan.cells())} cells"),
-        ("Seed", f"{plan.seed}; each cell has {draws}"),
+        ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
+        ("Seed", f"{plan.seed}; {draws} draws"),
         ("Set", _listed(plan.set)),
         ("Grid", _listed({key: list(v) for key, v in plan.grid.items()})),
         (

@@ -69,7 +69,7 @@ def _heat_map(axes: Axes, quantity: Quantity, values: np.ndarray) -> None:
     )
     axes.set_title(quantity.title, fontsize=10)
     middle = 0.5 * sum(image.get_clim())
-    if values.size > 100:
+    if values.shape[1] > 8:  # no room for numbers
         axes.figure.colorbar(image, ax=axes)
         return
     for (row, column), value in np.ndenumerate(values):

@@ -50,22 +50,23 @@ class SweepStore:
                 use; ``out: ...``.
         """
         self.out = out
-        if out.is_dir() and any(out.iterdir()):
-            _check_same(out, plan)
-        else:
-            with whole_directory(out) as directory:
-                _make(directory, plan)
+        self._journal = -1
         try:
+            if out.is_dir() and any(out.iterdir()):
+                _check_same(out, plan)
+            else:
+                with whole_directory(out) as directory:
+                    _make(directory, plan)
             self._lock = _locked(out / MANIFEST)
-            self._journal = -1
-            self._open()
         except BlockingIOError:
             raise ValueError(f"out: another process works in {out}; wait") from None
         except OSError as error:
-            raise ValueError(
-                f"out: {out} cannot be written ({error.strerror}); name another "
-                "directory"
-            ) from None
+            raise _unwritable(out, error) from None
+        try:
+            self._open()
+        except OSError as error:
+            self.close()
+            raise _unwritable(out, error) from None
 
     def _open(self) -> None:
         """Finds what is done, and cuts off a line that a crash left unfinished."""
@@ -153,6 +154,13 @@ def load_results(out: str | Path) -> pd.DataFrame:
 def trajectory_path(out: Path, index: int) -> Path:
     """The file of a run's trajectory."""
     return out / "trajectories" / f"{index:06d}.parquet"
+
+
+def _unwritable(out: Path, error: OSError) -> ValueError:
+    return ValueError(
+        f"out: {out} cannot be written ({error.strerror}); make room, or name another "
+        "directory"
+    )
 
 
 def _make(out: Path, plan: SweepPlan) -> None:

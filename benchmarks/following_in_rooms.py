@@ -3,9 +3,9 @@
 `obstacle_free` in the free field, and in a room of 7 m x 7 m x 3 m that
 reverberates for 0.4 s, with coloured ego noise 20 dB below the source at 1 m: how
 much of the run the robot follows; and, from starts with the source behind it, how
-often the target is on the source's side after one burst, two and three. Exit status
-1 if the room costs more than a twentieth of the following, or if a twentieth of the
-starts is not resolved after two bursts.
+often the target is on the source's side after one burst, two and three. Exit
+status 1 if the room costs more than a twentieth of the following, or more than a
+twentieth of the starts is not resolved after two bursts.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ import soundfile
 from numpy.typing import NDArray
 
 from analysis.metrics import run_metrics
-from benchmarks.figures import Figure, print_figures, stay_on_one_core
+from benchmarks.figures import Figure, print_figures
 from diagrams import RunResult, load_scenario, simulate
 
 __all__ = [
@@ -64,10 +64,10 @@ def in_a_room(noise_file: str, snr_db: float = 20.0) -> list[str]:
 def behind(seed: int) -> list[str]:
     """Settings of a robot amid the room with a resting source behind it."""
     rng = np.random.default_rng(seed)
-    x, y = rng.uniform(-0.5, 0.5, 2)
+    x, y = rng.uniform(-0.3, 0.3, 2)
     heading = rng.uniform(-math.pi, math.pi)
     away = heading + rng.choice([-1.0, 1.0]) * math.radians(rng.uniform(100.0, 180.0))
-    distance = rng.uniform(1.5, 2.5)
+    distance = rng.uniform(2.0, 2.8)
     S = x + distance * math.cos(away), y + distance * math.sin(away)
     return [
         f"start.position_m=[{x:.3f}, {y:.3f}]",
@@ -184,12 +184,11 @@ def run(runs: int, starts: int) -> int:
 def main() -> int:
     """Prints the tables and their verdicts."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=5, help="of the scenario")
-    parser.add_argument("--starts", type=int, default=100, help="with it behind")
+    parser.add_argument("--runs", type=int, default=3, help="of the scenario")
+    parser.add_argument("--starts", type=int, default=40, help="with it behind")
     arguments = parser.parse_args()
     if min(arguments.runs, arguments.starts) < 1:
         parser.error("--runs and --starts must be at least 1")
-    stay_on_one_core()
     return run(arguments.runs, arguments.starts)
 
 

@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from analysis.room_trials import RoomResult, draw_layouts, locate_bursts
-from benchmarks.figures import Figure, print_figures, stay_on_one_core
+from benchmarks.figures import Figure, print_figures
 from systems.room import RoomParameters
 from systems.tdoa_estimator import TDOAParameters
 from systems.waveforms import SoundParameters
@@ -92,7 +92,6 @@ def main() -> int:
     layouts = parser.parse_args().layouts
     if layouts < 1:
         parser.error("--layouts must be at least 1")
-    stay_on_one_core()
     return run(layouts)
 
 

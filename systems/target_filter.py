@@ -65,7 +65,7 @@ SCATTER_RATE = 0.05
 LARGEST_STEP = 1.0
 #: The same for the first sighting after a silence of so many seconds, which owes
 #: nothing to the ones before.
-LARGEST_FRESH_STEP = 3.0
+LARGEST_FRESH_STEP = 4.0
 SILENCE_S = 0.5
 #: Nepers by which the other hypothesis must lead before the choice turns over.
 SWITCH_MARGIN = 3.0

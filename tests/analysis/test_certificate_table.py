@@ -61,3 +61,18 @@ def test_command_prints_the_tables_and_says_what_it_does(row, monkeypatch, capsy
         "diagram_starts": 200,
         "hearing": "ideal",
     }
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["nowhere"], "nowhere"),
+        (["--laws", "passive", "--starts", "5"], "law: 'passive' is not known"),
+        (["--starts", "0"], "starts: 0 must be at least 1"),
+    ],
+)
+def test_bad_input_ends_with_status_2(words, message, capsys):
+    with pytest.raises(SystemExit) as ended:
+        table.main(words)
+    assert ended.value.code == 2
+    assert message in capsys.readouterr().err

@@ -7,6 +7,7 @@ import math
 import resource
 import sys
 from collections.abc import Callable, Generator, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -172,21 +173,38 @@ def test_a_sweep_can_be_resumed_from_nothing(tmp_path, undisturbed):
     pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
 
 
-def test_full_disk_keeps_what_is_done(tmp_path, undisturbed):
-    # A limit on the size of files is a full disk to those who write.
-    out = tmp_path / "out"
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    sweep = prepared(out)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (6000, limits[1]))
+@contextmanager
+def files_of_at_most(size: int) -> Iterator[None]:
+    """A limit on the size of files is a full disk to those who write."""
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, hard))
     try:
-        with pytest.raises(StoreError, match="runs that are done are kept"):
-            sweep.run()
+        yield
     finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+
+
+def test_full_disk_keeps_what_is_done(tmp_path, undisturbed):
+    out = tmp_path / "out"
+    sweep = prepared(out)
+    with (
+        files_of_at_most(6000),
+        pytest.raises(StoreError, match="runs that are done are kept"),
+    ):
+        sweep.run()
     kept = load_results(out)
     assert 1 <= len(kept) < 12
     table = prepared(out, resume=True).run()
     pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
+
+
+def test_full_disk_is_noticed_before_anything_runs(tmp_path):
+    with (
+        files_of_at_most(100),
+        pytest.raises(ValueError, match=r"out: .* cannot be written"),
+    ):
+        prepared(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
 
 
 def test_trajectories_are_those_of_the_runs(tmp_path):
@@ -212,6 +230,7 @@ def test_a_run_that_fails_is_recorded_and_the_rest_goes_on(tmp_path, laws):
     assert table["seed"][0] == table["seed"][1]
 
 
+@pytest.mark.slow
 def test_a_run_that_kills_its_process_is_recorded(tmp_path, laws):
     laws_used = ["sweep_laws:deadly", "sweep_laws:mortal", "active"]
     table = run_sweep(
@@ -280,6 +299,8 @@ def test_used_directories_are_refused(tmp_path):
     with pytest.raises(ValueError, match="holds no sweep"):
         prepared(other, resume=True)
     assert [path.name for path in other.iterdir()] == ["mine"]
+    with pytest.raises(ValueError, match="is a file"):
+        prepared(other / "mine", resume=True)
     with pytest.raises(ValueError, match="holds no results"):
         load_results(other)
 

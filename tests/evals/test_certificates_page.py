@@ -9,12 +9,17 @@ import pytest
 
 from analysis.certificate_table import LAWS
 from analysis.certificate_trials import try_certificate
+from analysis.contact_oscillation import contact_oscillation
 from analysis.disturbance_bounds import source_bound
 from analysis.energy_certificate import certify_energy
 from analysis.point_mass import point_mass
+from analysis.radial_law import radial_law
+from analysis.trap_stiffness import trap_stiffness
 from analysis.velocity_terms import velocity_term_analysis
 from diagrams import load_scenario
 
+#: Laws by the names that the page gives them.
+NAMES = dict(zip(("conventional", "active 2019", "active 2017"), LAWS, strict=True))
 PAGE = (Path(__file__).parents[2] / "docs/certificates.md").read_text("utf-8")
 
 
@@ -66,12 +71,10 @@ def test_bounds_of_a_moving_source():
 
 
 def test_one_sided_dampings():
-    names = {"conventional": "conventional", "active 2019": "active"}
-    names["active 2017"] = "active2017"
     for law, term, approaching, receding, ratios, amplitude in rows(
         "| law | term | approaching"
     ):
-        scenario = load_scenario("two_static_obstacles", [f"law={names[law]}"])
+        scenario = load_scenario("two_static_obstacles", [f"law={NAMES[law]}"])
         variant = velocity_term_analysis(scenario).variants[term]
         quoted = [float(re.findall(r"[\d.]+", c)[0]) for c in (approaching, receding)]
         sides = (variant.approaching, variant.receding)
@@ -79,3 +82,53 @@ def test_one_sided_dampings():
         quoted = [float(x) for x in ratios.split(",")]
         assert [s.damping_ratio for s in sides] == pytest.approx(quoted, abs=6e-4)
         assert variant.amplitude_ratio == pytest.approx(float(amplitude), abs=6e-4)
+
+
+def test_stiffness_across_the_line():
+    for law, *quoted in rows("| law | a point, exact"):
+        scenario = load_scenario("two_static_obstacles", [f"law={NAMES[law]}"])
+        cases = (("exact", "point"), ("exact", "face"), ("cones", "point"))
+        found = [trap_stiffness(scenario, *case).across_n_m for case in cases]
+        assert found == pytest.approx([float(c.split()[0]) for c in quoted], abs=0.06)
+
+
+@pytest.mark.slow
+def test_oscillations_before_an_obstacle():
+    table = rows("| law | term | amplitude | centre")
+    assert len(table) == 6
+    analyses = {
+        law: contact_oscillation(load_scenario("two_static_obstacles", [f"law={name}"]))
+        for law, name in NAMES.items()
+    }
+    for law, term, amplitude, centre, growth, frequency in table:
+        found = analyses[law]
+        run = found.runs[term]
+        A = float(amplitude.split()[0]) / 1e3
+        near = int(abs(run.amplitudes_m - A).argmin())
+        assert run.amplitudes_m[near] == pytest.approx(A, abs=6e-4)
+        predicted = found.predictions[term].at(A)
+        simulated = (
+            run.centres_m[near],
+            run.growth_per_s[near],
+            run.frequencies_rad_s.mean(),
+        )
+        for cell, ours, theirs, digit in zip(
+            (centre, growth, frequency), predicted, simulated, (4, 4, 3), strict=True
+        ):
+            quoted = [float(x.split()[0]) for x in cell.split(",")]
+            assert [ours, theirs] == pytest.approx(quoted, abs=2.0 * 10.0**-digit)
+
+
+def test_how_far_behind_an_obstacle_the_goal_may_lie():
+    """The greatest L with K_r (L + c) = f(c, 0) for some c."""
+    quoted = re.findall(
+        r"([\d.]+) m\s+to go, the active law of 2019 with up to ([\d.]+) m,"
+        r" that of 2017 with up to ([\d.]+) m",
+        " ".join(PAGE.split()),
+    )
+    for law, value in zip(LAWS, quoted[0], strict=True):
+        scenario = load_scenario("two_static_obstacles", [f"law={law}"])
+        tabulated = radial_law(scenario)
+        stiffness = scenario.attraction.stiffness_n_m
+        most = (tabulated.forces_n / stiffness - tabulated.distances_m).max()
+        assert most == pytest.approx(float(value), abs=0.06)
