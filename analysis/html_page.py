@@ -28,6 +28,7 @@ __all__ = [
     "equation",
     "figure_html",
     "heading",
+    "links",
     "note",
     "number",
     "page",
@@ -62,6 +63,15 @@ def heading(level: int, text: str, anchor: str = "") -> str:
 def paragraph(text: str) -> str:
     """A paragraph; `words` between backquotes are set as code."""
     return f"<p>{_inline(text)}</p>"
+
+
+def links(targets: Iterable[tuple[str, str]]) -> str:
+    """A line of links to sections, given as anchor and text."""
+    inner = " \u00b7 ".join(
+        f'<a href="#{html.escape(anchor)}">{html.escape(text)}</a>'
+        for anchor, text in targets
+    )
+    return f'<p class="links">{inner}</p>'
 
 
 def note(text: str) -> str:

@@ -29,9 +29,9 @@ from systems.signals import FRAME_PERIOD_S
 __all__ = ["BurstCycles", "SampledLoop", "sampled_parts"]
 
 #: Length of the runs that check delay margins in a short and a full report, s.
-_CHECK_S = (100.0, 300.0)
-#: Simulated cycles of the sound.
-CYCLES = 40
+_CHECK_S = (60.0, 300.0)
+#: Simulated cycles of the sound, as above.
+_CYCLES = (20, 40)
 
 
 @dataclass(frozen=True)
@@ -68,7 +68,7 @@ class BurstCycles:
 
 def sampled_parts(*, full: bool) -> tuple[Part, ...]:
     """Delay margins, exact and simulated; multipliers of the burst cycle."""
-    duration_s = _CHECK_S[full]
+    duration_s, cycles = _CHECK_S[full], _CYCLES[full]
     return (
         Part(
             "sampled",
@@ -80,7 +80,7 @@ def sampled_parts(*, full: bool) -> tuple[Part, ...]:
         Part(
             "burst_cycle",
             "Burst cycle",
-            _bursts,
+            lambda study: _bursts(study, cycles),
             _render_bursts,
             document=_burst_document,
         ),
@@ -162,10 +162,10 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
     return parts
 
 
-def _bursts(study: Study) -> BurstCycles:
+def _bursts(study: Study, count: int) -> BurstCycles:
     at: OperatingPoint = study.need("equilibria").at
     cycles = tuple(burst_cycle(study.scenario, hold, point=at) for hold in HOLDS)
-    runs = tuple(simulate_burst_cycle(cycle, CYCLES) for cycle in cycles)
+    runs = tuple(simulate_burst_cycle(cycle, count) for cycle in cycles)
     gaps = gap_chart(study.scenario, point=at)
     return BurstCycles(study.scenario.tracker.hold, cycles, runs, gaps)
 
@@ -204,13 +204,14 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
         for cycle, run in zip(data.cycles, data.runs, strict=True)
     ]
     first = data.cycles[0]
+    cycles = round(data.runs[0].time_s[-1] / first.period_s)
     return [
         paragraph(
             f"The source sounds for {first.on_s:g} s in every {first.period_s:g} s. In "
             "between, the target rests in W (`world`), moves with the robot (`robot`) "
             "or goes on with its own velocity (`motion`). A multiplier is the share of "
             "what was off that is left after a cycle, about rest: from the product of "
-            f"the one-period matrices, and fitted to {CYCLES} simulated cycles after a "
+            f"the one-period matrices, and fitted to {cycles} simulated cycles after a "
             "kick along the line to the source, which shows the motion along it only."
         ),
         table(["hold", "multipliers", "simulated, along", "stable"], rows),

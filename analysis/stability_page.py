@@ -11,6 +11,7 @@ from analysis.html_page import (
     bullets,
     definitions,
     equation,
+    links,
     note,
     number,
     page,
@@ -88,7 +89,13 @@ def _verdict_table(rows: Sequence[Comparison], laws: Sequence[str]) -> str:
 
 def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
     sheet = analysis.sheet
-    parts = _equations(sheet.law_equations, prefix)
+    parts = [
+        links(
+            (f"{prefix}-{key}", finding.part.title)
+            for key, finding in analysis.findings.items()
+        )
+    ]
+    parts += _equations(sheet.law_equations, prefix)
     parts.append(_parameter_table([row for row in sheet.parameters if row.of_law]))
     parts.append(
         paragraph(f"SHA-256 of the effective scenario: `{sheet.scenario_sha256}`.")

@@ -13,6 +13,7 @@ from analysis.html_page import (
     definitions,
     equation,
     figure_html,
+    links,
     note,
     number,
     page,
@@ -70,6 +71,7 @@ def document() -> Tags:
     parts = [
         paragraph("Tom & `K_0 < 3`"),
         note("Mind"),
+        links([("top", "Up & up")]),
         definitions([("a", "b")]),
         table(["x", "verdict"], [[1.5, "pass"], [None, "fail"]], caption="Numbers"),
         equation(r"\frac{a}{b}", "ratio", "a / b"),
