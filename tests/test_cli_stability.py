@@ -87,6 +87,11 @@ def test_table_on_the_terminal(quick, capsys, tmp_path):
         (["--law", "magic"], "law", "active2017"),
         (["no_such"], "scenario", "obstacle_free"),
         (["--set", "plant.motor_lag_s=0.001"], "plant.motor_lag_s", "step_s"),
+        (
+            ["--set", "attraction.damping_n_s_m=0"],
+            "attraction",
+            "raise attraction.damp",
+        ),
         (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
         (["--out", "/dev/null/out"], "out", "name another"),
     ],
