@@ -7,10 +7,10 @@ import json
 import pytest
 
 import phonotaxis
-from analysis import stability_parts
-from analysis.html_page import paragraph
-from analysis.stability import Part
-from analysis.verdicts import Criterion, judge
+from analysis.runs.html_page import paragraph
+from analysis.stability import stability_parts
+from analysis.stability.stability import Part
+from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
 
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.metrics import run_metrics
+from analysis.runs.metrics import run_metrics
 from benchmarks.following_in_rooms import (
     BURST_ENDS_S,
     behind,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.metrics import run_metrics
+from analysis.runs.metrics import run_metrics
 from diagrams import load_scenario, simulate
 
 pytestmark = pytest.mark.slow
