@@ -27,10 +27,9 @@ from analysis.stability.linearisation import (
     continuous_model,
     sampled_model,
 )
-from analysis.stability.operating_point_plots import plot_equilibria, plot_step
+from analysis.stability.operating_point_plots import plot_equilibria
 from analysis.stability.operating_points import OperatingPoint, moving_equilibrium
 from analysis.stability.stability import Part, Study
-from analysis.stability.step_response import Oscillation, StepCheck, check_step
 
 __all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
 
@@ -68,7 +67,7 @@ class LinearModels:
     gradient: GradientCheck
 
 
-def linear_parts(*, full: bool) -> tuple[Part, ...]:
+def linear_parts() -> tuple[Part, ...]:
     """Operating points first: the report needs one to stand on."""
     return (
         Part(
@@ -86,13 +85,6 @@ def linear_parts(*, full: bool) -> tuple[Part, ...]:
             fresh=True,
             document=_models_document,
             models=lambda data: (data.continuous, data.sampled, data.at.motion),
-        ),
-        Part(
-            "step",
-            "Prediction against simulation",
-            lambda study: check_step(study.scenario, full=full),
-            _render_step,
-            document=_step_document,
         ),
     )
 
@@ -314,32 +306,3 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
 def top(shares: dict[str, float], count: int = 3) -> list[tuple[str, float]]:
     """The largest shares."""
     return sorted(shares.items(), key=lambda item: -item[1])[:count]
-
-
-def _step_document(data: StepCheck) -> dict[str, Any]:
-    names = ("predicted", "ideal", "full", "step_m", "frequency_error", "damping_error")
-    return {"step": {name: getattr(data, name) for name in names}}
-
-
-def _render_step(data: StepCheck, name: str) -> list[str]:
-    found: list[tuple[str, Oscillation | None]] = [
-        ("predicted by the linear model", data.predicted),
-        ("simulated, exact sensors", data.ideal),
-        ("simulated, the scenario's own sensors", data.full),
-    ]
-    rows: list[list[Cell]] = [
-        [title, each.frequency_rad_s, each.damping_ratio]
-        for title, each in found
-        if each
-    ]
-    return [
-        paragraph(
-            f"P starts {data.step_m:g} m off the operating point, along the line to "
-            f"the source. Exact sensors: {100.0 * data.frequency_error:.2f} % off in "
-            f"frequency and {100.0 * data.damping_error:.2f} % in damping. The "
-            "scenario's own sensors (in a full report) differ more: echoes of cones "
-            "are not nearest points, and hearing has its noise and its silences."
-        ),
-        table(["", "rad/s", "damping ratio"], rows),
-        figure_html(plot_step(data), name, "A small step, predicted and simulated."),
-    ]

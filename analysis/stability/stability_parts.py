@@ -11,6 +11,7 @@ from analysis.stability.margin_parts import margin_parts
 from analysis.stability.robustness_parts import robustness_parts
 from analysis.stability.sampled_parts import sampled_parts
 from analysis.stability.stability import Part
+from analysis.stability.step_parts import step_parts
 from analysis.stability.velocity_parts import velocity_parts
 from analysis.stability.verdict_parts import verdict_parts
 
@@ -24,7 +25,8 @@ def parts(*, full: bool) -> tuple[Part, ...]:
         full: Also those that take minutes.
     """
     return (
-        *linear_parts(full=full),
+        *linear_parts(),
+        *step_parts(full=full),
         *margin_parts(),
         *sampled_parts(full=full),
         *chart_parts(),
