@@ -8,9 +8,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
-from scipy.stats import binomtest
 
 from analysis.hearing.detection import DetectionPoint, FalseAlarms
+from analysis.runs.intervals import wilson_interval
 from analysis.runs.scene import COLOURS
 
 __all__ = ["plot_detection"]
@@ -53,17 +53,11 @@ def plot_detection(
     return figure
 
 
-def _interval(count: int, trials: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    found = binomtest(count, trials).proportion_ci(0.95, method="wilson")
-    return found.low, found.high
-
-
 def _curve(
     axes: Axes, name: str, points: Sequence[DetectionPoint], colour: str
 ) -> None:
     levels = [point.snr_db for point in points]
-    ends = np.array([_interval(point.heard, point.trials) for point in points])
+    ends = np.array([wilson_interval(point.heard, point.trials) for point in points])
     axes.fill_between(levels, *ends.T, color=colour, alpha=0.2, linewidth=0)
     axes.plot(
         levels,
@@ -88,7 +82,7 @@ def _false_alarms(
 ) -> None:
     found = [alarm for alarm in alarms if alarm.count]
     shares = np.array([alarm.count / alarm.frames for alarm in found])
-    ends = np.array([_interval(alarm.count, alarm.frames) for alarm in found])
+    ends = np.array([wilson_interval(alarm.count, alarm.frames) for alarm in found])
     axes.errorbar(
         [alarm.rate for alarm in found],
         shares,
@@ -101,7 +95,7 @@ def _false_alarms(
     silent = [alarm for alarm in alarms if not alarm.count]
     axes.plot(
         [alarm.rate for alarm in silent],
-        [_interval(0, alarm.frames)[1] for alarm in silent],
+        [wilson_interval(0, alarm.frames)[1] for alarm in silent],
         "v",
         color=COLOURS["robot"],
         label="none heard: below",

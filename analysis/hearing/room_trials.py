@@ -16,8 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
-from scipy.stats import binomtest
 
+from analysis.runs.intervals import Interval, wilson_interval
 from systems.acoustics import AcousticParameters
 from systems.adc import MicArrayParameters, convert, frame_noise
 from systems.geometry import rotate
@@ -84,11 +84,9 @@ class RoomResult:
         )
 
     @property
-    def located_interval(self) -> tuple[float, float]:
+    def located_interval(self) -> Interval:
         """Wilson's 95 % interval of the share that is located."""
-        trials = binomtest(int(self.located.sum()), len(self.layouts))
-        low, high = trials.proportion_ci(0.95, method="wilson")
-        return float(low), float(high)
+        return wilson_interval(int(self.located.sum()), len(self.layouts))
 
 
 def draw_layouts(
