@@ -281,8 +281,8 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from analysis.result_directory import choose_directory, whole_directory
-    from analysis.run_report import run_summary, summary_text, write_run
+    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import build_sound_follower, load_scenario
 
     with ExitStack() as stack:
@@ -387,9 +387,9 @@ def _scenarios(options: argparse.Namespace) -> None:
 
 
 def _locate(options: argparse.Namespace) -> None:
-    from analysis.locate import load_geometry, locate
-    from analysis.locate_text import locate_text
-    from analysis.result_directory import choose_directory, whole_directory
+    from analysis.hearing.locate import load_geometry, locate
+    from analysis.hearing.locate_text import locate_text
+    from analysis.runs.result_directory import choose_directory, whole_directory
 
     with ExitStack() as stack:
         try:
@@ -404,7 +404,7 @@ def _locate(options: argparse.Namespace) -> None:
             raise InputError.from_error(error) from None
         document = result.to_dict()
         if options.out is not None:
-            from analysis.locate_plots import write_locate
+            from analysis.hearing.locate_plots import write_locate
 
             document["out"] = str(out)
             write_locate(result, document, directory)
@@ -419,13 +419,13 @@ def _locate(options: argparse.Namespace) -> None:
 
 
 def _localization(options: argparse.Namespace) -> None:
-    from analysis.localization import prepare_localization
-    from analysis.localization_report import (
+    from analysis.hearing.localization import prepare_localization
+    from analysis.hearing.localization_report import (
         localization_summary,
         localization_text,
         write_localization,
     )
-    from analysis.result_directory import choose_directory, whole_directory
+    from analysis.runs.result_directory import choose_directory, whole_directory
 
     with ExitStack() as stack:
         try:
@@ -453,10 +453,10 @@ def _localization(options: argparse.Namespace) -> None:
 
 
 def _stability(options: argparse.Namespace) -> None:
-    from analysis.result_directory import choose_directory, whole_directory
-    from analysis.stability import analyse_law, chosen_laws
-    from analysis.stability_parts import parts
-    from analysis.stability_report import (
+    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.stability.stability import analyse_law, chosen_laws
+    from analysis.stability.stability_parts import parts
+    from analysis.stability.stability_report import (
         stability_document,
         stability_text,
         write_stability,
@@ -490,10 +490,10 @@ def _stability(options: argparse.Namespace) -> None:
 
 
 def _sweep(options: argparse.Namespace) -> None:
-    from analysis.sweep import prepare_sweep
-    from analysis.sweep_page import write_sweep
-    from analysis.sweep_plan import load_sweep
-    from analysis.sweep_summary import sweep_summary, sweep_text
+    from analysis.sweeps.sweep import prepare_sweep
+    from analysis.sweeps.sweep_page import write_sweep
+    from analysis.sweeps.sweep_plan import load_sweep
+    from analysis.sweeps.sweep_summary import sweep_summary, sweep_text
 
     try:
         plan = load_sweep(options.sweep)
@@ -527,9 +527,9 @@ def _sweep(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
-    from analysis.compare import prepare_comparison
-    from analysis.compare_options import comparison_plans
-    from analysis.compare_report import (
+    from analysis.sweeps.compare import prepare_comparison
+    from analysis.sweeps.compare_options import comparison_plans
+    from analysis.sweeps.compare_report import (
         compare_summary,
         compare_text,
         write_comparison,
@@ -570,9 +570,9 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _design(options: argparse.Namespace) -> None:
-    from analysis.design_study import STUDY_RUNS, study_design
-    from analysis.design_text import design_summary, design_text, write_design
-    from analysis.result_directory import choose_directory, whole_directory
+    from analysis.gains.design_study import STUDY_RUNS, study_design
+    from analysis.gains.design_text import design_summary, design_text, write_design
+    from analysis.runs.result_directory import choose_directory, whole_directory
     from diagrams import load_scenario
 
     with ExitStack() as stack:

@@ -20,7 +20,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.metrics import run_metrics
+from analysis.runs.metrics import run_metrics
 from benchmarks.figures import Figure, print_figures
 from diagrams import RunResult, load_scenario, simulate
 

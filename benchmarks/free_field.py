@@ -12,7 +12,7 @@ from time import perf_counter
 
 import numpy as np
 
-from analysis.free_field import (
+from analysis.hearing.free_field import (
     Estimator,
     FreeFieldCell,
     Loudspeaker,
@@ -20,7 +20,7 @@ from analysis.free_field import (
     run_cell,
     total_consistency,
 )
-from analysis.paper_tables import PAPER_CELLS
+from analysis.hearing.paper_tables import PAPER_CELLS
 from systems.array_shape import ArrayShape
 from systems.localise import TDOAParameters
 from systems.robot import RobotParameters

@@ -15,14 +15,14 @@ from time import process_time
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.detection import (
+from analysis.hearing.detection import (
     DetectionPoint,
     FalseAlarms,
     detection_curve,
     false_alarms,
 )
-from analysis.detection_plots import plot_detection
-from analysis.free_field import Loudspeaker
+from analysis.hearing.detection_plots import plot_detection
+from analysis.hearing.free_field import Loudspeaker
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from systems.array_shape import ArrayShape
 from systems.localise import HearingMemory, Localiser, TDOAParameters

@@ -10,7 +10,7 @@ import numpy as np
 import pyroomacoustics as pra
 from numpy.typing import NDArray
 
-from analysis.free_field import frame_estimator
+from analysis.hearing.free_field import frame_estimator
 from systems.array_shape import ArrayShape
 from systems.localise import TDOAParameters
 from systems.multilateration import locate_source

@@ -20,9 +20,9 @@ import numpy as np
 import pyroomacoustics as pra
 from numpy.typing import NDArray
 
-from analysis.cramer_rao import LocalizationBound, position_bound
-from analysis.free_field import Loudspeaker
-from analysis.paper_tables import PAPER_CELLS
+from analysis.hearing.cramer_rao import LocalizationBound, position_bound
+from analysis.hearing.free_field import Loudspeaker
+from analysis.hearing.paper_tables import PAPER_CELLS
 from benchmarks.figures import stay_on_one_core
 from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from analysis.room_trials import RoomResult, draw_layouts, locate_bursts
+from analysis.hearing.room_trials import RoomResult, draw_layouts, locate_bursts
 from benchmarks.figures import Figure, print_figures
 from systems.room import RoomParameters
 from systems.tdoa_estimator import TDOAParameters

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from analysis.replay import write_replay
+from analysis.runs.replay import write_replay
 from diagrams import load_scenario, simulate
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

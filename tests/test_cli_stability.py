@@ -7,10 +7,10 @@ import json
 import pytest
 
 import phonotaxis
-from analysis import stability_parts
-from analysis.html_page import paragraph
-from analysis.stability import Part
-from analysis.verdicts import Criterion, judge
+from analysis.runs.html_page import paragraph
+from analysis.stability import stability_parts
+from analysis.stability.stability import Part
+from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
 
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
@@ -87,6 +87,11 @@ def test_table_on_the_terminal(quick, capsys, tmp_path):
         (["--law", "magic"], "law", "active2017"),
         (["no_such"], "scenario", "obstacle_free"),
         (["--set", "plant.motor_lag_s=0.001"], "plant.motor_lag_s", "step_s"),
+        (
+            ["--set", "attraction.damping_n_s_m=0"],
+            "attraction",
+            "raise attraction.damp",
+        ),
         (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
         (["--out", "/dev/null/out"], "out", "name another"),
     ],

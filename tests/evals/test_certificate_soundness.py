@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.certificate_trials import try_certificate
-from analysis.energy_certificate import certify_energy
+from analysis.stability.certificate_trials import try_certificate
+from analysis.stability.energy_certificate import certify_energy
 from diagrams import Scenario, load_scenario
 from diagrams.loading import ScenarioError
 

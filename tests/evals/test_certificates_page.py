@@ -7,15 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from analysis.certificate_table import LAWS
-from analysis.certificate_trials import try_certificate
-from analysis.contact_oscillation import contact_oscillation
-from analysis.disturbance_bounds import source_bound
-from analysis.energy_certificate import certify_energy
-from analysis.point_mass import point_mass
-from analysis.radial_law import radial_law
-from analysis.trap_stiffness import trap_stiffness
-from analysis.velocity_terms import velocity_term_analysis
+from analysis.stability.certificate_table import LAWS
+from analysis.stability.certificate_trials import try_certificate
+from analysis.stability.contact_oscillation import contact_oscillation
+from analysis.stability.disturbance_bounds import source_bound
+from analysis.stability.energy_certificate import certify_energy
+from analysis.stability.point_mass import point_mass
+from analysis.stability.radial_law import radial_law
+from analysis.stability.trap_stiffness import trap_stiffness
+from analysis.stability.velocity_terms import velocity_term_analysis
 from diagrams import load_scenario
 
 #: Laws by the names that the page gives them.

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.contact_mode import contact_spectral_radius
-from analysis.contact_oscillation import contact_oscillation
-from analysis.harmonic_balance import predict_oscillation
-from analysis.head_on import head_on
+from analysis.gains.head_on import head_on
+from analysis.stability.contact_mode import contact_spectral_radius
+from analysis.stability.contact_oscillation import contact_oscillation
+from analysis.stability.harmonic_balance import predict_oscillation
 from diagrams import load_scenario
 
 GAINS = (

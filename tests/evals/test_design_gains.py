@@ -7,8 +7,8 @@ import json
 import numpy as np
 import pytest
 
-from analysis.design import DesignRequirements, metres_to_go
-from analysis.push_and_pull import DESIGNED_LAWS
+from analysis.gains.design import DesignRequirements, metres_to_go
+from analysis.gains.push_and_pull import DESIGNED_LAWS
 from diagrams import simulate
 from diagrams.scenario import Scenario
 from phonotaxis import main

@@ -7,8 +7,8 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from analysis.detection import FalseAlarms, detection_curve, false_alarms
-from analysis.free_field import Loudspeaker
+from analysis.hearing.detection import FalseAlarms, detection_curve, false_alarms
+from analysis.hearing.free_field import Loudspeaker
 from systems.array_shape import ArrayShape
 from systems.localise import TDOAParameters
 from systems.robot import RobotParameters

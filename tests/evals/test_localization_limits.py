@@ -9,16 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.free_field import (
+from analysis.hearing.free_field import (
     FreeFieldCell,
     Loudspeaker,
     frame_estimator,
     run_cell,
     total_consistency,
 )
-from analysis.localization import prepare_localization
-from analysis.localization_report import localization_summary, localization_text
-from analysis.paper_tables import PAPER_CELLS
+from analysis.hearing.localization import prepare_localization
+from analysis.hearing.localization_report import localization_summary, localization_text
+from analysis.hearing.paper_tables import PAPER_CELLS
 from systems.array_shape import ArrayShape
 from systems.localise import TDOAParameters
 from systems.robot import RobotParameters

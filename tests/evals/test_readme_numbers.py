@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.metrics import run_metrics
+from analysis.runs.metrics import run_metrics
 from diagrams import load_scenario, simulate
 
 pytestmark = pytest.mark.slow
@@ -45,7 +45,7 @@ def test_obstacle_free():
     np.testing.assert_allclose(numbers("least clearance"), least, atol=TOLERANCE_M)
 
 
-LAWS = ("none", "conventional", "active")
+LAWS = ("none", "conventional", "active", "active2017")
 
 
 @pytest.mark.parametrize(
@@ -54,7 +54,7 @@ LAWS = ("none", "conventional", "active")
 )
 def test_how_the_scenarios_end(scenario):
     line = next(x for x in README.splitlines() if x.startswith(f"| {scenario} |"))
-    for law, stated in zip(LAWS, line.split("|")[2:5], strict=True):
+    for law, stated in zip(LAWS, line.split("|")[2:6], strict=True):
         result = simulate(load_scenario(scenario, [f"law={law}"]))
         if result.collision is not None:
             by = "hits" if result.collision.fault == "robot" else "is hit by"

@@ -135,6 +135,16 @@ def test_a_source_ahead_stays_ahead_while_the_robot_starts(seed):
     np.testing.assert_allclose(position(memory), [4.5, 0.5], atol=5.0 * NOISE)
 
 
+@pytest.mark.parametrize(("side", "verdict"), [(1.0, 0.0), (-1.0, 1.0)])
+def test_one_frame_of_each_burst_tells_when_the_robot_has_moved(side, verdict):
+    """As in a room: the rest of a burst is lost to echoes."""
+    source = [2.0 * side, 0.5]
+    silence = [None] * 60
+    memory = listen([(source, (0.0, 0.0, 0.0)), *silence, (source, (0.6, 0.0, 0.3))])
+    assert memory[0] == verdict
+    assert math.dist(position(memory), source) < 0.15
+
+
 def test_nothing_is_decided_at_rest():
     """Reflection keeps all distances, however the source moves."""
     path = [([-2.0 + 0.3 * T * k, 0.5], (0.0, 0.0, 0.0)) for k in range(80)]

@@ -149,6 +149,27 @@ def test_the_louder_image_in_a_wall_is_not_the_source():
         assert other is None or abs(math.degrees(other.bearing) - 30.0) > 30.0
 
 
+def test_a_sound_that_two_of_three_hear_yet_is_no_place():
+    """The third would say what its noise says, anywhere."""
+    localiser = listener()
+    spectrum = np.fft.rfft(Generator(Philox(key=1)).standard_normal(N))
+    spectrum[np.fft.rfftfreq(N, 1.0 / FS) > 8_000.0] = 0.0
+    sound = 10.0 * np.fft.irfft(spectrum, N)[:170]
+    memory, generator = localiser.blank(), Generator(Philox(key=2))
+    for _ in range(8):
+        noise = generator.standard_normal((3, N)).astype(np.float32)
+        _, memory = localiser.localise(noise, memory)
+    careless = 0
+    for _ in range(60):
+        frame = generator.standard_normal((3, N)).astype(np.float32)
+        frame[0, -170:] += sound
+        frame[1, -70:] += sound[:70]
+        assert localiser.localise(frame, memory)[0] is None
+        fix, _ = localiser.localise(frame, memory._replace(heard=True))
+        careless += fix is not None
+    assert careless > 0
+
+
 def test_noise_between_sounds_becomes_the_memory():
     """The running mean is that of the frames' own energies, by Parseval."""
     localiser, memory = listener(), listener().blank()

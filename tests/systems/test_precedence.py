@@ -126,3 +126,24 @@ def test_level_does_not_matter(seed, gain):
     np.testing.assert_allclose(louder, loud**2 * after, rtol=1e-3)
     assert same == pytest.approx(news, abs=1e-5)
     assert 0.0 <= news <= 1.0
+
+
+def test_little_of_noise_is_news_once_its_level_is_known():
+    """Powers of noise are exponential: exp(-4) of the energy is beyond four times
+    the mean; without the level all that rises is news."""
+    noise = np.random.default_rng(4).standard_normal((3, N)).astype(np.float32)
+    _, _, unaware = keep_first_wave_front(noise, SIZES.silent(), SIZES)
+    dry, _, news = keep_first_wave_front(noise, SIZES.silent(), SIZES, 1.0)
+    assert 0.0 < news < 1.2 * math.exp(-4.0)
+    assert unaware > 5.0 * news
+    assert np.isfinite(dry).all()
+
+
+def test_a_click_in_noise_is_as_it_was_and_the_noise_is_gone():
+    noise = np.random.default_rng(4).standard_normal(N) * 0.01
+    clean, *_ = keep_first_wave_front(frame(at(CLICK)), SIZES.silent(), SIZES)
+    noisy, *_ = keep_first_wave_front(
+        frame(at(CLICK) + noise), SIZES.silent(), SIZES, 0.01**2
+    )
+    assert energy(noisy[0], CLICK) == pytest.approx(energy(clean[0], CLICK), rel=0.2)
+    assert energy(noisy[0], ECHO) < 0.02 * energy(noisy[0], CLICK)

@@ -1,0 +1,1 @@
+"""The laws' curves, and gains from stated requirements."""

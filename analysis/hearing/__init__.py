@@ -1,0 +1,1 @@
+"""How well sounds are located: bounds, trials, tables, and recordings."""

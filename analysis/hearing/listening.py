@@ -1,0 +1,172 @@
+"""A resting robot that listens to a resting source, through the whole diagram."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
+from diagrams import Scenario, build_sound_follower, make_simulator
+from diagrams.builder import block_seed
+from systems import MicArray
+from systems.array_shape import ArrayShape
+from systems.array_tolerances import draw_tolerances
+from systems.mic_array import microphones_B
+from systems.noise import tick_generator
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.sound_emitter import emitted_samples
+from systems.waveforms import make_waveform
+
+__all__ = ["Heard", "Listener"]
+
+# Ticks from the start to the first frame that counts: sound arrives meanwhile
+# (from 8 m at most), and every block has a past.
+_LEAD = 2
+
+
+@dataclass(frozen=True)
+class Heard:
+    """What the estimator made of the frames."""
+
+    p_AS: NDArray[np.float64]
+    """(2,) the source from the microphones' centroid, in B axes, m."""
+    bearings: NDArray[np.float64]
+    """(k,) of the frames in which something was heard, rad."""
+    ranges: NDArray[np.float64]
+    """(l,) of those with a range, m."""
+    positions: NDArray[np.float64]
+    """(l, 2) of the same, from the microphones' centroid, in B axes, m."""
+    bound: LocalizationBound
+    """From noise and rounding, over all frames."""
+
+
+class Listener:
+    """One diagram, used for any number of places.
+
+    Drake never frees blocks that are written in Python, hence the robot is put
+    where it has the source as wanted, rather than a diagram built for it.
+
+    Args:
+        scenario: A source at rest whose sound goes on, and a robot that no
+            force moves.
+
+    Raises:
+        ValueError: The sound cannot be played.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        self._scenario = scenario
+        self._follower = build_sound_follower(scenario)
+        seed = block_seed(scenario.seed, "sound_emitter")
+        self._waveform = make_waveform(scenario.sound, seed)
+        #: The microphones as stated.
+        self.shape = ArrayShape.of(scenario.robot.microphones_m)
+
+    def listen(
+        self,
+        distance: float,
+        bearing: float,
+        trials: int,
+        sound_speed_tolerance: float = 0.0,
+        *,
+        session: int = 0,
+    ) -> Heard:
+        """Takes one measurement a frame.
+
+        Args:
+            distance: Of the source from the microphones' centroid, m.
+            bearing: Of the source, rad.
+            trials: Number of frames.
+            sound_speed_tolerance: Largest error of the speed of sound.
+            session: Sessions are at different times, and so have noises and
+                errors of their own.
+        """
+        p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
+        start = session * (trials + 4 * _LEAD)
+        simulator = make_simulator(self._follower)
+        root = simulator.get_mutable_context()
+        root.SetTime(start * FRAME_PERIOD_S)
+        self._place_robot(root, p_AS)
+        simulator.Initialize()
+        rows = []
+        for tick in range(start, start + _LEAD + trials):
+            self._redraw_errors(root, tick, sound_speed_tolerance)
+            # The update at this tick, of the frame that ends now, comes first.
+            simulator.AdvanceTo((tick + 1) * FRAME_PERIOD_S)
+            rows.append(self._read(root))
+        heard, ranged, bearings, ranges = np.asarray(rows[_LEAD:]).T
+        heard, ranged = heard > 0.5, ranged > 0.5
+        directions = np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
+        ticks = start + _LEAD + np.arange(trials, dtype=float)
+        return Heard(
+            p_AS=p_AS,
+            bearings=bearings[heard],
+            ranges=ranges[ranged],
+            positions=(ranges[:, None] * directions)[ranged],
+            bound=self._bound(p_AS, ticks * FRAME_PERIOD_S),
+        )
+
+    def _place_robot(self, root: Any, p_AS: NDArray[np.float64]) -> None:
+        """Puts the robot, facing along x, where the source is at p_AS."""
+        p_WS = self._scenario.source.path().pose(0.0)[:2]
+        p_BA = microphones_B(self._scenario.robot).mean(axis=0)
+        p_WB = p_WS - p_AS - p_BA
+        plant = self._follower.blocks["plant"]
+        state = [*p_WB, *np.zeros(5)]
+        plant.GetMyMutableContextFromRoot(root).SetContinuousState(state)
+
+    def _redraw_errors(self, root: Any, tick: int, speed_tolerance: float) -> None:
+        scenario = self._scenario
+        rng = tick_generator(block_seed(scenario.seed, "array_errors"), tick)
+        errors = draw_tolerances(scenario.microphones, self.shape.count, rng)
+        speed = 1.0 + speed_tolerance * rng.uniform(-1.0, 1.0)
+        microphones = self._follower.blocks["microphones"]
+        context = microphones.GetMyMutableContextFromRoot(root)
+        for index, values in (
+            (MicArray.POSITION_ERRORS, errors.position_errors.ravel()),
+            (MicArray.CHANNEL_DELAYS, errors.channel_delays),
+            (MicArray.GAINS, errors.gains),
+            (MicArray.SOUND_SPEED, [scenario.acoustics.c * speed]),
+        ):
+            context.get_mutable_numeric_parameter(index).SetFromVector(values)
+
+    def _read(self, root: Any) -> tuple[float, ...]:
+        """(detected, range_valid, bearing, range) of the last frame."""
+        block = self._follower.blocks["hearing"]
+        context = block.GetMyContextFromRoot(root)
+        names = ("detected", "range_valid", "source_bearing", "source_range")
+        return tuple(
+            float(block.GetOutputPort(name).Eval(context)[0]) for name in names
+        )
+
+    def _bound(
+        self, p_AS: NDArray[np.float64], ends: NDArray[np.float64]
+    ) -> LocalizationBound:
+        """Of the frames that end then, rms."""
+        scenario = self._scenario
+        microphones = scenario.microphones
+        first = round((ends[0] - 3 * FRAME_PERIOD_S) * SAMPLE_RATE_HZ)
+        count = round(ends[-1] * SAMPLE_RATE_HZ) - first
+        samples = emitted_samples(self._waveform, scenario.sound, first, count)
+        assert samples is not None
+        energy = SlopeEnergy.of(samples, SAMPLE_RATE_HZ, first / SAMPLE_RATE_HZ)
+        noise_pa = scenario.sound.level_pa * 10.0 ** (-microphones.snr_db_at_1m / 20.0)
+        rounding_pa = 1.0 / microphones.counts_per_pa / math.sqrt(12.0)
+        bounds = [
+            position_bound(
+                energy,
+                end - FRAME_PERIOD_S,
+                end,
+                p_AS,
+                self.shape.p_AM,
+                math.hypot(noise_pa, rounding_pa),
+                sample_rate_hz=SAMPLE_RATE_HZ,
+                c=scenario.acoustics.c,
+            )
+            for end in ends
+        ]
+        return LocalizationBound.mean(bounds)

@@ -1,0 +1,236 @@
+"""The papers' localisation experiment, beside its bound and its tolerances.
+
+Han 2019, tables 1 and 2: a resting source 1-4 m away at 0, 30 and 60 deg, 100
+measurements a cell, on a robot at rest. Here a measurement is one frame, heard
+through the whole diagram. The papers' own estimator runs beside ours, on the
+same sound and noise.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.hearing.listening import Heard, Listener
+from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
+from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
+from diagrams import Scenario, load_scenario
+from systems.array_shape import ArrayShape
+
+__all__ = [
+    "ESTIMATORS",
+    "REALISTIC_TOLERANCES",
+    "SOUND_SPEED_TOLERANCE",
+    "LocalizationCell",
+    "LocalizationExperiment",
+    "prepare_localization",
+]
+
+#: What the experiment changes in the default scenario: nothing moves the
+#: robot, and the sound goes on, so that every frame is a measurement.
+_SETTING = (
+    "name=localization",
+    "description=A resting source heard by a resting robot",
+    "law=none",
+    "obstacles=[]",
+    "attraction.stiffness_n_m=0",
+    "source.waypoints_m=[[2.175, 0]]",
+    "sound.period_s=0.5",
+)
+
+#: An array built with care; redrawn for every measurement, within these limits.
+REALISTIC_TOLERANCES = (
+    "microphones.position_tolerance_m=0.0002",
+    "microphones.delay_tolerance_s=2.0e-7",
+)
+#: The same of the speed of sound, as a share of it: 1 deg C.
+SOUND_SPEED_TOLERANCE = 0.002
+
+#: Emission and bound of a cell are held in memory.
+_MOST_TRIALS = 100_000
+
+#: Settings of ``tdoa`` by the estimators' names. The papers take every result
+#: of the closed form as it comes: no threshold.
+ESTIMATORS: dict[str, dict[str, Any]] = {
+    "paper": {
+        "method": "amdf",
+        "false_alarm_rate": 1.0 - 1e-12,
+        "suppress_echoes": False,
+        "maximum_closure_s": 1.0,
+        "maximum_ambiguity": 1.0,
+        "maximum_bearing_std_deg": 1e9,
+        "maximum_relative_range_std": 1e9,
+    },
+    "fast": {"method": "gcc"},
+    "ml": {"method": "ml"},
+}
+
+
+@dataclass(frozen=True)
+class LocalizationCell:
+    """The measurements of one estimator in one place."""
+
+    paper: PaperCell
+    """The place, and what the paper found there."""
+    estimator: str
+    """A key of ESTIMATORS."""
+    trials: int
+    """Number of frames."""
+    heard: Heard
+    """What was measured, and its bound."""
+    tolerance: PolarStd
+    """What the array's tolerances cost, predicted to first order."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """A cell of the JSON document; null where nothing was measured."""
+        paper = self.paper
+        heard, bound = self.heard, self.heard.bound
+        bearings_deg = np.degrees(heard.bearings)
+        return {
+            "range_m": paper.range_m,
+            "bearing_deg": paper.bearing_deg,
+            "estimator": self.estimator,
+            "trials": self.trials,
+            "unheard": self.trials - len(heard.bearings),
+            "rangeless": len(heard.bearings) - len(heard.ranges),
+            **_moments("range", "m", heard.ranges, paper.range_m),
+            **_moments("bearing", "deg", bearings_deg, paper.bearing_deg),
+            "bound_range_m": bound.range_std,
+            "bound_bearing_deg": math.degrees(bound.bearing_std),
+            "tolerance_range_m": self.tolerance.range,
+            "tolerance_bearing_deg": math.degrees(self.tolerance.bearing),
+            "paper": {
+                "range_mean_m": paper.range_mean_m,
+                "range_std_m": paper.range_std_m,
+                "bearing_mean_deg": paper.bearing_mean_deg,
+                "bearing_std_deg": paper.bearing_std_deg,
+            },
+        }
+
+
+def _moments(
+    name: str, unit: str, values: NDArray[np.float64], truth: float
+) -> dict[str, float | None]:
+    """Mean, standard deviation and RMSE, as far as there are values for it."""
+    some, several = len(values) > 0, len(values) > 1
+    return {
+        f"{name}_mean_{unit}": float(values.mean()) if some else None,
+        f"{name}_std_{unit}": float(values.std(ddof=1)) if several else None,
+        f"{name}_rmse_{unit}": float(np.sqrt(np.mean((values - truth) ** 2)))
+        if some
+        else None,
+    }
+
+
+@dataclass(frozen=True)
+class LocalizationExperiment:
+    """What is measured; see ``prepare_localization``."""
+
+    scenario: Scenario
+    """A source at rest that sounds on, and a robot that no force moves."""
+    trials: int
+    """Measurements a cell."""
+    sound_speed_tolerance: float
+    """Largest error of the speed of sound, as a share of it."""
+    estimators: tuple[str, ...] = tuple(ESTIMATORS)
+    """Keys of ESTIMATORS."""
+    places: tuple[PaperCell, ...] = PAPER_CELLS
+    """Where the source is put."""
+
+    @property
+    def measurements(self) -> int:
+        """Number of measurements in all."""
+        return self.trials * len(self.places) * len(self.estimators)
+
+    @property
+    def shape(self) -> ArrayShape:
+        """The microphones as stated."""
+        return ArrayShape.of(self.scenario.robot.microphones_m)
+
+    @property
+    def array_errors(self) -> ArrayErrors:
+        """Standard deviations of errors that are uniform within the tolerances."""
+        part = 1.0 / math.sqrt(3.0)
+        microphones = self.scenario.microphones
+        return ArrayErrors(
+            position_m=part * microphones.position_tolerance_m,
+            delay_s=part * microphones.delay_tolerance_s,
+            sound_speed_share=part * self.sound_speed_tolerance,
+        )
+
+    def run(
+        self, progress: Callable[[float], None] | None = None
+    ) -> list[LocalizationCell]:
+        """Measures in every place with every estimator.
+
+        Errors within the tolerances are redrawn for every measurement, and are
+        the same for all estimators, as sound and noise are.
+
+        Args:
+            progress: Called with the number of measurements so far.
+
+        Returns:
+            Cells by place, then by estimator.
+
+        Raises:
+            ValueError: The sound cannot be played.
+        """
+        listeners = [
+            (name, Listener(_with_estimator(self.scenario, name)))
+            for name in self.estimators
+        ]
+        cells: list[LocalizationCell] = []
+        for number, place in enumerate(self.places):
+            for name, listener in listeners:
+                heard = listener.listen(
+                    place.range_m,
+                    math.radians(place.bearing_deg),
+                    self.trials,
+                    self.sound_speed_tolerance,
+                    session=number,
+                )
+                tolerance = predicted_std(
+                    self.array_errors,
+                    heard.p_AS,
+                    self.shape,
+                    self.scenario.acoustics.c,
+                )
+                cells.append(
+                    LocalizationCell(place, name, self.trials, heard, tolerance)
+                )
+                if progress is not None:
+                    progress(self.trials * len(cells))
+        return cells
+
+
+def prepare_localization(
+    overrides: Iterable[str] = (), *, trials: int = 100, tolerances: bool = False
+) -> LocalizationExperiment:
+    """The experiment in the default scenario.
+
+    Args:
+        overrides: Changes of the scenario, as of ``load_scenario``.
+        trials: Measurements a cell.
+        tolerances: Whether the array has errors within REALISTIC_TOLERANCES.
+
+    Raises:
+        ValueError: An override, or the number of trials, is wrong.
+    """
+    if not 2 <= trials <= _MOST_TRIALS:
+        raise ValueError(f"trials: {trials} must lie between 2 and {_MOST_TRIALS}")
+    own = REALISTIC_TOLERANCES if tolerances else ()
+    return LocalizationExperiment(
+        scenario=load_scenario("default", [*_SETTING, *own, *overrides]),
+        trials=trials,
+        sound_speed_tolerance=SOUND_SPEED_TOLERANCE if tolerances else 0.0,
+    )
+
+
+def _with_estimator(scenario: Scenario, name: str) -> Scenario:
+    tdoa = scenario.tdoa.model_copy(update=ESTIMATORS[name])
+    return scenario.model_copy(update={"tdoa": tdoa})

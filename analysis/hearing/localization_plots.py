@@ -1,0 +1,190 @@
+"""Picture of the localisation experiment: estimates and errors over the plane."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Ellipse
+from numpy.typing import NDArray
+
+from analysis.hearing.localization import LocalizationCell
+from analysis.runs.scene import COLOURS
+
+__all__ = ["plot_localization"]
+
+#: How the estimators are drawn.
+_STYLES = {
+    "paper": (COLOURS["obstacle"], "the papers' estimator"),
+    "fast": (COLOURS["left"], "fast"),
+    "ml": (COLOURS["robot"], "maximum likelihood"),
+}
+#: Ellipses have so many standard deviations as half axes.
+_SIGMAS = 2.0
+#: Along and across the line of sight, the exaggerated half axes of each distance
+#: are no longer than this, m.
+_ROOM_M = (0.45, 0.2)
+#: Where the factors stand, m.
+_LABELS_Y_M = -0.5
+#: Floor that is shown: from behind the robot to beyond the farthest cell, m.
+_X_M, _Y_M = (-0.35, 5.05), (-0.95, 4.3)
+
+
+def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
+    """Two maps in B axes, seen from the microphones' centroid, m.
+
+    Left, to scale: where Han 2019 found the source (mean, and two standard
+    deviations of range and bearing), and where each estimator puts it. Right:
+    ellipses of two standard deviations about each estimator's mean, and those of
+    the Cramer-Rao bound, exaggerated along and across the line of sight by
+    factors that stand beside each distance. The papers' estimator, whose errors
+    are no ellipses, is left out there.
+    """
+    figure = Figure(figsize=(13.0, 7.2), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    for axes in (left, right):
+        _floor(axes, cells)
+    _to_scale(left, cells)
+    _exaggerated(right, cells)
+    left.set_ylabel("y in B, left (m)")
+    left.set_title("Where the source was found, to scale", fontsize=11)
+    right.set_title("Spread about the mean, exaggerated as written", fontsize=11)
+    for axes in (left, right):
+        axes.legend(loc="upper right", fontsize=9, framealpha=1.0)
+    return figure
+
+
+def _floor(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
+    """Microphones, true places, and arcs of equal range."""
+    axes.set_aspect("equal")
+    axes.set_xlim(*_X_M)
+    axes.set_ylim(*_Y_M)
+    axes.set_xlabel("x in B, ahead (m)")
+    arc = np.radians(np.linspace(-5.0, 75.0, 80))
+    for distance in sorted({cell.paper.range_m for cell in cells}):
+        x, y = distance * np.cos(arc), distance * np.sin(arc)
+        axes.plot(x, y, color="#E5E5E5", linewidth=0.8, zorder=0)
+    axes.plot(
+        [0.0] * 3, [0.4, 0.0, -0.4], "o", markersize=5, color=COLOURS["obstacle"],
+        label="microphones",
+    )  # fmt: skip
+    truth = np.array([_truth(cell) for cell in cells])
+    axes.plot(*truth.T, "+", markersize=11, color=COLOURS["source"], label="source")
+
+
+def _truth(cell: LocalizationCell) -> NDArray[np.float64]:
+    angle = math.radians(cell.paper.bearing_deg)
+    return cell.paper.range_m * np.array([math.cos(angle), math.sin(angle)])
+
+
+def _to_scale(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
+    label: str | None = "Han 2019, 2 standard deviations"
+    for paper in dict.fromkeys(cell.paper for cell in cells):
+        angle = math.radians(paper.bearing_mean_deg)
+        across = paper.range_mean_m * math.radians(paper.bearing_std_deg)
+        axes.add_patch(
+            Ellipse(
+                (
+                    paper.range_mean_m * math.cos(angle),
+                    paper.range_mean_m * math.sin(angle),
+                ),
+                2.0 * _SIGMAS * paper.range_std_m,
+                2.0 * _SIGMAS * across,
+                angle=paper.bearing_mean_deg,
+                facecolor=COLOURS["sound"],
+                edgecolor=COLOURS["echo"],
+                alpha=0.6,
+                label=label,
+            )
+        )
+        label = None
+    for name, group in _by_estimator(cells).items():
+        colour, title = _STYLES[name]
+        found = np.concatenate([cell.heard.positions for cell in group])
+        axes.plot(*found.T, ".", markersize=3, color=colour, alpha=0.5, label=title)
+
+
+def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
+    drawn = [
+        cell
+        for cell in cells
+        if cell.estimator != "paper" and len(cell.heard.positions) > 1
+    ]
+    for distance in sorted({cell.paper.range_m for cell in drawn}):
+        ring = [cell for cell in drawn if cell.paper.range_m == distance]
+        factors = _factors(ring)
+        _write_factors(axes, distance, factors)
+        for cell in ring:
+            _spread(axes, cell, factors)
+    titles = [_STYLES[name] for name in _by_estimator(drawn)]
+    for colour, title in titles:
+        axes.plot([], [], color=colour, label=title)
+    axes.plot([], [], "--", color=COLOURS["source"], label="Cramer-Rao bound")
+
+
+def _spread(axes: Axes, cell: LocalizationCell, factors: NDArray[np.float64]) -> None:
+    """Estimates about their mean, with their ellipse and that of the bound."""
+    colour = _STYLES[cell.estimator][0]
+    truth, turn = _truth(cell), _along_and_across(cell)
+    stretch = turn.T @ np.diag(factors) @ turn
+    positions = cell.heard.positions
+    about_mean = truth + (positions - positions.mean(axis=0)) @ stretch.T
+    axes.plot(*about_mean.T, ".", markersize=1.5, color=colour, alpha=0.35)
+    for covariance, line, edge in (
+        (np.cov(positions.T), "-", colour),
+        (cell.heard.bound.covariance, "--", COLOURS["source"]),
+    ):
+        ellipse = _ellipse(truth, stretch @ covariance @ stretch.T)
+        ellipse.set(linestyle=line, edgecolor=edge, linewidth=1.2)
+        axes.add_patch(ellipse)
+
+
+def _along_and_across(cell: LocalizationCell) -> NDArray[np.float64]:
+    """(2, 2) unit vectors along the line of sight and to its left."""
+    angle = math.radians(cell.paper.bearing_deg)
+    cosine, sine = math.cos(angle), math.sin(angle)
+    return np.array([[cosine, sine], [-sine, cosine]])
+
+
+def _factors(cells: Sequence[LocalizationCell]) -> NDArray[np.float64]:
+    """(2,) along and across: the largest spread of a ring fits its room."""
+    stds = [(c.heard.positions @ _along_and_across(c).T).std(axis=0) for c in cells]
+    wanted = np.array(_ROOM_M) / np.maximum(_SIGMAS * np.max(stds, axis=0), 1e-9)
+    return np.array([_nice(value) for value in wanted])
+
+
+def _nice(value: float) -> float:
+    """The next smaller of 1, 2 and 5 times a power of ten."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(k * power for k in (5.0, 2.0, 1.0) if k * power <= value)
+
+
+def _write_factors(axes: Axes, distance: float, factors: NDArray[np.float64]) -> None:
+    axes.annotate(
+        f"along x{factors[0]:g}\nacross x{factors[1]:g}",
+        (distance, _LABELS_Y_M),
+        ha="center",
+        va="center",
+        fontsize=8,
+    )
+
+
+def _ellipse(centre: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
+    values, vectors = np.linalg.eigh(covariance)
+    width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(values, 0.0))
+    angle = math.degrees(math.atan2(vectors[1, 0], vectors[0, 0]))
+    return Ellipse(
+        (float(centre[0]), float(centre[1])), width, height, angle=angle, fill=False
+    )
+
+
+def _by_estimator(
+    cells: Sequence[LocalizationCell],
+) -> dict[str, list[LocalizationCell]]:
+    groups: dict[str, list[LocalizationCell]] = {}
+    for cell in cells:
+        groups.setdefault(cell.estimator, []).append(cell)
+    return groups

@@ -1,0 +1,162 @@
+"""The localisation experiment as a JSON document, as tables and as files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from analysis.hearing.free_field import frame_estimator
+from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
+from analysis.hearing.sensitivity import sensitivity_table
+from analysis.runs.run_report import SCHEMA_VERSION, versions
+from diagrams import dump_scenario
+
+__all__ = ["localization_summary", "localization_text", "write_localization"]
+
+_ERROR_NAMES = {
+    "position_m": "1 mm",
+    "delay_s": "1 us",
+    "sound_speed_share": "1 % of c",
+    "gain_db": "1 dB",
+}
+
+
+def localization_summary(
+    experiment: LocalizationExperiment,
+    cells: Sequence[LocalizationCell],
+    out: Path | None,
+) -> dict[str, Any]:
+    """The JSON document of the experiment."""
+    scenario, shape = experiment.scenario, experiment.shape
+    microphones, c = scenario.microphones, scenario.acoustics.c
+    # Whatever the errors of the array do to a range is to be seen.
+    tdoa = scenario.tdoa.model_copy(update={"maximum_relative_range_std": 1e9})
+    estimate = frame_estimator(tdoa, shape, c)
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "seed": scenario.seed,
+        "sound": scenario.sound.kind,
+        "snr_db_at_1m": microphones.snr_db_at_1m,
+        "tolerances": {
+            "position_m": microphones.position_tolerance_m,
+            "delay_s": microphones.delay_tolerance_s,
+            "gain_db": microphones.gain_tolerance_db,
+            "sound_speed_share": experiment.sound_speed_tolerance,
+        },
+        "cells": [cell.to_dict() for cell in cells],
+        "sensitivity": sensitivity_table(
+            experiment.places,
+            shape,
+            c,
+            estimate,
+            trials=experiment.trials,
+            seed=scenario.seed,
+        ),
+        "versions": versions(),
+        "out": str(out) if out is not None else None,
+    }
+
+
+def write_localization(
+    experiment: LocalizationExperiment,
+    cells: Sequence[LocalizationCell],
+    summary: dict[str, Any],
+    directory: Path,
+) -> None:
+    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``."""
+    from analysis.hearing.localization_plots import plot_localization
+
+    (directory / "scenario.yaml").write_text(dump_scenario(experiment.scenario))
+    (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    plot_localization(cells).savefig(directory / "localization.png", dpi=150)
+
+
+def localization_text(summary: dict[str, Any]) -> str:
+    """The tables on a terminal."""
+    tolerances = summary["tolerances"]
+    drawn = any(tolerances.values())
+    cells = summary["cells"]
+    lines = [
+        f"{cells[0]['trials']} frames a cell, {summary['sound']}, "
+        f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
+        + (_tolerances_text(tolerances) if drawn else "no errors of the array"),
+    ]
+    lines += [
+        "Han 2019: on hardware; paper: its estimator here; (n): frames without result"
+    ]
+    for name, unit in (("range", "m"), ("bearing", "deg")):
+        lines += ["", *_table(cells, name, unit)]
+    lines += ["", *_sensitivity_lines(summary["sensitivity"])]
+    return "\n".join(lines)
+
+
+def _tolerances_text(tolerances: dict[str, float]) -> str:
+    return (
+        f"every frame with errors within {1e3 * tolerances['position_m']:g} mm, "
+        f"{1e6 * tolerances['delay_s']:g} us and "
+        f"{100.0 * tolerances['sound_speed_share']:g} % of c"
+    )
+
+
+def _table(cells: list[dict[str, Any]], name: str, unit: str) -> list[str]:
+    """Mean and standard deviation by place, an estimator a column."""
+    places = _by_place(cells)
+    titles = "".join(f"{cell['estimator']:>18}" for cell in places[0])
+    heading = f"{name} in {unit}"
+    lines = [
+        f"{heading:<18}{'Han 2019':>13}{titles}{'bound':>9}{'tolerance':>11}",
+        f"{'':<18}{'mean std':>13}" + f"{'mean std':>18}" * len(places[0]),
+    ]
+    for group in places:
+        first = group[0]
+        mean, std = (first["paper"][f"{name}_{x}_{unit}"] for x in ("mean", "std"))
+        row = f"{_place(first)}{f'{mean:.2f} {std:.2f}':>13}"
+        for cell in group:
+            lost = cell["unheard"] + (cell["rangeless"] if name == "range" else 0)
+            mean, std = (cell[f"{name}_{x}_{unit}"] for x in ("mean", "std"))
+            row += f"{_pair(mean, std, lost):>18}"
+        bound, tolerance = (first[f"{x}_{name}_{unit}"] for x in ("bound", "tolerance"))
+        lines.append(f"{row}{bound:9.4f}{tolerance:11.4f}")
+    return lines
+
+
+def _by_place(rows: list[dict[str, Any]]) -> list[list[dict[str, Any]]]:
+    """Rows of one place together."""
+    groups = groupby(rows, lambda row: (row["range_m"], row["bearing_deg"]))
+    return [list(group) for _, group in groups]
+
+
+def _place(row: dict[str, Any]) -> str:
+    return f"{row['range_m']:4.0f} m {row['bearing_deg']:5.0f} deg  "
+
+
+def _pair(mean: float | None, std: float | None, lost: int) -> str:
+    """Mean and standard deviation; how many frames gave nothing in brackets."""
+    missing = f" ({lost})" if lost else ""
+    if mean is None:
+        return f"none{missing}"
+    spread = "-" if std is None else f"{std:.4f}"
+    return f"{mean:.3f} {spread}{missing}"
+
+
+def _sensitivity_lines(rows: list[dict[str, Any]]) -> list[str]:
+    """What each unit error costs: predicted, and measured in brackets."""
+    places = _by_place(rows)
+    lines = ["What errors of the array cost: predicted (measured)"]
+    for name, unit in (("range", "m"), ("bearing", "deg")):
+        heading = f"{name} in {unit}"
+        titles = "".join(f"{_ERROR_NAMES[row['error']]:>17}" for row in places[0])
+        lines += ["", f"{heading:<18}{titles}"]
+        for group in places:
+            costs = (_cost(row, name, unit) for row in group)
+            lines.append(_place(group[0]) + "".join(f"{cost:>17}" for cost in costs))
+    return lines
+
+
+def _cost(row: dict[str, Any], name: str, unit: str) -> str:
+    measured = row[f"measured_{name}_{unit}"]
+    told = "infinite" if measured is None else f"{measured:.3f}"
+    return f"{row[f'predicted_{name}_{unit}']:.3f} ({told})"

@@ -1,0 +1,209 @@
+"""What errors of the array and of the air cost in bearing and range.
+
+Predicted to first order: an error moves the delays, and the position moves so
+that the delays of the array as stated fit them again. Measured: sound recorded
+by arrays with random errors, located as if there were none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.hearing.cramer_rao import polar_gradients
+from analysis.hearing.free_field import Estimator, Loudspeaker
+from analysis.hearing.paper_tables import PaperCell
+from systems.array_shape import ArrayShape
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "UNIT_ERRORS",
+    "ArrayErrors",
+    "PolarStd",
+    "measured_std",
+    "predicted_std",
+    "sensitivity_table",
+]
+
+#: Shares of a Gaussian within one standard deviation.
+_ONE_SIGMA = (0.158655, 0.841345)
+
+
+@dataclass(frozen=True)
+class ArrayErrors:
+    """Standard deviations of independent errors."""
+
+    position_m: float = 0.0
+    """Of every coordinate of every microphone, m."""
+    delay_s: float = 0.0
+    """Of every channel, s."""
+    sound_speed_share: float = 0.0
+    """Of the speed of sound over its stated value."""
+    gain_db: float = 0.0
+    """Of every channel, dB."""
+
+
+@dataclass(frozen=True)
+class PolarStd:
+    """Standard deviations of a source's place."""
+
+    bearing: float
+    """rad."""
+    range: float
+    """m."""
+
+
+#: Errors of the sensitivity table: 1 mm, 1 us, 1 % and 1 dB.
+UNIT_ERRORS = (
+    ArrayErrors(position_m=1e-3),
+    ArrayErrors(delay_s=1e-6),
+    ArrayErrors(sound_speed_share=0.01),
+    ArrayErrors(gain_db=1.0),
+)
+
+
+def predicted_std(
+    errors: ArrayErrors, p_AS: NDArray[np.float64], shape: ArrayShape, c: float
+) -> PolarStd:
+    """What errors cost, to first order.
+
+    Args:
+        errors: Of the array and of the air; gains do not change delays.
+        p_AS: (2,) source from the microphones' centroid, m.
+        shape: The microphones as stated, in the plane.
+        c: Speed of sound as stated, m/s.
+    """
+    rays = p_AS - shape.p_AM
+    ranges = np.linalg.norm(rays, axis=1)
+    rays /= ranges[:, None]
+    times = np.hstack(
+        (
+            -errors.position_m * rays[:, [0]] * np.eye(shape.count) / c,
+            -errors.position_m * rays[:, [1]] * np.eye(shape.count) / c,
+            -errors.delay_s * np.eye(shape.count),
+            -errors.sound_speed_share * ranges[:, None] / c,
+        )
+    )
+    to_delays = np.hstack((-np.ones((shape.count - 1, 1)), np.eye(shape.count - 1)))
+    moves = np.linalg.pinv(to_delays @ rays / c) @ to_delays @ times
+    of_bearing, of_range = (gradient @ moves for gradient in polar_gradients(p_AS))
+    return PolarStd(
+        bearing=float(np.linalg.norm(of_bearing)), range=float(np.linalg.norm(of_range))
+    )
+
+
+def measured_std(
+    errors: ArrayErrors,
+    p_AS: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+    *,
+    loudspeaker: Loudspeaker,
+    estimate: Estimator,
+    trials: int,
+    seed: int,
+) -> PolarStd:
+    """What Gaussian errors cost in noise-free frames.
+
+    Large errors bend range, and its tail is long: taken is half the width of
+    what holds the central 68 % of the estimates, a Gaussian's standard
+    deviation. A frame without a finite range counts as infinitely far.
+
+    Args:
+        errors: Of the array and of the air.
+        p_AS: (2,) source from the microphones' centroid, m.
+        shape: The microphones as stated, in the plane.
+        c: Speed of sound as stated, m/s.
+        loudspeaker: What sounds.
+        estimate: From a frame to a fix.
+        trials: Number of frames.
+        seed: Of the errors.
+
+    Raises:
+        ValueError: In some frame nothing was heard.
+    """
+    rng = np.random.default_rng(seed)
+    bearings, ranges = np.empty(trials), np.empty(trials)
+    for k in range(trials):
+        p_AM = shape.p_AM + errors.position_m * rng.standard_normal(shape.p_AM.shape)
+        late = errors.delay_s * rng.standard_normal(shape.count)
+        speed = c * (1.0 + errors.sound_speed_share * rng.standard_normal())
+        gains = 10.0 ** (errors.gain_db * rng.standard_normal(shape.count) / 20.0)
+        begin = rng.uniform(0.1, loudspeaker.seconds - 0.1 - FRAME_PERIOD_S)
+        pressure = loudspeaker.pressure(begin + late, p_AS, p_AM, speed)
+        fix = estimate(pressure * gains[:, None].astype(np.float32))
+        if fix is None:
+            raise ValueError(f"nothing was heard from {p_AS} with {errors}")
+        bearings[k] = fix.bearing
+        ranges[k] = fix.range if fix.range_valid else math.inf
+    return PolarStd(bearing=_half_width(bearings), range=_half_width(ranges))
+
+
+def _half_width(values: NDArray[np.float64]) -> float:
+    low, high = np.quantile(values, _ONE_SIGMA, method="nearest")
+    return float(high - low) / 2.0
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if math.isfinite(value) else None
+
+
+def sensitivity_table(
+    places: Sequence[PaperCell],
+    shape: ArrayShape,
+    c: float,
+    estimate: Estimator,
+    *,
+    trials: int,
+    seed: int,
+) -> list[dict[str, Any]]:
+    """Rows of the JSON document: each unit error in each place.
+
+    Args:
+        places: Of the source.
+        shape: The microphones, in the plane.
+        c: Speed of sound, m/s.
+        estimate: From a frame to a fix.
+        trials: Frames a row.
+        seed: Of all random numbers.
+    """
+    loudspeaker = Loudspeaker.of("chirp", seed)
+    rows = []
+    for number, (errors, cell) in enumerate(
+        (errors, cell) for cell in places for errors in UNIT_ERRORS
+    ):
+        angle = math.radians(cell.bearing_deg)
+        p_AS = cell.range_m * np.array([math.cos(angle), math.sin(angle)])
+        predicted = predicted_std(errors, p_AS, shape, c)
+        measured = measured_std(
+            errors,
+            p_AS,
+            shape,
+            c,
+            loudspeaker=loudspeaker,
+            estimate=estimate,
+            trials=trials,
+            seed=seed + number,
+        )
+        (kind,) = [f.name for f in fields(errors) if getattr(errors, f.name)]
+        rows.append(
+            {
+                "range_m": cell.range_m,
+                "bearing_deg": cell.bearing_deg,
+                "error": kind,
+                "size": getattr(errors, kind),
+                "predicted_range_m": predicted.range,
+                "measured_range_m": measured.range
+                if math.isfinite(measured.range)
+                else None,
+                "predicted_bearing_deg": math.degrees(predicted.bearing),
+                "measured_bearing_deg": math.degrees(measured.bearing),
+            }
+        )
+    return rows

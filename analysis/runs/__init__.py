@@ -1,0 +1,1 @@
+"""What a run did: metrics, pictures, replay, result directories."""

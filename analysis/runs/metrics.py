@@ -1,0 +1,250 @@
+"""Figures of merit of a run; docs/metrics.md defines each in words."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.hearing.sightings import sightings
+from analysis.runs.proximity import Proximity
+from analysis.runs.shortest_path import shortest_path_length
+from analysis.runs.smoothness import (
+    jerk,
+    log_dimensionless_jerk,
+    spectral_arc_length,
+    turn_reversals,
+    windows,
+)
+from diagrams.simulation import RunResult
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["following_error", "run_metrics"]
+
+#: A detection is off when it is farther from the source than this, m.
+OUTLIER_M = 0.5
+#: Movements of this many ticks (4 s) have their smoothness measured.
+WINDOW_TICKS = 160
+#: A window that is never faster is a rest, not a movement, m/s.
+MOVING_M_S = 0.05
+#: Slower turning is no turning, rad/s.
+TURNING_RAD_S = 0.1
+#: The law has reacted when it pushes this hard, N: 0.13 m/s^2 at 3.94 kg.
+REACTION_N = 0.5
+#: An echo this near to an obstacle's true distance is that obstacle's, m.
+ECHO_M = 0.2
+
+
+def run_metrics(result: RunResult) -> dict[str, float | None]:
+    """All metrics of a run, SI units; None where one does not apply."""
+    proximity = Proximity(result)
+    return {
+        **_proximity_metrics(proximity),
+        **_goal_metrics(result),
+        **_following_metrics(result),
+        **_smoothness_metrics(result),
+        **_effort_metrics(result),
+        "reaction_distance_m": _reaction_distance(proximity),
+        **_collision_metrics(result),
+        **_hearing_metrics(result),
+    }
+
+
+def following_error(result: RunResult) -> NDArray[np.float64]:
+    """Distance of P from the source, less the follow distance, (n,) m."""
+    distance = result.columns["source_range_true"]
+    return distance - result.scenario.attraction.follow_distance_m
+
+
+def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
+    """The source counts as a body, but not as an obstacle."""
+    least, contact = proximity.least, float(np.min(proximity.time_to_contact))
+    return {
+        "minimum_clearance_m": float(np.min(least)),
+        "minimum_obstacle_clearance_m": _least(least[:-1]),
+        "clearance_p05_m": _quantile(proximity.clearance, 0.05),
+        "minimum_time_to_contact_s": contact if np.isfinite(contact) else None,
+    }
+
+
+def _goal_metrics(result: RunResult) -> dict[str, float | None]:
+    """The goal: the radius of a resting source, the band of a moving one."""
+    scenario, columns, time = result.scenario, result.columns, result.time
+    source = scenario.bodies()["source"]
+    goal = scenario.goal_radius_m
+    if source.path.moves:
+        goal = scenario.attraction.follow_distance_m + scenario.stop.following_band_m
+    inside = columns["source_range_true"] <= goal
+    entries, exits = np.flatnonzero(inside), np.flatnonzero(~inside)
+    last_entry = int(exits[-1]) + 1 if len(exits) else 0
+    steps = np.hypot(np.diff(columns["p_WB_x"]), np.diff(columns["p_WB_y"]))
+    length = float(np.sum(steps))
+    shortest = None if source.path.moves else _shortest_path(result)
+    return {
+        "time_to_goal_s": float(time[entries[0]]) if len(entries) else None,
+        "settling_time_s": float(time[last_entry]) if inside[-1] else None,
+        "path_length_m": length,
+        "shortest_path_m": shortest,
+        "spl": None if shortest is None else _spl(result.cause, length, shortest),
+        "final_distance_m": float(columns["source_range_true"][-1]),
+    }
+
+
+def _shortest_path(result: RunResult) -> float | None:
+    """Of a disc as wide as the robot, to where P can be at the goal radius."""
+    scenario = result.scenario
+    *obstacles, source = scenario.bodies().values()
+    boxes = [body.rectangle(0.0) for body in obstacles if not body.path.moves]
+    length = shortest_path_length(
+        scenario.start.position_m,
+        source.path.pose(0.0)[:2],
+        scenario.goal_radius_m + scenario.robot.control_point_m,
+        boxes,
+        scenario.robot.width_m / 2.0,
+    )
+    return length if np.isfinite(length) else None
+
+
+def _spl(cause: str, length: float, shortest: float) -> float:
+    """One run's term of SPL (Anderson et al. 2018): its mean over runs is SPL."""
+    if cause != "reached":
+        return 0.0
+    longest = max(length, shortest)
+    return shortest / longest if longest > 0.0 else 1.0
+
+
+def _following_metrics(result: RunResult) -> dict[str, float | None]:
+    """From the end of the second burst on."""
+    sound, columns = result.scenario.sound, result.columns
+    settled = result.time >= sound.start_s + sound.period_s + sound.on_s
+    error = np.abs(following_error(result)[settled])
+    bearing = np.degrees(columns["source_bearing_true"][settled])
+    return {
+        "following_fraction": _mean(error <= result.scenario.stop.following_band_m),
+        "following_error_rms_m": _rms(error),
+        "following_error_p95_m": _quantile(error, 0.95),
+        "following_bearing_rms_deg": _rms(bearing),
+        "valid_target_fraction": float(np.mean(columns["target_valid"] > 0.5)),
+    }
+
+
+def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
+    """Of the origin of B and of the heading."""
+    columns, rate = result.columns, 1.0 / FRAME_PERIOD_S
+    velocity = np.stack([columns["v_WB_x"], columns["v_WB_y"]], axis=1)
+    linear = np.hypot(*jerk(velocity, FRAME_PERIOD_S).T)
+    angular = jerk(columns["omega_WB"], FRAME_PERIOD_S)
+    speed = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
+    movements = windows(speed, WINDOW_TICKS)
+    moving = np.max(movements, axis=1, initial=0.0) >= MOVING_M_S
+    movements = movements[moving & np.any(np.diff(movements, 2) != 0.0, axis=1)]
+    sparc = spectral_arc_length(movements, rate)
+    ldlj = log_dimensionless_jerk(movements, rate)
+    path = float(np.sum(speed)) * FRAME_PERIOD_S
+    turned = float(np.sum(np.abs(np.diff(columns["theta_WB"]))))
+    reversals = turn_reversals(columns["omega_WB"], TURNING_RAD_S)
+    duration = result.simulated_s
+    return {
+        "jerk_rms_m_s3": _rms(linear),
+        "jerk_max_m_s3": float(np.max(linear)) if len(linear) else None,
+        "angular_jerk_rms_rad_s3": _rms(angular),
+        "sparc": _quantile(sparc, 0.5),
+        "ldlj": _quantile(ldlj, 0.5),
+        "turn_reversals_per_s": reversals / duration if duration > 0.0 else None,
+        "heading_change_rad_m": turned / path if path > MOVING_M_S else None,
+        "mean_speed_m_s": float(np.mean(speed)),
+        "top_speed_m_s": float(np.max(speed)),
+    }
+
+
+def _effort_metrics(result: RunResult) -> dict[str, float | None]:
+    """What the law and the wheels were asked for."""
+    columns, robot = result.columns, result.scenario.robot
+    force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
+    wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
+    push = columns["repulsion_x"] * columns["v_WP_x"]
+    push = push + columns["repulsion_y"] * columns["v_WP_y"]
+    variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
+    pulling = np.hypot(columns["v_WP_x"], columns["v_WP_y"])
+    full = 0.999
+    saturated = np.max(np.abs(wheels), axis=0) >= full * robot.top_wheel_speed
+    saturated |= pulling >= full * robot.top_speed_m_s
+    speeds = np.stack([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
+    impossible = np.any(speeds > 2.0 * robot.top_speed_m_s, axis=0)
+    return {
+        "control_effort_rms_n": _rms(np.hypot(*force)),
+        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
+        "wheel_variation_m_s2": float(variation)
+        * robot.wheel_radius_m
+        / FRAME_PERIOD_S,
+        "saturated_fraction": float(np.mean(saturated)),
+        "impossible_obstacle_speed_ticks": int(np.count_nonzero(impossible)),
+    }
+
+
+def _reaction_distance(proximity: Proximity) -> float | None:
+    """From P to the nearest obstacle when the law first pushes back from it."""
+    columns = proximity.result.columns
+    distances = proximity.distances_from_P()
+    if len(distances) < 2:
+        return None
+    nearest = np.min(distances[:-1], axis=0)
+    echoes = [
+        np.where(
+            columns[f"collision_{k}"] > 0.5,
+            np.hypot(columns[f"collision_{k}_B_x"], columns[f"collision_{k}_B_y"]),
+            np.inf,
+        )
+        for k in (1, 2, 3)
+    ]
+    seen = np.min(np.abs(np.stack(echoes) - nearest), axis=0) <= ECHO_M
+    push = np.hypot(columns["repulsion_x"], columns["repulsion_y"])
+    reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
+    first = np.flatnonzero(reacting)
+    return float(nearest[first[0]]) if len(first) else None
+
+
+def _collision_metrics(result: RunResult) -> dict[str, float | None]:
+    """What the cones knew of the body that was hit."""
+    before = sightings(result)
+    return {
+        "contact_warning_s": before.warning_s if before else None,
+        "contact_unseen_s": before.unseen_s if before else None,
+        "contact_push_n": before.push_n if before else None,
+    }
+
+
+def _hearing_metrics(result: RunResult) -> dict[str, Any]:
+    """How good the fresh estimates were."""
+    columns = result.columns
+    heard = columns["detected"] > 0.5
+    ranged = heard & (columns["range_valid"] > 0.5)
+    error = np.hypot(
+        columns["p_WS_estimated_x"] - columns["p_WS_x"],
+        columns["p_WS_estimated_y"] - columns["p_WS_y"],
+    )
+    off = error[ranged] > OUTLIER_M
+    return {
+        "detections": int(np.count_nonzero(heard)),
+        "detections_with_range": int(np.count_nonzero(ranged)),
+        "source_error_median_m": _quantile(error[ranged], 0.5),
+        "source_error_p95_m": _quantile(error[ranged], 0.95),
+        "source_outlier_fraction": _mean(off),
+    }
+
+
+def _least(values: NDArray[np.float64]) -> float | None:
+    return float(np.min(values)) if len(values) else None
+
+
+def _mean(flags: NDArray[np.bool_]) -> float | None:
+    return float(np.mean(flags)) if len(flags) else None
+
+
+def _rms(values: NDArray[np.float64]) -> float | None:
+    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+
+
+def _quantile(values: NDArray[np.float64], q: float) -> float | None:
+    return float(np.quantile(values, q)) if len(values) else None

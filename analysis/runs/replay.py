@@ -1,0 +1,240 @@
+"""A run as a page that plays in a browser, with nothing else needed."""
+
+from __future__ import annotations
+
+import html
+import logging
+import math
+import re
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import Meshcat, MeshcatParams
+
+from analysis.runs import replay_scene
+from analysis.runs.replay_scene import upright
+from analysis.runs.scene import moving_and_static, sound_bursts
+from diagrams import RunResult
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
+
+#: Meshcat records at most so many frames a second.
+FRAMES_PER_S = 32.0
+#: Length of a piece of trail, s.
+TRAIL_PIECE_S = 0.5
+#: Time for which one ring of the sound is seen, s.
+RING_S = 0.0625
+
+
+def write_replay(result: RunResult, path: str | Path) -> None:
+    """Writes a self-contained page that plays the run.
+
+    The robot with its microphone bar, wheels and cones (a cone is orange
+    while it has an echo), the obstacles, the source with a ring that grows
+    while it sounds, where the robot takes the source to be (a ball), and both
+    trails. The page needs a browser with WebGL, but no network.
+
+    Args:
+        result: The run.
+        path: The .html file.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
+    with _quiet_drake():
+        meshcat = Meshcat(MeshcatParams(host="localhost"))
+        _build_scene(meshcat, result)
+        meshcat.StartRecording(FRAMES_PER_S, set_visualizations_while_recording=False)
+        record_run(meshcat, result)
+        meshcat.StopRecording()
+        meshcat.PublishRecording()
+        page = meshcat.StaticHtml()
+        del meshcat
+    title = html.escape(f"{_title(result)} - replay")
+    page = re.sub(
+        "<title>.*?</title>", lambda _: f"<title>{title}</title>", page, count=1
+    )
+    Path(path).write_text(page, encoding="utf-8")
+
+
+@contextmanager
+def _quiet_drake() -> Iterator[None]:
+    """Drake announces the address of a server that nobody is meant to open."""
+    logger = logging.getLogger("drake")
+    level = logger.level
+    logger.setLevel(logging.WARNING)
+    try:
+        yield
+    finally:
+        logger.setLevel(level)
+
+
+def _title(result: RunResult) -> str:
+    scenario = result.scenario
+    return f"{scenario.name}, law {scenario.law}: {result.cause}"
+
+
+def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
+    scenario = result.scenario
+    replay_scene.add_floor(meshcat, result, _title(result))
+    replay_scene.add_obstacles(meshcat, scenario)
+    replay_scene.add_source(meshcat, scenario)
+    replay_scene.add_robot(meshcat, scenario)
+    replay_scene.set_stage(meshcat, result)
+
+
+def record_run(meshcat: Meshcat, result: RunResult) -> None:
+    """Records all motion of a run; the bodies must have been made before."""
+    frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
+    _record_robot(meshcat, result, frames)
+    _record_source(meshcat, result, frames)
+    _record_estimate(meshcat, result)
+    _record_obstacles(meshcat, result, frames)
+    _record_trail(meshcat, result, "trail/robot", ("p_WP_x", "p_WP_y"), "robot")
+    _record_trail(meshcat, result, "trail/source", ("p_WS_x", "p_WS_y"), "source")
+
+
+def _at_frames(
+    result: RunResult, values: NDArray[np.float64], frames: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n, 3) poses at the ticks, interpolated to the frames."""
+    columns = [
+        np.interp(frames, result.time, values[:, 0]),
+        np.interp(frames, result.time, values[:, 1]),
+        np.interp(frames, result.time, np.unwrap(values[:, 2])),
+    ]
+    return np.stack(columns, axis=1)
+
+
+def _record_path(
+    meshcat: Meshcat,
+    path: str,
+    frames: NDArray[np.float64],
+    pose_at: Iterable[tuple[float, float, float]] | NDArray[np.float64],
+    height: float = 0.0,
+) -> None:
+    for time, (x, y, theta) in zip(frames, pose_at, strict=True):
+        meshcat.SetTransform(path, upright(x, y, height, theta), float(time))
+
+
+def _record_switch(
+    meshcat: Meshcat, path: str, times: Iterable[float], states: Iterable[bool]
+) -> None:
+    """Records visibility where it changes; the first state counts from 0 s."""
+    last: bool | None = None
+    for time, state in zip(times, states, strict=True):
+        if state != last:
+            meshcat.SetProperty(
+                path,
+                "visible",
+                value=bool(state),
+                time_in_recording=0.0 if last is None else float(time),
+            )
+            last = state
+
+
+def _record_robot(
+    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
+) -> None:
+    path = _at_frames(result, result.poses("WB"), frames)
+    _record_path(meshcat, "robot", frames, path)
+    for side, angles in wheel_angles(result).items():
+        turned = np.interp(frames, result.time, angles)
+        for time, angle in zip(frames, turned, strict=True):
+            spin = upright(0.0, 0.0, 0.0, angle)
+            meshcat.SetTransform(f"robot/{side}/wheel", spin, float(time))
+    for number in (1, 2, 3):
+        if f"echo_{number}" in result.columns:
+            echo = result.columns[f"echo_{number}"] > 0.5
+            cone = f"robot/cone_{number}"
+            _record_switch(meshcat, f"{cone}/echo", result.time, echo)
+            _record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
+
+
+def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
+    """Angles of wheels that roll without slip on the robot's path, (n,) rad."""
+    robot, path = result.scenario.robot, result.poses("WB")
+    theta = np.unwrap(path[:, 2])
+    between = 0.5 * (theta[1:] + theta[:-1])
+    steps = np.diff(path[:, :2], axis=0)
+    forward = steps[:, 0] * np.cos(between) + steps[:, 1] * np.sin(between)
+    turn = 0.5 * robot.wheel_separation_m * np.diff(theta)
+    return {
+        "left": np.r_[0.0, np.cumsum(forward - turn)] / robot.wheel_radius_m,
+        "right": np.r_[0.0, np.cumsum(forward + turn)] / robot.wheel_radius_m,
+    }
+
+
+def _record_source(
+    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
+) -> None:
+    path = _at_frames(result, result.poses("WS"), frames)
+    if not result.scenario.source.path().moves:
+        frames, path = frames[:1], path[:1]
+    _record_path(meshcat, "source", frames, path)
+    bursts = sound_bursts(result.scenario, result.simulated_s)
+    times = np.arange(0.0, result.simulated_s, RING_S / 2.0)
+    for number in range(len(replay_scene.RINGS)):
+        seen = [ring_at(time, bursts) == number for time in times]
+        _record_switch(meshcat, f"source/ring_{number + 1}", times, seen)
+
+
+def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
+    """Which ring is seen at a time, s: each in turn while the source sounds."""
+    for start, end in bursts:
+        if start <= time < end:
+            return math.floor((time - start) / RING_S) % len(replay_scene.RINGS)
+    return None
+
+
+def _record_estimate(meshcat: Meshcat, result: RunResult) -> None:
+    """The ball jumps when a frame is heard and rests in between."""
+    columns = result.columns
+    valid = columns["target_valid"] > 0.5
+    _record_switch(meshcat, "estimate", result.time, valid)
+    height = replay_scene.SOURCE_HEIGHT_M + 0.12
+    places = np.stack(
+        [columns["p_WS_estimated_x"], columns["p_WS_estimated_y"]], axis=1
+    )
+    for tick in np.flatnonzero(valid):
+        if tick and valid[tick - 1] and np.allclose(places[tick], places[tick - 1]):
+            continue
+        x, y = places[tick]
+        if tick and valid[tick - 1]:
+            # Without this the ball would glide here from the last burst on.
+            x_0, y_0 = places[tick - 1]
+            before = float(result.time[tick - 1])
+            meshcat.SetTransform("estimate", upright(x_0, y_0, height, 0.0), before)
+        time = float(result.time[tick])
+        meshcat.SetTransform("estimate", upright(x, y, height, 0.0), time)
+
+
+def _record_obstacles(
+    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
+) -> None:
+    moving, _ = moving_and_static(result.scenario)
+    for obstacle in moving:
+        pose: Callable[[float], tuple[float, float, float]] = obstacle.path().pose
+        places = [pose(float(time)) for time in frames]
+        height = 0.5 * replay_scene.OBSTACLE_HEIGHT_M
+        _record_path(meshcat, f"obstacles/{obstacle.name}", frames, places, height)
+
+
+def _record_trail(
+    meshcat: Meshcat, result: RunResult, path: str, names: tuple[str, str], role: str
+) -> None:
+    """Pieces that are there from the start and seen once they are driven."""
+    points = np.stack([result.columns[name] for name in names], axis=1)
+    step = round(TRAIL_PIECE_S / FRAME_PERIOD_S)
+    for number, start in enumerate(range(0, len(points) - 1, step)):
+        piece = points[start : start + step + 1]
+        if not np.ptp(piece, axis=0).any():
+            continue
+        name = f"{path}/{number}"
+        replay_scene.add_trail(meshcat, name, piece, role)
+        drawn = result.time[min(start + step, len(points) - 1)]
+        _record_switch(meshcat, name, (0.0, drawn), (False, True))

@@ -1,0 +1,252 @@
+"""The bodies of a replay: what Meshcat is given before anything moves.
+
+Meshcat records how objects move and whether they are visible, not that they
+come into being; so everything that is ever seen is made here.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.colors import to_rgb
+from matplotlib.textpath import TextPath
+from numpy.typing import ArrayLike, NDArray
+from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from analysis.runs.scene import COLOURS, bounds, sensor_pose
+from diagrams import RunResult, Scenario
+from systems.mic_array import microphones_B
+
+__all__ = [
+    "RINGS",
+    "add_floor",
+    "add_obstacles",
+    "add_robot",
+    "add_source",
+    "add_trail",
+    "set_stage",
+    "upright",
+]
+
+#: Heights are not modelled; these look right, m.
+ROBOT_HEIGHT_M = 0.16
+MICROPHONE_HEIGHT_M = 0.30
+SOURCE_HEIGHT_M = 0.30
+OBSTACLE_HEIGHT_M = 0.35
+SENSOR_HEIGHT_M = 0.14
+WHEEL_WIDTH_M = 0.035
+#: The body carries the microphone bar, which is wider; m of the bar's width.
+BODY_WIDTH_FRACTION = 0.45
+#: Radii of the ring that grows while the source sounds, m.
+RINGS = (0.28, 0.38, 0.48, 0.58, 0.68)
+
+
+def _colour(role: str, alpha: float = 1.0) -> Rgba:
+    return Rgba(*to_rgb(COLOURS[role]), alpha)
+
+
+def upright(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
+    """A body at a height above the floor, turned about the vertical."""
+    return _placed(0.0, 0.0, yaw, [x, y, z])
+
+
+def _placed(
+    roll: float, pitch: float, yaw: float, place: list[float]
+) -> RigidTransform:
+    return RigidTransform(RollPitchYaw(roll, pitch, yaw), _plain(place))
+
+
+def _plain(values: ArrayLike) -> Any:
+    """An array in column order, untyped: Drake's stubs take ndarray amiss."""
+    return np.asfortranarray(values)
+
+
+def _ribbon(
+    meshcat: Meshcat, path: str, points: ArrayLike, rgba: Rgba, z: float, width: float
+) -> None:
+    """A flat band along (n, 2) points, m: lines are a pixel wide in most browsers."""
+    middle = np.asarray(points, dtype=float)
+    along = np.gradient(middle, axis=0)
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    aside = 0.5 * width * np.column_stack([-along[:, 1], along[:, 0]])
+    edges = np.concatenate([middle + aside, middle - aside]).T
+    vertices = np.vstack([edges, np.full(edges.shape[1], z)])
+    n = len(middle)
+    left, right = np.arange(n - 1), n + np.arange(n - 1)
+    faces = np.hstack([[left, right, right + 1], [left, right + 1, left + 1]])
+    triangles = _plain(faces.astype(np.int32))
+    meshcat.SetTriangleMesh(path, _plain(vertices), triangles, rgba)
+
+
+def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
+    """A floor that holds the whole run, a line a metre, and a title."""
+    x_low, x_high, y_low, y_high = floor_rectangle(result)
+    middle = upright((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
+    slab = Box(x_high - x_low, y_high - y_low, 0.02)
+    meshcat.SetObject("floor/slab", slab, Rgba(1.0, 1.0, 0.99))
+    meshcat.SetTransform("floor/slab", middle)
+    along = np.arange(x_low, x_high + 0.5)
+    across = np.arange(y_low, y_high + 0.5)
+    starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
+    ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
+    _segments(meshcat, "floor/grid", starts, ends, Rgba(0.55, 0.55, 0.55))
+    _write(meshcat, "floor/title", title, (x_low + 0.1, y_high - 0.4), 0.28)
+    for x in along[:-1]:
+        _write(
+            meshcat, f"floor/x {x:.0f}", f"{x:.0f} m", (x + 0.05, y_low + 0.06), 0.13
+        )
+
+
+def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
+    """Smallest x, largest x, smallest y, largest y of the floor, whole metres.
+
+    At least the scenario's arena, about the middle of the run.
+    """
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
+    width, depth = result.scenario.arena_m
+    x_more = max(width - (x_high - x_low), 0.0) / 2.0
+    y_more = max(depth - (y_high - y_low), 0.0) / 2.0
+    return (
+        float(math.floor(x_low - x_more)),
+        float(math.ceil(x_high + x_more)),
+        float(math.floor(y_low - y_more)),
+        float(math.ceil(y_high + y_more)),
+    )
+
+
+def _segments(
+    meshcat: Meshcat, path: str, starts: ArrayLike, ends: ArrayLike, rgba: Rgba
+) -> None:
+    def lifted(points: ArrayLike) -> Any:
+        flat = np.asarray(points, dtype=float).T
+        return _plain(np.vstack([flat, np.full(flat.shape[1], 0.004)]))
+
+    meshcat.SetLineSegments(path, lifted(starts), lifted(ends), 1.0, rgba)
+
+
+def _write(
+    meshcat: Meshcat, path: str, text: str, place: tuple[float, float], size: float
+) -> None:
+    """Outlines of letters on the floor: Meshcat has no text."""
+    starts: list[NDArray[np.float64]] = []
+    ends: list[NDArray[np.float64]] = []
+    for polygon in TextPath(place, text, size=size).to_polygons():
+        outline = np.asarray(polygon)
+        starts.extend(outline[:-1])
+        ends.extend(outline[1:])
+    _segments(meshcat, path, starts, ends, Rgba(0.25, 0.25, 0.25))
+
+
+def add_robot(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The robot about the origin of B: body, wheels, microphone bar, cones."""
+    robot = scenario.robot
+    width = BODY_WIDTH_FRACTION * robot.width_m
+    body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
+    meshcat.SetObject("robot/body", body, _colour("robot"))
+    meshcat.SetTransform("robot/body", upright(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02))
+    for side, y in (("left", 0.5), ("right", -0.5)):
+        _add_wheel(meshcat, scenario, side, y * robot.wheel_separation_m)
+    _add_microphones(meshcat, scenario)
+    if scenario.obstacle_sensing == "ultrasonic":
+        for sensor in range(3):
+            _add_cone(meshcat, scenario, sensor)
+
+
+def _add_wheel(meshcat: Meshcat, scenario: Scenario, side: str, y: float) -> None:
+    """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
+    radius, path = scenario.robot.wheel_radius_m, f"robot/{side}"
+    meshcat.SetTransform(path, _placed(-0.5 * math.pi, 0.0, 0.0, [0.0, y, radius]))
+    tyre = Cylinder(radius, WHEEL_WIDTH_M)
+    meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
+    spoke = Box(1.7 * radius, 0.25 * radius, WHEEL_WIDTH_M + 0.004)
+    meshcat.SetObject(f"{path}/wheel/spoke", spoke, Rgba(0.95, 0.95, 0.95))
+
+
+def _add_microphones(meshcat: Meshcat, scenario: Scenario) -> None:
+    robot = scenario.robot
+    bar = Box(0.02, robot.width_m, 0.02)
+    x = robot.control_point_m - 0.01
+    meshcat.SetObject("robot/bar", bar, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform("robot/bar", upright(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
+    mast = Cylinder(0.012, MICROPHONE_HEIGHT_M - ROBOT_HEIGHT_M)
+    middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
+    meshcat.SetObject("robot/mast", mast, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform("robot/mast", upright(x, 0.0, middle))
+    for number, (x_M, y_M) in enumerate(microphones_B(scenario.robot), start=1):
+        path = f"robot/microphone_{number}"
+        meshcat.SetObject(path, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
+        meshcat.SetTransform(path, upright(x_M, y_M, MICROPHONE_HEIGHT_M))
+
+
+def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
+    """Both looks of a cone; the recording shows one at a time.
+
+    A cone without an echo is short: at its full 3 m it would hide the scene.
+    """
+    x, y, axis = sensor_pose(scenario, sensor)
+    path = f"robot/cone_{sensor + 1}"
+    # The cone's axis is z: tilt it forward, then turn it to the sensor's axis.
+    tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
+    meshcat.SetTransform(path, tilted)
+    length = 0.8
+    radius = length * math.tan(math.radians(scenario.ultrasonic.beam_half_angle_deg))
+    for look, role, alpha in (("echo", "echo", 0.55), ("empty", "empty", 0.18)):
+        cone = MeshcatCone(length, 0.35 * radius, radius)
+        meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))
+
+
+def add_source(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The master robot about the origin of S, its loudspeaker and its rings."""
+    length, width = scenario.source_size
+    body = Box(length, width, SOURCE_HEIGHT_M)
+    meshcat.SetObject("source/body", body, _colour("source"))
+    meshcat.SetTransform("source/body", upright(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M))
+    horn = Cylinder(0.07, 0.06)
+    meshcat.SetObject("source/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
+    meshcat.SetTransform(
+        "source/loudspeaker", upright(0.0, 0.0, SOURCE_HEIGHT_M + 0.03)
+    )
+    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    for number, radius in enumerate(RINGS, start=1):
+        circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+        path = f"source/ring_{number}"
+        _ribbon(meshcat, path, circle, _colour("source"), SOURCE_HEIGHT_M, 0.03)
+    meshcat.SetObject("estimate", Sphere(0.06), _colour("estimate"))
+
+
+def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The boxes where they are at the start."""
+    for obstacle in scenario.obstacles:
+        path = f"obstacles/{obstacle.name}"
+        box = Box(*obstacle.size_m, OBSTACLE_HEIGHT_M)
+        meshcat.SetObject(path, box, _colour("obstacle"))
+        x, y, theta = obstacle.path().pose(0.0)
+        meshcat.SetTransform(path, upright(x, y, 0.5 * OBSTACLE_HEIGHT_M, theta))
+
+
+def add_trail(
+    meshcat: Meshcat, path: str, points: NDArray[np.float64], role: str
+) -> None:
+    """One piece of a trail on the floor, through (n, 2) points in W, m."""
+    _ribbon(meshcat, path, points, _colour(role), 0.008, 0.03)
+
+
+def set_stage(meshcat: Meshcat, result: RunResult) -> None:
+    """Even light, a plain background, and the whole run in view."""
+    for path in ("/Grid", "/Axes", "/Lights/SpotLight"):
+        meshcat.SetProperty(path, "visible", value=False)
+    for side in ("Negative", "Positive"):
+        lamp = f"/Lights/PointLight{side}X"
+        meshcat.SetProperty(lamp, "visible", value=False)
+    meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.6)
+    meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
+    for end in ("top_color", "bottom_color"):
+        meshcat.SetProperty("/Background", end, [0.86, 0.89, 0.92])
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.5)
+    middle = np.array([(x_low + x_high) / 2.0, (y_low + y_high) / 2.0 - 0.2, 0.0])
+    extent = max((x_high - x_low) / 1.3, y_high - y_low)
+    camera = middle + extent * np.array([0.0, -0.45, 0.6])
+    meshcat.SetCameraPose(_plain(camera), _plain(middle))

@@ -1,0 +1,228 @@
+"""Pictures of a run: seen from above, and over time."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.runs.scene import COLOURS, bounds, sound_bursts
+from analysis.runs.trajectory_artists import (
+    draw_collision,
+    draw_cones,
+    draw_estimates,
+    draw_obstacles,
+    draw_robot,
+    draw_source,
+    times_apart,
+)
+from diagrams import RunResult
+
+__all__ = ["plot_time_series", "plot_trajectory"]
+
+#: The width at which the pictures are meant to be read, inch.
+WIDTH_IN = 8.0
+#: Room round the map for labels, title and legend, inch.
+LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.4
+
+
+def plot_trajectory(result: RunResult) -> Figure:
+    """The run seen from above, in W, m.
+
+    Drawn at a few instants, with the time beside: the robot's footprint with
+    its microphone bar, the source, moving obstacles and the sensor cones, up
+    to the range read (no cones with ideal sensing). Estimates of the source
+    are drawn where a frame was heard, faint ones early, strong ones late.
+    """
+    figure, axes = _map(result)
+    axes.grid(color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.set_title(_title(result), fontsize=11)
+    times = times_apart(result)
+    draw_cones(axes, result, times)
+    draw_obstacles(axes, result)
+    draw_source(axes, result, times)
+    draw_estimates(axes, result)
+    draw_robot(axes, result, times)
+    draw_collision(axes, result)
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="lower center", ncols=3, fontsize=8.5, frameon=False
+    )
+    return figure
+
+
+def _map(result: RunResult) -> tuple[Figure, Axes]:
+    """Axes to one scale that hold all bodies, with room below for the legend.
+
+    The picture is never taller or flatter than can be read: instead, more of
+    the floor is shown.
+    """
+    x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
+    width = WIDTH_IN - LEFT_IN - RIGHT_IN
+    tallest, flattest = 1.3 * width, 0.4 * width
+    more = max((y_high - y_low) * width / tallest - (x_high - x_low), 0.0) / 2.0
+    x_low, x_high = x_low - more, x_high + more
+    more = max((x_high - x_low) * flattest / width - (y_high - y_low), 0.0) / 2.0
+    y_low, y_high = y_low - more, y_high + more
+    height = width * (y_high - y_low) / (x_high - x_low)
+    total = BELOW_IN + height + ABOVE_IN
+    figure = Figure(figsize=(WIDTH_IN, total))
+    axes = figure.add_axes(
+        (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
+    )
+    axes.set_aspect("equal")
+    axes.set_xlim(x_low, x_high)
+    axes.set_ylim(y_low, y_high)
+    axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
+    axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
+    axes.set_xlabel("x in W (m)")
+    axes.set_ylabel("y in W (m)")
+    return figure, axes
+
+
+def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> Figure:
+    """What was heard, felt and done over time; bursts of the source are shaded.
+
+    Args:
+        result: The run.
+        clearance: (n,) distance from the robot to the nearest body at each
+            tick, m (``analysis.runs.proximity``); none leaves its panel out.
+
+    Raises:
+        ValueError: ``clearance`` has not one value a tick.
+    """
+    panels = [_range, _bearing, _forces, _speeds, _turning]
+    distance = None if clearance is None else np.asarray(clearance, dtype=float)
+    if distance is not None and distance.shape != result.time.shape:
+        raise ValueError(
+            f"clearance: {distance.shape} values for {result.time.shape} ticks; "
+            "give the clearance of the same run (analysis.runs.proximity)"
+        )
+    rows = len(panels) + (distance is not None)
+    figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")
+    all_axes = np.atleast_1d(figure.subplots(rows, sharex=True))
+    for axes, panel in zip(all_axes, panels, strict=False):
+        panel(axes, result)
+    if distance is not None:
+        _clearance(all_axes[-1], result, distance)
+    bursts = sound_bursts(result.scenario, result.simulated_s)
+    for axes in all_axes:
+        for start, end in bursts:
+            axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
+        axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
+        axes.set_axisbelow(True)
+        axes.legend(
+            loc="upper left",
+            bbox_to_anchor=(1.005, 1.03),
+            fontsize=8,
+            frameon=False,
+            handlelength=1.5,
+        )
+    all_axes[-1].set_xlabel("time (s), shaded while the source sounds")
+    all_axes[-1].set_xlim(0.0, max(result.simulated_s, 1e-3))
+    figure.suptitle(_title(result), fontsize=11)
+    figure.align_ylabels(list(all_axes))
+    return figure
+
+
+def _title(result: RunResult) -> str:
+    scenario, hit = result.scenario, result.collision
+    by = f" with {hit.object} ({hit.fault}'s fault)" if hit else ""
+    return (
+        f"{scenario.name}, law {scenario.law}: {result.cause}{by} "
+        f"after {result.simulated_s:.1f} s"
+    )
+
+
+def _heard(axes: Axes, result: RunResult, values: NDArray[np.float64]) -> None:
+    axes.plot(
+        result.time,
+        values,
+        ".",
+        color=COLOURS["estimate"],
+        markersize=4,
+        label="estimated",
+        zorder=3,
+    )
+
+
+def _range(axes: Axes, result: RunResult) -> None:
+    columns = result.columns
+    follow = result.scenario.attraction.follow_distance_m
+    colour = COLOURS["source"]
+    axes.plot(result.time, columns["source_range_true"], color=colour, label="true")
+    _heard(axes, result, columns["source_range"])
+    axes.axhline(follow, color="black", ls="--", lw=1.0, label="follow distance")
+    axes.set_ylabel("range of\nsource (m)")
+    # A wild estimate must not squeeze the rest into a line.
+    axes.set_ylim(0.0, 1.3 * max(follow, float(np.max(columns["source_range_true"]))))
+
+
+def _bearing(axes: Axes, result: RunResult) -> None:
+    true, heard = (
+        np.degrees(result.columns[name])
+        for name in ("source_bearing_true", "source_bearing")
+    )
+    axes.plot(
+        result.time, _cut_at_wraps(true, 360.0), color=COLOURS["source"], label="true"
+    )
+    _heard(axes, result, heard)
+    axes.set_ylabel("bearing of\nsource (deg)")
+
+
+def _forces(axes: Axes, result: RunResult) -> None:
+    for name in ("attraction", "repulsion"):
+        size = np.hypot(result.columns[f"{name}_x"], result.columns[f"{name}_y"])
+        axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
+    axes.set_ylabel("force on P\n(N)")
+    axes.set_ylim(bottom=0.0)
+
+
+def _speeds(axes: Axes, result: RunResult) -> None:
+    columns, robot = result.columns, result.scenario.robot
+    theta = columns["theta_WB"]
+    forward = columns["v_WB_x"] * np.cos(theta) + columns["v_WB_y"] * np.sin(theta)
+    for side in ("left", "right"):
+        rim = columns[f"wheel_speed_{side}"] * robot.wheel_radius_m
+        axes.plot(
+            result.time,
+            rim,
+            color=COLOURS[side],
+            lw=1.0,
+            label=f"{side} wheel, command",
+        )
+    axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
+    axes.set_ylabel("speed (m/s)")
+
+
+def _turning(axes: Axes, result: RunResult) -> None:
+    rate = np.degrees(result.columns["omega_WB"])
+    axes.plot(result.time, rate, color=COLOURS["robot"], label="robot, to the left")
+    axes.axhline(0.0, color="black", lw=0.6)
+    axes.set_ylabel("turn rate\n(deg/s)")
+
+
+def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) -> None:
+    axes.plot(
+        result.time, clearance, color=COLOURS["obstacle"], label="to nearest body"
+    )
+    least = int(np.argmin(clearance))
+    axes.plot(
+        result.time[least],
+        clearance[least],
+        "v",
+        color="black",
+        label=f"least: {clearance[least]:.2f} m",
+    )
+    axes.set_ylabel("clearance\n(m)")
+    axes.set_ylim(bottom=min(0.0, 1.1 * float(clearance[least])))
+
+
+def _cut_at_wraps(values: NDArray[np.float64], turn: float) -> NDArray[np.float64]:
+    """The same values, NaN after which a line would cross the whole panel."""
+    cut = values.copy()
+    cut[1:][np.abs(np.diff(values)) > 0.5 * turn] = np.nan
+    return cut

@@ -1,0 +1,250 @@
+"""What the picture of a run from above is made of."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
+from matplotlib.patches import Polygon, Wedge
+from matplotlib.patheffects import withStroke
+from numpy.typing import NDArray
+
+from analysis.runs.scene import (
+    COLOURS,
+    compose,
+    contact_point,
+    moving_and_static,
+    picture_times,
+    sensor_pose,
+    tick_at,
+)
+from diagrams import RunResult
+from diagrams.scenario import robot_rectangle
+from systems.geometry import rectangle_corners, rotate
+from systems.mic_array import microphones_B
+
+__all__ = [
+    "draw_collision",
+    "draw_cones",
+    "draw_estimates",
+    "draw_obstacles",
+    "draw_robot",
+    "draw_source",
+    "times_apart",
+]
+
+#: A body is drawn again when it has moved so far, m.
+APART_M = 0.25
+#: Instants at which the cones are drawn.
+CONE_INSTANTS = 4
+
+
+def times_apart(result: RunResult) -> list[float]:
+    """Instants at which the robot is clear of its last footprint, s.
+
+    The end of the run is always one of them.
+    """
+    path, end = result.poses("WB"), result.simulated_s
+    kept: list[float] = []
+    for time in picture_times(result):
+        if not kept or _apart(result, path, kept[-1], time):
+            kept.append(float(time))
+    if len(kept) > 1 and not _apart(result, path, kept[-1], end):
+        kept.pop()
+    return [*kept, end] if end > kept[-1] else kept
+
+
+def _apart(
+    result: RunResult, path: NDArray[np.float64], first: float, second: float
+) -> bool:
+    step = path[tick_at(result, second)] - path[tick_at(result, first)]
+    return bool(np.linalg.norm(step[:2]) >= APART_M)
+
+
+def _seconds(time: float) -> str:
+    return f"{round(time, 1):g} s"
+
+
+def draw_robot(axes: Axes, result: RunResult, times: list[float]) -> None:
+    """The path of P, and footprints with their microphones at some times, s."""
+    colour, scenario = COLOURS["robot"], result.scenario
+    axes.plot(
+        result.columns["p_WP_x"],
+        result.columns["p_WP_y"],
+        color=colour,
+        linewidth=1.8,
+        label="path of the control point P",
+        zorder=4,
+    )
+    microphones = microphones_B(scenario.robot)
+    for index, time in enumerate(times):
+        pose = result.poses("WB")[tick_at(result, time)]
+        corners = rectangle_corners(robot_rectangle(pose, scenario.robot))
+        label = "robot with its microphones" if index == 0 else None
+        patch = Polygon(
+            corners,
+            facecolor=(*to_rgb(colour), 0.10),
+            edgecolor=colour,
+            linewidth=1.0,
+            label=label,
+            zorder=3,
+        )
+        patch.set_gid(f"robot at {time:g}")
+        axes.add_patch(patch)
+        bar = np.array([compose(pose, (x, y, 0.0))[:2] for x, y in microphones])
+        axes.plot(*bar.T, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
+        _write_time(axes, pose, -0.42, time, colour)
+
+
+def _write_time(
+    axes: Axes, pose: NDArray[np.float64], aside: float, time: float, colour: str
+) -> None:
+    """The time beside a body, on its right; aside is the distance along y, m."""
+    dx, dy = rotate(pose[2], 0.0, aside)
+    unit_x, unit_y = dx / abs(aside), dy / abs(aside)
+    axes.annotate(
+        _seconds(time),
+        (pose[0] + dx, pose[1] + dy),
+        xytext=(9.0 * unit_x, 7.0 * unit_y),
+        textcoords="offset points",
+        color=colour,
+        fontsize=8,
+        ha="center",
+        va="center",
+        annotation_clip=True,
+        path_effects=[withStroke(linewidth=2.0, foreground="white")],
+        zorder=7,
+    )
+
+
+def draw_source(axes: Axes, result: RunResult, times: list[float]) -> None:
+    """The path of the source, its body at both ends, dots at some times, s."""
+    colour, path = COLOURS["source"], result.poses("WS")
+    axes.plot(
+        path[:, 0], path[:, 1], "--", color=colour, label="path of the source", zorder=3
+    )
+    ends = (0, len(path) - 1) if np.ptp(path[:, :2], axis=0).any() else (0,)
+    size = result.scenario.source_size
+    for index in ends:
+        patch = Polygon(
+            rectangle_corners(np.array([*path[index], *size])),
+            facecolor=(*to_rgb(colour), 0.25 if index == 0 else 0.6),
+            edgecolor=colour,
+            label="source, first and last" if index == 0 else None,
+            zorder=2.5,
+        )
+        patch.set_gid("source")
+        axes.add_patch(patch)
+    last = -math.inf
+    for time in times:
+        if math.isfinite(last) and not _apart(result, path, last, time):
+            continue
+        last = time
+        pose = path[tick_at(result, time)]
+        axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
+        _write_time(axes, pose, -0.5 * size[1], time, colour)
+
+
+def draw_estimates(axes: Axes, result: RunResult) -> None:
+    """A cross a heard frame, where the robot then took the source to be."""
+    columns = result.columns
+    heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
+    if not heard.any():
+        return
+    colour = COLOURS["estimate"]
+    part = result.time[heard] / max(result.simulated_s, 1e-9)
+    colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
+    axes.scatter(
+        columns["p_WS_estimated_x"][heard],
+        columns["p_WS_estimated_y"][heard],
+        c=colours,
+        marker="x",
+        s=16,
+        linewidths=0.9,
+        zorder=6,
+    )
+    # A legend's sample would else be as faint as the first estimate.
+    axes.scatter([], [], color=colour, marker="x", s=16, label=_ESTIMATES)
+
+
+def draw_obstacles(axes: Axes, result: RunResult) -> None:
+    """Resting boxes filled; moving ones in outline, with the time beside."""
+    colour = COLOURS["obstacle"]
+    moving, static = moving_and_static(result.scenario)
+    for index, obstacle in enumerate(static):
+        pose = np.array([*obstacle.path().pose(0.0), *obstacle.size_m])
+        label = "obstacle at rest" if index == 0 else None
+        patch = Polygon(rectangle_corners(pose), color=colour, label=label, zorder=3.5)
+        patch.set_gid(f"obstacle {obstacle.name}")
+        axes.add_patch(patch)
+    for index, obstacle in enumerate(moving):
+        path, last = obstacle.path(), None
+        for time in picture_times(result):
+            pose = np.array(path.pose(time))
+            if last is not None and np.linalg.norm(pose - last) < 0.5 * APART_M:
+                continue
+            last = pose
+            patch = Polygon(
+                rectangle_corners(np.array([*pose, *obstacle.size_m])),
+                fill=False,
+                edgecolor=colour,
+                linestyle="-",
+                linewidth=1.1,
+                label="moving obstacle" if index == 0 and time == 0.0 else None,
+                zorder=3.5,
+            )
+            patch.set_gid(f"obstacle {obstacle.name} at {time:g}")
+            axes.add_patch(patch)
+            _write_time(axes, pose, -0.5 * obstacle.size_m[1], time, colour)
+
+
+def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
+    """The sensor cones at a few of the times, s, up to the range that they read."""
+    if "range_1" not in result.columns:
+        return
+    step = max(1, math.ceil(len(times) / CONE_INSTANTS))
+    half = result.scenario.ultrasonic.beam_half_angle_deg
+    labelled: set[bool] = set()
+    for time in times[::step]:
+        tick = tick_at(result, time)
+        for sensor in range(3):
+            echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
+            pose = result.poses("WB")[tick]
+            x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
+            axis = math.degrees(theta)
+            wedge = Wedge(
+                (x, y),
+                result.columns[f"range_{sensor + 1}"][tick],
+                axis - half,
+                axis + half,
+                facecolor=(
+                    *to_rgb(COLOURS["echo" if echo else "empty"]),
+                    0.35 if echo else 0.07,
+                ),
+                edgecolor=(*to_rgb(COLOURS["echo" if echo else "empty"]), 0.5),
+                linewidth=0.5,
+                label=None if echo in labelled else _CONE_LABELS[echo],
+                zorder=1.5,
+            )
+            labelled.add(echo)
+            axes.add_patch(wedge)
+
+
+_ESTIMATES = "estimates of the source, faint: early"
+_CONE_LABELS = {True: "ultrasonic cone with an echo", False: "cone without an echo"}
+
+
+def draw_collision(axes: Axes, result: RunResult) -> None:
+    """A star where the robot touched something."""
+    if result.collision is None:
+        return
+    axes.plot(
+        *contact_point(result),
+        "*",
+        color="black",
+        markersize=15,
+        label=f"collision with {result.collision.object}",
+        zorder=8,
+    )

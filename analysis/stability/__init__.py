@@ -1,0 +1,1 @@
+"""Stability of the loop: models, margins, maps, certificates, the report."""

@@ -1,0 +1,197 @@
+"""Pictures of sampling and latency: charts, root loci, contact limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import TwoSlopeNorm
+from matplotlib.figure import Figure
+
+from analysis.runs.scene import COLOURS
+from analysis.stability.burst_gaps import GapChart
+from analysis.stability.contact_mode import ContactLimits
+from analysis.stability.delayed_run import DelayCheck
+from analysis.stability.root_locus import RootLocus
+from analysis.stability.sampled_stability import PolesAgainstPeriod, StabilityChart
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "plot_chart",
+    "plot_contact_limits",
+    "plot_delay_check",
+    "plot_gap_chart",
+    "plot_poles_against_period",
+    "plot_root_loci",
+]
+
+_LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+#: Exponents beyond these look alike in a chart, 1/s.
+_SLOWEST, _FASTEST = -0.5, 0.5
+
+
+def plot_chart(chart: StabilityChart) -> Figure:
+    """Exponent of the slowest mode over two parameters, today's design marked."""
+    figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+    axes = figure.subplots()
+    shown = np.clip(chart.growth_per_s, _SLOWEST, _FASTEST)
+    mesh = axes.pcolormesh(
+        chart.x,
+        chart.y,
+        shown,
+        cmap="RdBu_r",
+        norm=TwoSlopeNorm(0.0, _SLOWEST, _FASTEST),
+        shading="nearest",
+        rasterized=True,
+    )
+    if chart.growth_per_s.min() < 0.0 < chart.growth_per_s.max():
+        axes.contour(chart.x, chart.y, chart.growth_per_s, levels=[0.0], colors="black")
+    axes.plot(
+        *chart.today, "*", markersize=14, color="#F0E442", markeredgecolor="black"
+    )
+    axes.annotate("today", chart.today, textcoords="offset points", xytext=(9, 6))
+    if chart.x.min() > 0.0:
+        axes.set_xscale("log")
+    axes.set_yscale("log")
+    axes.set_xlabel(chart.x_name)
+    axes.set_ylabel(chart.y_name)
+    axes.set_title(chart.title, fontsize=10)
+    figure.colorbar(mesh, ax=axes, label="growth (1/s); blue decays")
+    return figure
+
+
+def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
+    """Poles in the z plane, and the slowest mode's exponent, over the period."""
+    figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+    left, right = figure.subplots(1, 2)
+    angle = np.linspace(0.0, 2.0 * np.pi, 300)
+    left.plot(np.cos(angle), np.sin(angle), color=COLOURS["empty"], linewidth=0.8)
+    colours = np.repeat(
+        np.log10(found.periods_s)[:, None], found.poles.shape[1], axis=1
+    )
+    dots = left.scatter(
+        found.poles.real, found.poles.imag, c=10.0**colours, s=6, norm="log"
+    )
+    left.set_aspect("equal")
+    left.set_xlim(-1.6, 1.3)
+    left.set_ylim(-1.45, 1.45)
+    left.set_xlabel("Re z")
+    left.set_ylabel("Im z")
+    figure.colorbar(dots, ax=left, label="sample period (s)")
+    right.semilogx(found.periods_s, found.growth_per_s, color=_LINES[0])
+    right.axhline(0.0, color="black", linewidth=0.8)
+    right.axvline(found.today_s, color=COLOURS["source"], linestyle="--", label="today")
+    right.set_ylim(-0.35, 0.5)
+    right.set_xlabel("sample period (s)")
+    right.set_ylabel("growth (1/s)")
+    right.legend(fontsize=8)
+    return figure
+
+
+def plot_gap_chart(chart: GapChart) -> Figure:
+    """Largest multiplier of a cycle over the silence, for each hold."""
+    figure = Figure(figsize=(6.8, 4.2), layout="constrained")
+    axes = figure.subplots()
+    styles = {"world": "-", "robot": "-", "motion": "--"}
+    for hold, row, colour in zip(chart.holds, chart.multiplier, _LINES, strict=False):
+        axes.semilogy(
+            chart.gaps_s, row, styles[hold], color=colour, label=f"hold: {hold}"
+        )
+    axes.axhline(1.0, color="black", linewidth=0.8)
+    axes.axvline(chart.today[0], color=COLOURS["empty"], linestyle=":")
+    if chart.today[1] in chart.holds:
+        row = chart.multiplier[chart.holds.index(chart.today[1])]
+        at = float(np.interp(chart.today[0], chart.gaps_s, row))
+        axes.plot(chart.today[0], at, "*", markersize=14, color="#F0E442",
+                  markeredgecolor="black", label="today")  # fmt: skip
+    axes.set_xlabel(f"silence after {chart.on_s:g} s of sound (s)")
+    axes.set_ylabel("largest multiplier of a cycle")
+    axes.grid(visible=True, which="both", linewidth=0.3)
+    axes.legend(fontsize=8)
+    return figure
+
+
+def plot_contact_limits(limits: ContactLimits) -> Figure:
+    """Largest K_0 and k_ref over the motors' lag, for each latency."""
+    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    panels = (
+        ("K_0 (N/m)", limits.stiffness_n_m, limits.stiffness_today_n_m),
+        (
+            "k_ref (N/m)",
+            limits.reference_stiffness_n_m,
+            limits.reference_stiffness_today_n_m,
+        ),
+    )
+    for axes, (name, values, today) in zip(figure.subplots(1, 2), panels, strict=True):
+        for k, ticks in enumerate(limits.latency_ticks):
+            axes.loglog(
+                limits.motor_lags_s,
+                np.maximum(values[:, k], 1e-2),
+                "o-",
+                markersize=3,
+                color=_LINES[k % len(_LINES)],
+                label=f"{ticks * FRAME_PERIOD_S * 1e3:.0f} ms",
+            )
+        axes.plot(
+            limits.today[0], today, "*", markersize=14, color="#F0E442",
+            markeredgecolor="black",
+        )  # fmt: skip
+        axes.annotate(
+            "today", (limits.today[0], today), textcoords="offset points", xytext=(8, 4)
+        )
+        axes.set_xlabel("motor lag (s)")
+        axes.set_ylabel(f"largest stable {name}")
+        axes.grid(visible=True, which="both", linewidth=0.3)
+        axes.legend(title="latency of echoes", fontsize=8, title_fontsize=8)
+    return figure
+
+
+def plot_root_loci(loci: Sequence[RootLocus]) -> Figure:
+    """Poles in the s plane, from a twentieth to twenty times today's gain."""
+    columns = min(2, len(loci))
+    rows = math.ceil(len(loci) / columns)
+    figure = Figure(figsize=(4.8 * columns, 3.8 * rows), layout="constrained")
+    cells = np.atleast_1d(figure.subplots(rows, columns)).ravel()
+    for axes, locus in zip(cells, loci, strict=False):
+        _root_locus(figure, axes, locus)
+    for axes in cells[len(loci) :]:
+        axes.set_axis_off()
+    return figure
+
+
+def _root_locus(figure: Figure, axes: Axes, locus: RootLocus) -> None:
+    poles = locus.poles
+    values = np.repeat(locus.values[:, None], poles.shape[1], axis=1)
+    dots = axes.scatter(poles.real, poles.imag, c=values, s=7, norm="log")
+    axes.plot(
+        locus.poles_today.real, locus.poles_today.imag, "*", markersize=11,
+        color="#F0E442", markeredgecolor="black", label=f"today: {locus.today:g}",
+    )  # fmt: skip
+    slow = np.abs(locus.poles_today)[np.isfinite(locus.poles_today)]
+    reach = 4.0 * max(float(slow[slow < 10.0].max(initial=0.5)), 0.5)
+    axes.axvline(0.0, color="black", linewidth=0.8)
+    axes.set_xlim(-reach, 0.5 * reach)
+    axes.set_ylim(-reach, reach)
+    axes.set_xlabel("Re s (1/s)")
+    axes.set_ylabel("Im s (rad/s)")
+    axes.set_title(f"{locus.parameter}\n({locus.loop})", fontsize=9)
+    axes.legend(fontsize=8, loc="upper left")
+    figure.colorbar(dots, ax=axes)
+
+
+def plot_delay_check(check: DelayCheck) -> Figure:
+    """Simulated offsets with 0.95 and 1.05 of the delay margin."""
+    figure = Figure(figsize=(9.0, 3.6), layout="constrained")
+    runs = (("0.95", check.below), ("1.05", check.above))
+    for axes, (share, run) in zip(figure.subplots(1, 2), runs, strict=True):
+        axes.plot(run.time_s, 1e6 * run.offset_m, color=_LINES[0], linewidth=0.7)
+        axes.set_title(
+            f"{share} of {check.margin.delay_s * 1e3:.1f} ms at the "
+            f"{check.margin.at}: growth {run.growth_per_s:+.4f} 1/s",
+            fontsize=9,
+        )
+        axes.set_xlabel("time (s)")
+        axes.set_ylabel("offset of P (um)")
+    return figure

@@ -1,0 +1,308 @@
+"""Parts of the stability report: operating points and linear models."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from analysis.runs.html_page import (
+    ZERO,
+    Cell,
+    figure_html,
+    note,
+    number,
+    paragraph,
+    table,
+)
+from analysis.stability.equilibria import EquilibriumSearch, find_equilibria
+from analysis.stability.linear_models import LinearModel, Mode
+from analysis.stability.linearisation import (
+    GradientCheck,
+    RouteComparison,
+    check_gradient,
+    compare_routes,
+    continuous_model,
+    sampled_model,
+)
+from analysis.stability.operating_point_plots import plot_equilibria
+from analysis.stability.operating_points import OperatingPoint, moving_equilibrium
+from analysis.stability.stability import Part, Study
+
+__all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
+
+#: Elements of a matrix below this are printed as a dot.
+_ZERO = 1e-12
+#: Matrices of more columns are printed in small type.
+_WIDE = 8
+#: Slower modes than this are neutral, 1/s.
+_NEUTRAL_1_S = 1e-6
+#: Modes that are printed.
+_MODES = 12
+
+
+@dataclass(frozen=True)
+class OperatingPoints:
+    """Where the loop can be, and where it is linearised."""
+
+    search: EquilibriumSearch
+    at: OperatingPoint
+    """The stable equilibrium nearest to the follow distance."""
+    moving: OperatingPoint | None
+    """Following a source that moves on; none: there is no such state."""
+    no_moving: str
+    """Why there is none."""
+
+
+@dataclass(frozen=True)
+class LinearModels:
+    """The loop about the operating point."""
+
+    at: OperatingPoint
+    continuous: LinearModel
+    sampled: LinearModel
+    routes: RouteComparison
+    gradient: GradientCheck
+
+
+def linear_parts() -> tuple[Part, ...]:
+    """Operating points first: the report needs one to stand on."""
+    return (
+        Part(
+            "equilibria",
+            "Operating points",
+            _operating_points,
+            _render_points,
+            document=_points_document,
+        ),
+        Part(
+            "linear_models",
+            "Linear models",
+            _linear_models,
+            _render_models,
+            fresh=True,
+            document=_models_document,
+            models=lambda data: (data.continuous, data.sampled, data.at.motion),
+        ),
+    )
+
+
+def _operating_points(study: Study) -> OperatingPoints:
+    search = find_equilibria(study.scenario)
+    sinks = [point for point in search.points if point.stable]
+    if not sinks:
+        kinds = ", ".join(point.kind for point in search.points) or "none at all"
+        raise ValueError(
+            f"attraction: the loop has no stable equilibrium (found: {kinds}), so that "
+            "there is nothing to linearise about; raise attraction.damping_n_s_m or "
+            "lower the law's stiffness"
+        )
+    at = min(sinks, key=lambda point: abs(point.offset_m))
+    try:
+        return OperatingPoints(search, at, moving_equilibrium(study.scenario), "")
+    except ValueError as error:
+        return OperatingPoints(search, at, None, str(error))
+
+
+def point_document(point: OperatingPoint) -> dict[str, Any]:
+    """An entry of ``equilibria``."""
+    return {
+        "position_W": point.p_WP,
+        "heading_rad": point.theta_WB,
+        "kind": point.kind,
+        "stable": point.stable,
+        "continuum": point.continuum,
+        "source_distance_m": point.source_distance_m,
+        "offset_m": point.offset_m,
+        "clearance_m": point.clearance_m,
+        "nearest_body": point.nearest_body,
+        "force_n": point.force_n,
+        "stiffness_n_m": point.stiffness_n_m,
+        "velocity_W": point.v_WS,
+        "eigenvalues": point.eigenvalues,
+    }
+
+
+def _points_document(data: OperatingPoints) -> dict[str, Any]:
+    search = data.search
+    return {
+        "equilibria": [point_document(point) for point in search.points],
+        "equilibrium_search": {
+            "statement": search.statement,
+            "complete": search.complete,
+            "area_m": search.area_m,
+            "smallest_cell_m": search.cell_m,
+            "cells": search.cells,
+            "unresolved": search.unresolved,
+            "switching": [vars(point) for point in search.switching],
+        },
+        "operating_point": point_document(data.at),
+        "moving_equilibrium": point_document(data.moving)
+        if data.moving
+        else {"problem": data.no_moving},
+    }
+
+
+def _render_points(data: OperatingPoints, name: str) -> list[str]:
+    rows: list[list[Cell]] = [_point_row(point) for point in data.search.points]
+    headings = [
+        "x (m)", "y (m)", "kind", "from the source (m)", "offset (m)",
+        "nearest body", "clearance (m)", "slowest poles (1/s)",
+    ]  # fmt: skip
+    moving = (
+        table(headings, [_point_row(data.moving)], caption="Following a moving source")
+        if data.moving
+        else note(f"No moving equilibrium: {data.no_moving}.")
+    )
+    return [
+        paragraph(data.search.statement),
+        paragraph(
+            "The heading at rest is free; its neutral poles are left out. Offset: how "
+            "much farther from the source than the follow distance. The report is "
+            f"about the sink at ({data.at.p_WP[0]:.3f}, {data.at.p_WP[1]:.3f}) m."
+        ),
+        table(headings, rows, caption="Equilibria at rest"),
+        moving,
+        figure_html(
+            plot_equilibria(data.search),
+            name,
+            "Equilibria of P over the floor, and the force on it.",
+        ),
+    ]
+
+
+def _point_row(point: OperatingPoint) -> list[Cell]:
+    poles = sorted(point.eigenvalues, key=lambda pole: -pole.real)
+    upper = [complex(pole) for pole in poles if pole.imag >= 0.0][:2]
+    return [
+        *(round(float(value), 6) for value in point.p_WP),
+        point.kind + (" (continuum)" if point.continuum else ""),
+        point.source_distance_m,
+        point.offset_m,
+        point.nearest_body,
+        point.clearance_m,
+        "; ".join(number(pole, 3) for pole in upper),
+    ]
+
+
+def _linear_models(study: Study) -> LinearModels:
+    points: OperatingPoints = study.need("equilibria")
+    at = points.at
+    return LinearModels(
+        at,
+        continuous_model(at),
+        sampled_model(at),
+        compare_routes(at),
+        check_gradient(at),
+    )
+
+
+def _models_document(data: LinearModels) -> dict[str, Any]:
+    return {
+        "linear_models": {
+            "continuous": _model_document(data.continuous),
+            "sampled": _model_document(data.sampled),
+            "routes": data.routes,
+            "gradient": data.gradient,
+        }
+    }
+
+
+def _model_document(model: LinearModel) -> dict[str, Any]:
+    return {
+        "A": model.A,
+        "B": model.B,
+        "C": model.C,
+        "D": model.D,
+        "period_s": model.period_s,
+        "state_names": model.state_names,
+        "input_names": model.input_names,
+        "output_names": model.output_names,
+        "poles": model.poles,
+    }
+
+
+def _render_models(data: LinearModels, name: str) -> list[str]:
+    routes, check = data.routes, data.gradient
+    continuous = data.continuous
+    checks: list[list[Cell]] = [
+        [
+            "two routes: AutoDiff of a whole period, blocks joined by `control`",
+            f"{routes.states} states",
+            routes.matrix_difference,
+        ],
+        ["poles of the two routes", "simple, nonzero", routes.pole_difference],
+        [
+            "AutoDiff against central differences",
+            ", ".join(f"`{x}`" for x in check.largest_at),
+            check.largest_difference,
+        ],
+        [
+            "corner: left against right difference",
+            ", ".join(f"`{x}`" for x in check.kink_at),
+            check.kink,
+        ],
+    ]
+    return [
+        paragraph(
+            "Deviations from the operating point, SI units. Continuous: without "
+            "sampling and without the tick of latency. Sampled: one period of 25 ms "
+            f"of the built diagram, {routes.states} states; its matrices are in the "
+            "exported files."
+        ),
+        table(["check", "of", "largest difference"], checks),
+        *(
+            matrix_table(continuous, matrix)
+            for matrix in ("A", "B", "C", "D")
+            if getattr(continuous, matrix).any()
+        ),
+        _mode_table(continuous.modes, "Modes, continuous"),
+        _mode_table(data.sampled.modes, "Modes of the built diagram, as ln(z)/T"),
+    ]
+
+
+def matrix_table(model: LinearModel, matrix: str) -> str:
+    """A matrix with the names of its rows and columns; a dot is a zero."""
+    x, u, y = model.state_names, model.input_names, model.output_names
+    rows, columns = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}[matrix]
+    body: list[list[Cell]] = [
+        [row, *(_element(value) for value in values)]
+        for row, values in zip(rows, getattr(model, matrix), strict=True)
+    ]
+    return table([matrix, *columns], body, dense=len(columns) > _WIDE)
+
+
+def _element(value: float) -> Cell:
+    return ZERO if abs(value) < _ZERO else float(np.round(value, 12))
+
+
+def _mode_table(modes: Sequence[Mode], caption: str) -> str:
+    moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
+    rows: list[list[Cell]] = [
+        [
+            mode.eigenvalue,
+            mode.z,
+            mode.damping_ratio,
+            mode.frequency_rad_s,
+            mode.time_constant_s,
+            mode.settling_s,
+            ", ".join(f"{k} {100.0 * v:.0f} %" for k, v in top(mode.participation)),
+        ]
+        for mode in moving[:_MODES]
+    ]
+    faster = len(moving) - len(rows)
+    left = f"; left out: {len(modes) - len(moving)} neutral"
+    left += f" and {faster} faster ones" if faster else ""
+    return table(
+        ["pole (1/s)", "z", "damping ratio", "rad/s", "time constant (s)",
+         "to 2 % (s)", "participation"],
+        rows,
+        caption=caption + left,
+    )  # fmt: skip
+
+
+def top(shares: dict[str, float], count: int = 3) -> list[tuple[str, float]]:
+    """The largest shares."""
+    return sorted(shares.items(), key=lambda item: -item[1])[:count]

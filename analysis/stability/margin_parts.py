@@ -1,0 +1,218 @@
+"""Parts of the stability report: margins of the loops."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.runs.html_page import Cell, figure_html, paragraph, table
+from analysis.stability.gang_of_four import GangOfFour, gang_of_four
+from analysis.stability.linear_models import LinearModel
+from analysis.stability.loop_margins import (
+    DiskMargin,
+    LoopMargins,
+    PointMargins,
+    all_margins,
+    loop_margins,
+)
+from analysis.stability.margin_plots import (
+    plot_bode,
+    plot_gang_of_four,
+    plot_nichols,
+    plot_nyquist,
+)
+from analysis.stability.open_loops import BREAK_POINTS, target_loop
+from analysis.stability.operating_points import OperatingPoint
+from analysis.stability.stability import Part, Study
+
+__all__ = ["Margins", "least_damped", "margin_parts"]
+
+#: What decides what a margin says, for readers.
+_EXPLANATION = (
+    "Each loop is cut at one place, the others stay closed: at the sensor (what "
+    "hearing says of the source), at the actuator (the law's acceleration) and at the "
+    "commanded wheel speeds, along the line to the source and across it. A disk margin "
+    "counts gain and phase changes at once; its gain and phase margin stand beside it."
+)
+#: Faster modes are those of motors and filters, rad/s.
+_SLOW_RAD_S = 12.0
+#: The loop whose margins stand for the implemented one.
+_MAIN = ("sensor", "along")
+
+
+@dataclass(frozen=True)
+class Margins:
+    """Of the ideal target loop and of the implemented one."""
+
+    target: dict[str, LoopMargins]
+    """By break point."""
+    target_model: LinearModel
+    """Cut at the sensor."""
+    implemented: tuple[PointMargins, ...]
+    gang: GangOfFour
+    """Along the line to the source."""
+    at: OperatingPoint
+
+    def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
+        """One of the implemented loop's margins; none: there is no such loop."""
+        for found in self.implemented:
+            if (found.at, found.direction) == (at, direction):
+                return found.margins
+        return None
+
+    @property
+    def target_poles(self) -> NDArray[np.complex128]:
+        """Of the closed ideal target loop, 1/s."""
+        model = self.target_model
+        return np.linalg.eigvals(model.A - model.B @ model.C).astype(complex)
+
+
+def least_damped(poles: NDArray[np.complex128]) -> complex:
+    """The oscillation that decays slowest for its frequency; else the slowest pole.
+
+    Args:
+        poles: s plane, 1/s.
+    """
+    slow = poles[np.abs(poles) < _SLOW_RAD_S]
+    swinging = slow[np.abs(slow.imag) > 1e-6]
+    if len(swinging) == 0:
+        return complex(poles[np.argmax(poles.real)])
+    pole = complex(swinging[np.argmin(-swinging.real / np.abs(swinging))])
+    return pole if pole.imag > 0.0 else pole.conjugate()
+
+
+def margin_parts() -> tuple[Part, ...]:
+    """Margins of the ideal target loop and of the implemented loop."""
+    return (
+        Part(
+            "margins",
+            "Margins",
+            _margins,
+            _render,
+            fresh=True,
+            document=_document,
+            models=lambda data: (data.target_model,),
+        ),
+    )
+
+
+def _margins(study: Study) -> Margins:
+    at: OperatingPoint = study.need("equilibria").at
+    models = {
+        place: target_loop(study.scenario, place)
+        for place in BREAK_POINTS
+        if place != "wheels"
+    }
+    return Margins(
+        {place: loop_margins(model) for place, model in models.items()},
+        models["sensor"],
+        all_margins(at),
+        gang_of_four(at),
+        at,
+    )
+
+
+def _document(data: Margins) -> dict[str, Any]:
+    sensor = data.implemented_at(*_MAIN) or data.implemented[0].margins
+    return {
+        "target_loop": {
+            **_loop_document(data.target_poles, data.target["sensor"]),
+            "margins": {at: _margin_document(m) for at, m in data.target.items()},
+        },
+        "implemented_loop": {
+            **_loop_document(data.at.eigenvalues, sensor),
+            "margins": {
+                f"{found.at}_{found.direction}": _margin_document(found.margins)
+                for found in data.implemented
+            },
+        },
+    }
+
+
+def _loop_document(
+    poles: NDArray[np.complex128], margins: LoopMargins
+) -> dict[str, Any]:
+    pole = least_damped(poles)
+    return {
+        "poles": poles,
+        "damping_ratio": -pole.real / abs(pole),
+        "natural_frequency_rad_s": abs(pole),
+        "phase_margin_deg": margins.phase_margin_deg,
+        "delay_margin_s": margins.delay_margin_s,
+        "disk_margin": margins.disk.alpha,
+    }
+
+
+def _margin_document(margins: LoopMargins) -> dict[str, Any]:
+    names = (
+        "stable", "gain_margin", "gain_reduction_margin", "phase_margin_deg",
+        "crossover_rad_s", "delay_margin_s", "modulus_margin",
+        "modulus_frequency_rad_s", "sensitivity_peak", "complementary_peak", "disks",
+    )  # fmt: skip
+    return {name: getattr(margins, name) for name in names}
+
+
+def _render(data: Margins, name: str) -> list[str]:
+    rows: list[list[Cell]] = [["Ideal target loop: no lag, no sampling, no obstacle"]]
+    rows += [_row(at, "along", margins) for at, margins in data.target.items()]
+    rows.append(["Implemented loop, 25 ms, at the operating point"])
+    rows += [_row(m.at, m.direction, m.margins) for m in data.implemented]
+    headings = [
+        "cut at", "direction", "gain up (dB)", "gain down (dB)", "phase (deg)",
+        "crossover (rad/s)", "modulus", "M_s", "M_t", "delay (s)",
+    ]  # fmt: skip
+    loops = [m.margins for m in data.implemented if m.direction == "along"]
+    disks: list[list[Cell]] = [
+        [m.at, m.direction, *_disk_cells(m.margins.disks)] for m in data.implemented
+    ]
+    return [
+        paragraph(_EXPLANATION),
+        table(headings, rows),
+        table(
+            [
+                "cut at", "direction",
+                *(f"skew {d.skew:+g}" for d in data.implemented[0].margins.disks),
+            ],
+            disks,
+            caption="Disk margins: size alpha; gain within +- dB; phase within +- deg",
+        ),
+        figure_html(plot_bode(loops), f"{name}-bode", "Bode diagram with margins."),
+        figure_html(
+            plot_nyquist(loops),
+            f"{name}-nyquist",
+            "Nyquist curves, with the disk that they must stay out of.",
+        ),
+        figure_html(plot_nichols(loops), f"{name}-nichols", "Nichols diagram."),
+        figure_html(
+            plot_gang_of_four(data.gang),
+            f"{name}-gang",
+            "Gang of four, along the line to the source.",
+        ),
+    ]  # fmt: skip
+
+
+def _row(at: str, direction: str, margins: LoopMargins) -> list[Cell]:
+    reduction = margins.gain_reduction_margin
+    return [
+        at,
+        direction,
+        margins.gain_margin_db,
+        20.0 * float(np.log10(reduction)) if reduction > 0.0 else -np.inf,
+        margins.phase_margin_deg,
+        margins.crossover_rad_s,
+        margins.modulus_margin,
+        margins.sensitivity_peak,
+        margins.complementary_peak,
+        margins.delay_margin_s,
+    ]
+
+
+def _disk_cells(disks: Sequence[DiskMargin]) -> list[Cell]:
+    return [
+        f"{disk.alpha:.3f}; {disk.gain_margin_db:.2f} dB; {disk.phase_margin_deg:.1f}"
+        for disk in disks
+    ]

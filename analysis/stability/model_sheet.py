@@ -1,0 +1,281 @@
+"""What a stability analysis is about: equations, parameters, limits, latencies.
+
+Everything is read from the scenario and from the blocks' own parameter models;
+the formulas are those of docs/model.md.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from analysis.runs.run_report import versions
+from diagrams import Scenario, dump_scenario
+from diagrams.laws import LAWS
+from systems.parameters import Parameters
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["Equation", "Latency", "Limit", "ModelSheet", "ParameterRow", "model_sheet"]
+
+#: Parts of a scenario that a loop with exact sensors depends on.
+_PARTS = ("attraction", "repulsion", "robot", "plant", "tracker", "sound")
+#: Fields of theirs that it does not depend on.
+_OTHERS = frozenset(
+    {
+        "robot.microphones_m",
+        *(f"sound.{name}" for name in ("kind", "file", "level_pa")),
+        *(f"sound.{name}_hz" for name in ("low", "high", "tone")),
+        *(
+            f"tracker.{name}"
+            for name in ("assumed_range_m", "resolve_front_back", "believed_outliers")
+        ),
+    }
+)
+
+#: Conventions and assumptions, for every law.
+_ASSUMPTIONS = (
+    "World frame W on the floor. Body frame B midway between the wheels, x forward.",
+    "Angles counter-clockwise, in rad unless a name ends in `_deg`; SI units.",
+    (
+        "P, ahead of the axle by epsilon, carries the virtual mass M. What the robot "
+        "weighs acts by way of the motor lag alone."
+    ),
+    (
+        "Linear models are of the build with exact sensors (`hearing` and "
+        "`obstacle_sensing` ideal, odometry not rounded), made by the builder that "
+        "simulates. Noise, converter, estimator and cones are in simulations only."
+    ),
+    (
+        "They hold while |v_P| and the wheels stay below their limits, and while no "
+        "echo comes or goes."
+    ),
+    (
+        "The heading follows the motion of P and is neutral at rest: its poles at 0 "
+        "(z = 1) are left out where stability is judged."
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A formula."""
+
+    title: str
+    """What it is."""
+    tex: str
+    """In matplotlib's subset of TeX, without the dollar signs."""
+    text: str
+    """The same in plain signs."""
+
+
+@dataclass(frozen=True)
+class ParameterRow:
+    """A parameter that the loop depends on."""
+
+    field: str
+    """Its path in the scenario."""
+    part: str
+    """What it is a parameter of, with the source of its values."""
+    value: Any
+    """As the scenario has it."""
+    changed: bool
+    """Whether this differs from the default."""
+    text: str
+    """Symbol, unit and source, in the words of its block."""
+
+    @property
+    def of_law(self) -> bool:
+        """Whether it belongs to the law, rather than to every loop."""
+        return self.field.startswith("repulsion.")
+
+
+@dataclass(frozen=True)
+class Limit:
+    """An edge of the operating envelope."""
+
+    quantity: str
+    value: float
+    unit: str
+    remark: str
+
+
+@dataclass(frozen=True)
+class Latency:
+    """A delay between the world and the wheels."""
+
+    path: str
+    """``source`` or ``obstacle``."""
+    part: str
+    """What takes the time."""
+    mean_s: float
+    """On average, s."""
+    remark: str
+
+
+@dataclass(frozen=True)
+class ModelSheet:
+    """The first page of a report."""
+
+    scenario: str
+    """Name."""
+    description: str
+    law: str
+    seed: int
+    scenario_sha256: str
+    """Of the effective scenario as YAML, with this law."""
+    motion: tuple[Equation, ...]
+    """Of every law."""
+    law_equations: tuple[Equation, ...]
+    """None for a law of the user's."""
+    parameters: tuple[ParameterRow, ...]
+    envelope: tuple[Limit, ...]
+    latencies: tuple[Latency, ...]
+    assumptions: tuple[str, ...]
+    versions: dict[str, str]
+
+    def latency_s(self, path: str) -> float:
+        """Sum over ``source`` or ``obstacle``, s."""
+        return sum(row.mean_s for row in self.latencies if row.path == path)
+
+
+def model_sheet(scenario: Scenario) -> ModelSheet:
+    """Collects the model sheet of a scenario's law."""
+    return ModelSheet(
+        scenario=scenario.name,
+        description=scenario.description,
+        law=scenario.law,
+        seed=scenario.seed,
+        scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
+        motion=_MOTION,
+        law_equations=_LAWS.get(scenario.law, ()),
+        parameters=tuple(_parameters(scenario)),
+        envelope=_envelope(scenario),
+        latencies=_latencies(scenario),
+        assumptions=_ASSUMPTIONS,
+        versions=versions(),
+    )
+
+
+def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
+    others = {f"repulsion.{law}." for law in LAWS if law != scenario.law}
+    for part in _PARTS:
+        for row in _rows(getattr(scenario, part), f"{part}."):
+            if row.field not in _OTHERS and not row.field.startswith(tuple(others)):
+                yield row
+
+
+def _rows(parameters: Parameters, prefix: str) -> Iterator[ParameterRow]:
+    default = type(parameters)()
+    part = (type(parameters).__doc__ or "").partition("\n\n")[0]
+    for name, info in type(parameters).model_fields.items():
+        value = getattr(parameters, name)
+        if isinstance(value, Parameters):
+            yield from _rows(value, f"{prefix}{name}.")
+            continue
+        changed = value != getattr(default, name)
+        text = _one_line(info.description or "")
+        yield ParameterRow(f"{prefix}{name}", _one_line(part), value, changed, text)
+
+
+def _one_line(text: str) -> str:
+    return " ".join(text.replace("``", "`").split())
+
+
+def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
+    robot, sensors = scenario.robot, scenario.ultrasonic
+    return (
+        Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
+        Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
+        Limit("speed of the source", scenario.source.speed_m_s, "m/s", "this scenario"),
+        Limit("nearest echo", sensors.minimum_range_m, "m", "nearer reads as this"),
+        Limit("farthest echo", sensors.maximum_range_m, "m", "beyond: no echo"),
+        Limit("age of a target", scenario.tracker.maximum_age_s, "s", "older: brake"),
+    )
+
+
+def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
+    half = FRAME_PERIOD_S / 2.0
+    sound, lag = scenario.sound, scenario.plant.motor_lag_s
+    silent = max(sound.period_s - sound.on_s, 0.0)
+    hold = Latency("source", "velocity held for a tick", half, "WheelSpeedCommand")
+    motor = Latency("source", "motor lag", lag, "first order")
+    return (
+        Latency("source", "sound collected", half, "middle of a 25 ms frame"),
+        Latency("source", "estimate computed", FRAME_PERIOD_S, "TDOAEstimator: a tick"),
+        Latency(
+            "source",
+            "silence between bursts",
+            silent**2 / (2.0 * sound.period_s),
+            f"up to {silent:g} s; 0 while the source sounds; bridged by the tracker",
+        ),
+        hold,
+        motor,
+        Latency("obstacle", "echo measured", 0.0, "travelling time not modelled"),
+        Latency("obstacle", hold.part, hold.mean_s, hold.remark),
+        Latency("obstacle", motor.part, motor.mean_s, motor.remark),
+    )
+
+
+_MOTION = (
+    Equation(
+        "Virtual mass at P",
+        r"M\,\ddot{p} = F_m + F_b,\quad F_b=\sum f(c,s)\,u,"
+        r"\quad u=-C_W/c,\quad c=|C_W|",
+        "M p'' = F_m + sum of f(c, s) u, u = -C_W/c, c = |C_W|",
+    ),
+    Equation(
+        "Attraction",
+        r"F_m = K_r\,(p_S-p)\left(1-\frac{d_f}{|p_S-p|}\right)-D_r\,v_P",
+        "F_m = K_r (p_S - p)(1 - d_f/|p_S - p|) - D_r v_P",
+    ),
+    Equation(
+        "Command, each tick T = 25 ms",
+        r"v_P \leftarrow v_P + T\,\ddot{p},\quad v=v_P\cdot x_B,"
+        r"\quad \omega=v_P\cdot y_B/\epsilon",
+        "v_P <- v_P + T p'', v = v_P . x_B, omega = v_P . y_B / epsilon",
+    ),
+    Equation(
+        "Plant",
+        r"\dot{x}=v\cos\theta,\quad\dot{y}=v\sin\theta,\quad\dot{\theta}=\omega,"
+        r"\quad\ddot{\phi}_i=(\dot{\phi}_i^{cmd}-\dot{\phi}_i)/\mathrm{lag}",
+        "x' = v cos theta, y' = v sin theta, theta' = omega, "
+        "phi_i'' = (commanded - phi_i')/lag",
+    ),
+)
+
+_LAWS: dict[str, tuple[Equation, ...]] = {
+    "none": (Equation("No avoidance", r"f = 0", "f = 0"),),
+    "conventional": (
+        Equation(
+            "Conventional law (Han 2019, eq. 19-a)",
+            r"f = K_0\,(\rho_0-c)+D_0\,s\quad (c<\rho_0),"
+            r"\quad f = 0\quad (c\geq\rho_0)",
+            "f = K_0 (rho_0 - c) + D_0 s for c < rho_0, else 0",
+        ),
+    ),
+    "active": (
+        Equation(
+            "Active law of 2019 (Han 2019, eq. 20)",
+            r"f = k_{ref}\,e^{-c/\alpha}\,c+d_{ref}\,e^{s/\beta}(\mu_0-s)"
+            r"\;[s<\mu_0]",
+            "f = k_ref exp(-c/alpha) c + d_ref exp(s/beta)(mu_0 - s) [s < mu_0]",
+        ),
+        Equation(
+            "with",
+            r"\alpha=\frac{\rho_0}{2\ln(k_{ref}/K_0)},"
+            r"\quad\beta=\frac{\mu_0}{2\ln(D_0/d_{ref})}",
+            "alpha = rho_0 / (2 ln(k_ref/K_0)), beta = mu_0 / (2 ln(D_0/d_ref))",
+        ),
+    ),
+    "active2017": (
+        Equation(
+            "Active law of 2017 (Kim 2017, eq. 20-21)",
+            r"f = \frac{K_a(c)}{c}+D_a(s)\,s,\quad K_a = K_0\min(1,\,c/\rho_1),"
+            r"\quad D_a = D_0\min(1,\,\mu_1/s)",
+            "f = K_a(c)/c + D_a(s) s, K_a = K_0 min(1, c/rho_1), "
+            "D_a = D_0 min(1, mu_1/s)",
+        ),
+    ),
+}

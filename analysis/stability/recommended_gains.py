@@ -1,0 +1,276 @@
+"""Least damping that meets the usual thresholds, for several springs, and its cost.
+
+The loop is the attraction's, sampled, with motor lag: springs and dampers of the
+law come in as the contact mode, whose stability is asked for as well.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from analysis.gains.attraction_search import damping_ratio, following_lag
+from analysis.stability.contact_mode import (
+    contact_matrix,
+    contact_spectral_radius,
+    largest_contact_stiffness,
+    motion_chain,
+)
+from analysis.stability.linear_models import LinearModel
+from analysis.stability.loop_margins import loop_margins
+from analysis.stability.loop_uncertainty import law_stiffness, with_values
+from analysis.stability.open_loops import BreakPoint
+from diagrams import Scenario
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "GainChoice",
+    "GainFigures",
+    "GainThresholds",
+    "RecommendedGains",
+    "attraction_loop",
+    "gain_figures",
+    "recommend_gains",
+]
+
+#: Springs beside the present one, as multiples of it.
+_SPRINGS = (0.5, 1.0, 2.0, 4.0)
+#: Dampers that are tried, as multiples of the critical one.
+_DAMPERS = np.geomspace(0.05, 3.0, 30)
+#: Where the loop is cut.
+_CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
+#: Frequencies of the search, rad/s; the final figures are refined between them.
+_OMEGA = np.geomspace(3e-2, 3e1, 300)
+
+
+@dataclass(frozen=True)
+class GainThresholds:
+    """What the gains are to meet."""
+
+    damping_ratio: float = 0.4
+    phase_margin_deg: float = 45.0
+    sensitivity_peak: float = 2.0
+    disk_margin: float = 2.0 / 3.0
+    spare_ticks: int = 1
+    """The contact mode stays stable with echoes so many ticks late."""
+
+
+@dataclass(frozen=True)
+class GainFigures:
+    """What a pair of gains achieves, and what it costs."""
+
+    stiffness_n_m: float
+    """K_r, N/m."""
+    damping_n_s_m: float
+    """D_r, N s/m."""
+    damping_ratio: float
+    phase_margin_deg: float
+    """The lesser one of sensor and actuator, deg."""
+    gain_margin_db: float
+    """The lesser one, dB."""
+    sensitivity_peak: float
+    """The greater one."""
+    disk_margin: float
+    """The lesser one."""
+    delay_margin_s: float
+    """The lesser one, s."""
+    contact_radius: float
+    """Of the contact mode with the spare ticks; stable below 1."""
+    following_lag_m: float
+    """Behind the follow point of a source that moves as the scenario's, m."""
+    settling_s: float
+    """To 2 % of a small deviation, s."""
+    largest_law_stiffness_n_m: float
+    """The stiffest law that does not swing before an obstacle, N/m."""
+
+
+@dataclass(frozen=True)
+class GainChoice:
+    """The least damping for one spring."""
+
+    stiffness_n_m: float
+    """K_r, N/m."""
+    figures: GainFigures | None
+    """None: no damping meets the thresholds with this spring."""
+
+
+@dataclass(frozen=True)
+class RecommendedGains:
+    """Today's gains, and the least damping for each of several springs."""
+
+    thresholds: GainThresholds
+    today: GainFigures
+    choices: tuple[GainChoice, ...]
+
+    @property
+    def recommended(self) -> GainFigures | None:
+        """With today's spring, or else the one with the least lag; none: nothing."""
+        found = [choice.figures for choice in self.choices if choice.figures]
+        same = [f for f in found if f.stiffness_n_m == self.today.stiffness_n_m]
+        return min(same or found, key=lambda f: f.following_lag_m, default=None)
+
+    @property
+    def advice(self) -> str:
+        """The recommendation and its cost, in words."""
+        today, best = self.today, self.recommended
+        if best is None:
+            return (
+                "No damping meets everything: the law is too stiff before an obstacle, "
+                "or the motors are too slow. Lower the law's stiffness first."
+            )
+        same_spring = best.stiffness_n_m == today.stiffness_n_m
+        if same_spring and best.damping_n_s_m <= today.damping_n_s_m:
+            return "Today's gains meet everything asked for here."
+        settings = (
+            f"attraction.stiffness_n_m={best.stiffness_n_m:g} "
+            f"attraction.damping_n_s_m={best.damping_n_s_m:g}"
+        )
+        return (
+            f"Recommended: `{settings}`. It costs distance: P stays "
+            f"{best.following_lag_m:.2f} m instead of {today.following_lag_m:.2f} m "
+            "behind the follow point of the moving source, which a shorter follow "
+            "distance can take back, for it overshoots less. It gains: 2 % is reached "
+            f"in {best.settling_s:.1f} s instead of {today.settling_s:.1f} s; a law "
+            f"may be as stiff as {best.largest_law_stiffness_n_m:.0f} N/m instead of "
+            f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A stiffer "
+            "K_r with more D_r lags less and leaves less delay margin."
+        )
+
+
+def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
+    """L of the attraction alone, sampled, along the line to a source at rest.
+
+    Args:
+        scenario: Gains, robot and plant are used.
+        at: ``sensor``: the damper stays closed; ``actuator``: both are cut.
+    """
+    chain = motion_chain(scenario)
+    mass = scenario.robot.mass_kg
+    spring = scenario.attraction.stiffness_n_m / mass * chain.C[:1]
+    damper = scenario.attraction.damping_n_s_m / mass * chain.C[1:]
+    inner = chain.B @ damper if at == "sensor" else np.zeros_like(chain.A)
+    return replace(
+        chain,
+        name=f"L of the attraction, at the {at}",
+        A=chain.A - inner,
+        C=spring if at == "sensor" else spring + damper,
+        D=np.zeros((1, 1)),
+        output_names=("acceleration",),
+    )
+
+
+def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
+    """What the scenario's K_r and D_r achieve."""
+    margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
+    K_r = scenario.attraction.stiffness_n_m
+    z = np.linalg.eigvals(contact_matrix(scenario, K_r))
+    slowest = -math.log(float(np.abs(z).max())) / FRAME_PERIOD_S
+
+    def least(name: str) -> float:
+        return min(float(getattr(m, name)) for m in margins)
+
+    return GainFigures(
+        stiffness_n_m=K_r,
+        damping_n_s_m=scenario.attraction.damping_n_s_m,
+        damping_ratio=damping_ratio(scenario),
+        phase_margin_deg=least("phase_margin_deg"),
+        gain_margin_db=least("gain_margin_db"),
+        sensitivity_peak=max(m.sensitivity_peak for m in margins),
+        disk_margin=min(m.disk.alpha for m in margins),
+        delay_margin_s=least("delay_margin_s"),
+        contact_radius=_contact_radius(scenario, thresholds),
+        following_lag_m=following_lag(scenario),
+        settling_s=4.0 / slowest,
+        largest_law_stiffness_n_m=largest_contact_stiffness(scenario) - K_r,
+    )
+
+
+def recommend_gains(
+    scenario: Scenario,
+    thresholds: GainThresholds | None = None,
+    *,
+    springs: Sequence[float] = _SPRINGS,
+) -> RecommendedGains:
+    """Finds the least D_r for each of several K_r.
+
+    Args:
+        scenario: Today's gains, law, robot and plant.
+        thresholds: What is to be met.
+        springs: K_r that are tried, as multiples of today's.
+
+    Raises:
+        ValueError: There is no spring today.
+    """
+    thresholds = thresholds or GainThresholds()
+    today = scenario.attraction.stiffness_n_m
+    if today == 0.0:
+        raise ValueError(
+            "attraction.stiffness_n_m: is 0, and gains of a loop that is not there "
+            "cannot be recommended; set it above 0"
+        )
+    return RecommendedGains(
+        thresholds,
+        gain_figures(scenario, thresholds),
+        tuple(_choice(scenario, share * today, thresholds) for share in springs),
+    )
+
+
+def _choice(scenario: Scenario, K_r: float, thresholds: GainThresholds) -> GainChoice:
+    critical = 2.0 * math.sqrt(K_r * scenario.robot.mass_kg)
+
+    def meets(D_r: float) -> bool:
+        return _meets(_with_gains(scenario, K_r, D_r), thresholds)
+
+    below = 0.0
+    for D_r in critical * _DAMPERS:
+        if meets(D_r):
+            least = _bisected(meets, below, float(D_r))
+            chosen = _with_gains(scenario, K_r, least)
+            return GainChoice(K_r, gain_figures(chosen, thresholds))
+        below = float(D_r)
+    return GainChoice(K_r, None)
+
+
+def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
+    """Least value that meets, rounded up to two decimals, where that meets too."""
+    while high - low > 1e-3 * high:
+        middle = (low + high) / 2.0
+        low, high = (low, middle) if meets(middle) else (middle, high)
+    rounded = math.ceil(100.0 * high) / 100.0
+    return rounded if meets(rounded) else high
+
+
+def _with_gains(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
+    return with_values(
+        scenario,
+        {"attraction.stiffness_n_m": K_r, "attraction.damping_n_s_m": D_r},
+    )
+
+
+def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
+    if damping_ratio(scenario) < thresholds.damping_ratio:
+        return False
+    if _contact_radius(scenario, thresholds) >= 1.0:
+        return False
+    for at in _CUTS:
+        L = attraction_loop(scenario, at).response(_OMEGA)[0, 0]
+        S = 1.0 / (1.0 + L)
+        crossing = np.flatnonzero(np.diff(np.sign(np.abs(L) - 1.0)))
+        angles = np.degrees(np.abs(np.angle(-L[[*crossing, *(crossing + 1)]])))
+        if (
+            angles.min(initial=180.0) < thresholds.phase_margin_deg
+            or np.abs(S).max() > thresholds.sensitivity_peak
+            or 1.0 / np.abs(S - 0.5).max() < thresholds.disk_margin
+        ):
+            return False
+    return True
+
+
+def _contact_radius(scenario: Scenario, thresholds: GainThresholds) -> float:
+    total = scenario.attraction.stiffness_n_m + law_stiffness(scenario)
+    return contact_spectral_radius(
+        scenario, total, latency_ticks=thresholds.spare_ticks
+    )

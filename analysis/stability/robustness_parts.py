@@ -1,0 +1,188 @@
+"""Parts of the stability report: what uncertain parameters do to the poles."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from analysis.runs.html_page import Cell, figure_html, paragraph, table
+from analysis.stability.loop_uncertainty import (
+    contact_poles,
+    contact_uncertainty,
+    following_poles,
+    following_uncertainty,
+)
+from analysis.stability.robustness import (
+    PoleCloud,
+    PoleFunction,
+    PoleSensitivity,
+    UncertainParameter,
+    continuous,
+    damping_ratio,
+    pole_cloud,
+    pole_sensitivities,
+    slowest_pole,
+)
+from analysis.stability.stability import Part, Study
+from diagrams import Scenario
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
+
+#: Random points of the box, in a short and in a full report.
+_SAMPLES = (25, 200)
+
+
+@dataclass(frozen=True)
+class LoopRobustness:
+    """One loop over its box of parameters."""
+
+    cloud: PoleCloud
+    sensitivities: tuple[PoleSensitivity, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything but the poles of each sample."""
+        cloud = self.cloud
+        return {
+            "period_s": cloud.period_s,
+            "parameters": [vars(p) for p in cloud.parameters],
+            "samples": len(cloud.values),
+            "stable_share": cloud.stable_share,
+            "nominal_radius": cloud.nominal_radius,
+            "worst_radius": cloud.worst_radius,
+            "worst_damping_ratio": cloud.worst_damping_ratio,
+            "worst_values": cloud.worst_values,
+            "worst_poles": cloud.worst_poles,
+            "sensitivities": [
+                {
+                    "parameter": row.parameter.name,
+                    "pole": row.pole,
+                    "derivative": row.derivative,
+                    "per_interval": row.per_interval,
+                }
+                for row in self.sensitivities
+            ],
+        }
+
+
+def loop_robustness(
+    scenario: Scenario,
+    poles: PoleFunction,
+    parameters: tuple[UncertainParameter, ...],
+    *,
+    samples: int,
+) -> LoopRobustness:
+    """Pole cloud, worst case and sensitivities of a loop of 25 ms periods."""
+    return LoopRobustness(
+        pole_cloud(
+            poles,
+            parameters,
+            period=FRAME_PERIOD_S,
+            samples=samples,
+            seed=scenario.seed,
+        ),
+        pole_sensitivities(poles, parameters, period=FRAME_PERIOD_S),
+    )
+
+
+def robustness_parts(*, full: bool) -> tuple[Part, ...]:
+    """Robustness about the operating point, and before an obstacle."""
+    samples = _SAMPLES[full]
+    return (
+        Part(
+            "robustness",
+            "Robustness at the operating point",
+            lambda study: _following(study, samples),
+            _render,
+            fresh=True,
+        ),
+        Part(
+            "contact_robustness",
+            "Robustness before an obstacle",
+            lambda study: _contact(study, samples),
+            _render,
+        ),
+    )
+
+
+def _following(study: Study, samples: int) -> LoopRobustness:
+    at = study.need("equilibria").at
+    return loop_robustness(
+        study.scenario,
+        following_poles(at),
+        following_uncertainty(study.scenario),
+        samples=samples,
+    )
+
+
+def _contact(study: Study, samples: int) -> LoopRobustness:
+    scenario = study.scenario
+    return loop_robustness(
+        scenario,
+        contact_poles(scenario),
+        contact_uncertainty(scenario),
+        samples=4 * samples,
+    )
+
+
+def _render(data: LoopRobustness, name: str) -> list[str]:
+    from analysis.stability.robustness_plots import plot_pole_cloud, plot_sensitivities
+
+    cloud = data.cloud
+    slowest = slowest_pole(cloud.worst_poles)
+    rate = continuous(slowest, cloud.period_s).real
+    boxes: list[list[Cell]] = [
+        [
+            f"{p.symbol}, `{p.name}`",
+            p.low,
+            p.nominal,
+            p.high,
+            p.unit.replace(" ", "\u00a0"),
+            cloud.worst_values[p.name],
+            p.reason,
+        ]
+        for p in cloud.parameters
+    ]
+    headings = ["parameter", "least", "nominal", "most", "unit", "worst case", "why"]
+    nominal = damping_ratio(slowest_pole(cloud.nominal_poles), cloud.period_s)
+    shares: list[list[Cell]] = [
+        [
+            row.parameter.symbol,
+            row.derivative,
+            row.parameter.unit.replace(" ", "\u00a0"),
+            row.per_interval,
+        ]
+        for row in sorted(data.sensitivities, key=lambda r: -abs(r.per_interval))
+    ]
+    return [
+        paragraph(
+            f"{len(cloud.values)} random points of the box below, and its worst "
+            f"corner. Stable: {100.0 * cloud.stable_share:.0f} % of the points. In the "
+            f"worst case the slowest mode {'decays' if rate < 0 else 'grows'} by "
+            f"{abs(rate):.3g} 1/s, damping ratio {cloud.worst_damping_ratio:.3f} "
+            f"(nominal {nominal:.3f})."
+        ),
+        table(headings, boxes),
+        figure_html(
+            plot_pole_cloud(cloud),
+            f"{name}-cloud",
+            "Poles over the box, ln(z)/T of the sampled loop. Poles faster than "
+            "12 1/s are left out.",
+        ),
+        table(
+            [
+                "parameter",
+                "d(pole)/dp (1/s per unit)",
+                "unit",
+                "over the interval (1/s)",
+            ],
+            shares,
+            caption="Sensitivity of the slowest pole",
+        ),
+        figure_html(
+            plot_sensitivities(data.sensitivities),
+            f"{name}-sensitivity",
+            "What each interval does to the slowest pole, to first order. Orange: "
+            "less decay, or a higher frequency.",
+        ),
+    ]

@@ -1,0 +1,163 @@
+"""What the verdicts of the stability report are about: numbers of its parts.
+
+Each function takes the study and returns a number, or says why there is none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+from analysis.stability.contact_mode import contact_spectral_radius
+from analysis.stability.loop_uncertainty import law_stiffness
+from analysis.stability.margin_parts import Margins, least_damped
+from analysis.stability.stability import Study
+from systems.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "Reading",
+    "read_barrier",
+    "read_contact",
+    "read_cycle",
+    "read_damping",
+    "read_decay",
+    "read_delay",
+    "read_jams",
+    "read_offset",
+    "read_passive",
+    "read_prediction",
+    "read_routes",
+    "read_trials",
+    "read_worst_case",
+    "read_worst_margin",
+]
+
+#: A number, or why there is none.
+Reading = float | str
+
+
+def _at(study: Study) -> Any:
+    return study.need("equilibria").at
+
+
+def read_decay(study: Study) -> Reading:
+    """Growth of the slowest motion about rest, 1/s."""
+    return float(_at(study).eigenvalues.real.max())
+
+
+def read_damping(study: Study) -> Reading:
+    """Damping ratio of the least damped slow mode."""
+    pole = least_damped(_at(study).eigenvalues)
+    return -pole.real / abs(pole)
+
+
+def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]:
+    """Of all cuts and directions."""
+
+    def read(study: Study) -> Reading:
+        margins: Margins | None = study.found.get("margins")
+        if not margins or not margins.implemented:
+            return "margins were not computed"
+        values = [
+            m.margins.disk.alpha if name == "disk" else getattr(m.margins, name)
+            for m in margins.implemented
+        ]
+        return float(max(values) if largest else min(values))
+
+    return read
+
+
+def read_delay(study: Study) -> Reading:
+    """Least exact delay margin, s."""
+    data = study.found.get("sampled")
+    if not data or not data.margins:
+        return "delay margins were not computed"
+    return float(min(margin.delay_s for margin in data.margins))
+
+
+def read_cycle(study: Study) -> Reading:
+    """Largest multiplier of the burst cycle with today's hold."""
+    data = study.found.get("burst_cycle")
+    if not data:
+        return "the burst cycle was not computed"
+    today = next(cycle for cycle in data.cycles if cycle.hold == data.today)
+    return today.largest
+
+
+def read_jams(study: Study) -> Reading:
+    """Sinks farther than the following band beyond the follow distance."""
+    points = study.need("equilibria")
+    band = study.scenario.stop.following_band_m
+    return float(sum(p.stable and p.offset_m > band for p in points.search.points))
+
+
+def read_offset(study: Study) -> Reading:
+    """Distance from the follow point at rest, m."""
+    return round(abs(float(_at(study).offset_m)), 9)
+
+
+def read_contact(study: Study, ticks: int) -> Reading:
+    """Growth of the contact mode at the law's largest slope, 1/s."""
+    scenario = study.scenario
+    stiffness = law_stiffness(scenario)
+    if stiffness <= 0.0:
+        return "the law does not push off obstacles"
+    total = scenario.attraction.stiffness_n_m + stiffness
+    return _growth(contact_spectral_radius(scenario, total, latency_ticks=ticks))
+
+
+def _growth(radius: float) -> float:
+    """ln(|z|)/T of the sampled loop, 1/s."""
+    return math.log(radius) / FRAME_PERIOD_S
+
+
+def read_worst_case(key: str) -> Callable[[Study], Reading]:
+    """Growth in the worst case of a robustness part, 1/s."""
+
+    def read(study: Study) -> Reading:
+        data = study.found.get(key)
+        return _growth(data.cloud.worst_radius) if data else "it was not computed"
+
+    return read
+
+
+def read_passive(study: Study) -> Reading:
+    """Largest power of the velocity term over that of D_r."""
+    data = study.found.get("energy_balance")
+    if not data:
+        return "the law has no radial force"
+    passivity = data.passivity
+    if passivity.attraction_damping_n_s_m == 0.0:
+        return "there is no damping to compare with"
+    share = passivity.largest_injection_n_s_m / passivity.attraction_damping_n_s_m
+    return float(share)
+
+
+def read_barrier(study: Study) -> Reading:
+    """Least energy at contact over kinetic energy at top speed."""
+    data = study.found.get("certificates")
+    if not data:
+        return "there is no energy certificate"
+    certificate = data[0].certificate
+    return certificate.contact_energy_j / certificate.model.top_kinetic_energy_j
+
+
+def read_trials(study: Study) -> Reading:
+    """Collisions of simulated certified starts."""
+    data = study.found.get("certificates")
+    return float(data[0].trials.inside_collisions) if data else "no certificate"
+
+
+def read_routes(study: Study) -> Reading:
+    """Largest difference of the two one-period matrices."""
+    data = study.found.get("linear_models")
+    return data.routes.matrix_difference if data else "no linear models"
+
+
+def read_prediction(study: Study) -> Reading:
+    """Error of frequency or damping of a small step, per cent."""
+    data = study.found.get("step")
+    if not data:
+        return "no step was simulated"
+    return 100.0 * max(abs(data.frequency_error), abs(data.damping_error))

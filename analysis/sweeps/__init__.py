@@ -1,0 +1,1 @@
+"""Many runs: sweeps, comparisons of laws, the papers' claims."""

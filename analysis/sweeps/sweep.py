@@ -1,0 +1,163 @@
+"""Runs a sweep: many scenarios, in many processes, into one table."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+from collections.abc import Callable, Generator, Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.runs.result_directory import choose_directory
+from analysis.sweeps.sweep_plan import SweepPlan, SweepPoint
+from analysis.sweeps.sweep_processes import run_locally
+from analysis.sweeps.sweep_run import Outcome, Task
+from analysis.sweeps.sweep_store import StoreError, SweepStore, load_results
+from diagrams import build_sound_follower
+
+__all__ = ["PreparedSweep", "prepare_sweep", "reproducing_command", "run_sweep"]
+
+#: Runs tasks, and calls its second argument a few times a second.
+Runner = Callable[[Iterator[Task], Callable[[], None]], Generator[Outcome]]
+
+
+@dataclass(frozen=True)
+class PreparedSweep:
+    """A sweep that has only to be run; see ``prepare_sweep``."""
+
+    plan: SweepPlan
+    points: list[SweepPoint]
+    """All runs, those that are done included."""
+    store: SweepStore
+    """The open directory of the results; ``run`` closes it."""
+    runner: Runner
+
+    def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
+        """Does all runs that the directory does not hold yet.
+
+        Args:
+            progress: Called a few times a second with the number of runs that
+                are done. What it raises ends the sweep.
+
+        Returns:
+            See ``load_results``.
+
+        Raises:
+            StoreError: The disk is full, or broken.
+            WorkerError: Workers cannot be started, or are gone.
+        """
+
+        def pulse() -> None:
+            if progress is not None:
+                progress(len(self.store.done))
+
+        pulse()
+        with closing(self.store):
+            try:
+                with closing(self.runner(self._tasks(), pulse)) as outcomes:
+                    for outcome in outcomes:
+                        self.store.add(outcome)
+                self.store.write_table(complete=True)
+            except BaseException:
+                with suppress(StoreError):
+                    self.store.write_table(complete=False)
+                raise
+        return load_results(self.store.out)
+
+    def _tasks(self) -> Iterator[Task]:
+        done = frozenset(self.store.done)
+        for point in self.points:
+            if point.index not in done:
+                scenario = self.plan.scenario_of(point)
+                yield Task(point, scenario, trajectory=self.plan.trajectories)
+
+
+def prepare_sweep(
+    plan: SweepPlan,
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+) -> PreparedSweep:
+    """Draws and checks all runs, then opens the directory of the results.
+
+    Args:
+        plan: What to run.
+        out: The directory; none: the next number under results/.
+        workers: Number of local processes; none: one a core.
+        scheduler: Address of a Dask scheduler to use instead.
+        resume: Whether ``out`` may hold runs of the same plan, which are kept.
+
+    Raises:
+        ValueError: Something of that is no good; says what, and the remedy.
+    """
+    if workers is not None and workers < 1:
+        raise ValueError(f"workers: {workers} must be at least 1; raise it")
+    if scheduler is not None and workers is not None:
+        raise ValueError("workers: a cluster has its own; leave out --workers")
+    if resume and out is None:
+        raise ValueError("out: --resume needs the directory to go on with; name it")
+    begun = (
+        resume and out is not None and Path(out).is_dir() and any(Path(out).iterdir())
+    )
+    directory = Path(out) if begun and out is not None else choose_directory(out)
+    points = plan.points()
+    _build_each_kind(plan, points)
+    runner: Runner
+    if scheduler is None:
+        runner = partial(run_locally, workers=workers or _cores())
+    else:
+        from analysis.sweeps.sweep_dask import connect, run_on_cluster
+
+        runner = partial(run_on_cluster, client=connect(scheduler))
+    return PreparedSweep(plan, points, SweepStore(directory, plan), runner)
+
+
+def run_sweep(
+    plan: SweepPlan,
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+    progress: Callable[[int], None] | None = None,
+) -> pd.DataFrame:
+    """Prepares and runs a sweep; see ``prepare_sweep`` and ``PreparedSweep.run``."""
+    prepared = prepare_sweep(
+        plan, out, workers=workers, scheduler=scheduler, resume=resume
+    )
+    return prepared.run(progress)
+
+
+def reproducing_command(out: Path, point: SweepPoint) -> str:
+    """The shell command that does one run of a sweep again."""
+    words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
+    for path, value in point.fields.items():
+        words += ["--set", f"{path}={json.dumps(value, ensure_ascii=False)}"]
+    return shlex.join([*words, "--seed", str(point.seed)])
+
+
+def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> None:
+    """What only a build finds, as an unknown law: once for each text or group."""
+    seen: set[str] = set()
+    for point in points:
+        kinds = {
+            json.dumps([path, value])
+            for path, value in point.fields.items()
+            if type(value) in (str, dict)
+        }
+        if point.index == 0 or not kinds <= seen:
+            build_sound_follower(plan.scenario_of(point))
+        seen |= kinds
+
+
+def _cores() -> int:
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

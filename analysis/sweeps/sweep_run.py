@@ -1,0 +1,94 @@
+"""One run of a sweep, and the row that it leaves."""
+
+from __future__ import annotations
+
+import io
+import math
+from dataclasses import dataclass
+from time import perf_counter
+from typing import Any
+
+from analysis.runs.metrics import run_metrics
+from analysis.sweeps.sweep_plan import SweepPoint
+from diagrams import RunResult, Scenario, simulate
+
+__all__ = ["Outcome", "Task", "lost_outcome", "run_task"]
+
+#: Cause in the row of a run that raised an error.
+FAILED = "failed"
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a worker is given."""
+
+    point: SweepPoint
+    scenario: Scenario
+    trajectory: bool
+    """Whether the trajectory is wanted."""
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What a worker gives back."""
+
+    row: dict[str, Any]
+    """Plain values: the point's own (``fields`` a mapping), ``cause``,
+    ``collision_object``, ``collision_fault``, ``collision_time_s``, ``metrics``
+    (a mapping), ``simulated_s``, ``wall_s`` and ``error``."""
+    trajectory: bytes | None = None
+    """A Parquet file."""
+
+
+def run_task(task: Task) -> Outcome:
+    """Runs a point. Whatever the run raises becomes its row."""
+    start = perf_counter()
+    try:
+        result = simulate(task.scenario)
+        row = _row(task.point, result.cause, start, result)
+        trajectory = _trajectory(result) if task.trajectory else None
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # the rest must go on
+        text = " ".join(f"{type(error).__name__}: {error}".split())
+        return Outcome(_row(task.point, FAILED, start, error=text))
+    return Outcome(row, trajectory)
+
+
+def lost_outcome(task: Task, reason: str) -> Outcome:
+    """The outcome of a run whose worker ended each time."""
+    return Outcome(_row(task.point, FAILED, perf_counter(), error=reason))
+
+
+def _row(
+    point: SweepPoint,
+    cause: str,
+    start: float,
+    result: RunResult | None = None,
+    error: str | None = None,
+) -> dict[str, Any]:
+    collision = result.collision if result else None
+    metrics = run_metrics(result) if result else {}
+    for name, value in metrics.items():
+        if value is not None and not math.isfinite(value):
+            raise ValueError(f"{name} is {value}")
+    return {
+        "index": point.index,
+        "cell": point.cell,
+        "run": point.run,
+        "seed": point.seed,
+        "redraws": point.redraws,
+        "fields": point.fields,
+        "cause": cause,
+        "collision_object": collision.object if collision else None,
+        "collision_fault": collision.fault if collision else None,
+        "collision_time_s": collision.time if collision else None,
+        "metrics": metrics,
+        "simulated_s": result.simulated_s if result else None,
+        "error": error,
+        "wall_s": perf_counter() - start,
+    }
+
+
+def _trajectory(result: RunResult) -> bytes:
+    buffer = io.BytesIO()
+    result.trajectory.to_parquet(buffer, index=False)
+    return buffer.getvalue()

@@ -1,0 +1,84 @@
+"""False alarms and the detection curve: what is counted, and as what."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from analysis.hearing.detection import detection_curve, false_alarms
+from analysis.hearing.free_field import Loudspeaker
+from systems.array_shape import ArrayShape
+from systems.delays import look
+from systems.localise import Localiser, TDOAParameters
+from systems.noise import tick_generator
+from systems.robot import RobotParameters
+
+C = 340.0
+SHAPE = ArrayShape.of(RobotParameters().microphones_m)
+CHIRP = Loudspeaker.of("chirp", seed=3)
+
+
+def curve(levels_db, trials=12, **changes):
+    settings = {"shape": SHAPE, "c": C, "trials": trials, "seed": 2, **changes}
+    return detection_curve(CHIRP, levels_db, **settings)
+
+
+def test_false_alarms_are_counted_at_every_rate_by_itself():
+    """They belong to the seed, and grow with the rate."""
+    rates = (0.999, 0.3, 1e-9)
+    alarms = false_alarms(rates, 200, shape=SHAPE, c=C, seed=9)
+    assert [alarm.rate for alarm in alarms] == list(rates)
+    assert alarms[1:2] == false_alarms([0.3], 200, shape=SHAPE, c=C, seed=9)
+    most, some, none = (alarm.count for alarm in alarms)
+    # Of the frames that are louder than the noise, hardly one is left at 0.999.
+    assert most > 40
+    assert 0 < some < 0.3 * 200
+    assert none == 0
+
+
+def test_a_chance_is_a_false_alarm_of_every_rate_above_it():
+    """Something is heard in a first frame if and only if its rate is higher."""
+    noise = tick_generator(9, 3).standard_normal((3, 2500), dtype=np.float32)
+    default = Localiser.of(TDOAParameters(), SHAPE, C)
+    seen = look(noise, default.plan)
+    assert seen is not None
+    for factor, heard in ((1.01, True), (0.99, False)):
+        rate = factor * seen[0].chance
+        localiser = Localiser.of(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
+        _, memory = localiser.localise(noise, localiser.blank())
+        # What is noise leaves its level behind.
+        assert (memory.energy == 0.0) == heard
+
+
+def test_loud_is_heard_and_faint_is_not():
+    loud, faint = curve([20.0, -40.0])
+    assert (loud.snr_db, loud.trials) == (20.0, 12)
+    assert (loud.heard, loud.ranged, loud.wrong) == (12, 12, 0)
+    assert (faint.heard, faint.ranged, faint.wrong) == (0, 0, 0)
+
+
+def test_what_is_off_by_more_than_it_says_is_wrong():
+    """An estimator that takes sound for 15 % faster: sin(bearing) is 1.15 times it."""
+    (point,) = curve(
+        [20.0], 25, range_m=20.0, parameters=TDOAParameters(sound_speed_m_s=1.15 * C)
+    )
+    bearings = [
+        abs(tick_generator(2, trial).uniform(-math.pi / 3.0, math.pi / 3.0))
+        for trial in range(25)
+    ]
+    errors = [math.asin(1.15 * math.sin(bearing)) - bearing for bearing in bearings]
+    limit = math.radians(5.0)
+    assert sum(error > 1.1 * limit for error in errors) <= point.wrong
+    assert point.wrong <= sum(error > 0.9 * limit for error in errors)
+    assert 0 < point.wrong < point.heard
+
+
+def test_a_stricter_rate_hears_less():
+    levels = [-12.0, -10.0]
+    lax, strict = (
+        curve(levels, trials=25, parameters=TDOAParameters(false_alarm_rate=rate))
+        for rate in (1e-3, 1e-12)
+    )
+    for a, b in zip(lax, strict, strict=True):
+        assert b.heard < a.heard

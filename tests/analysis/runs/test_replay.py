@@ -1,0 +1,222 @@
+"""What the replay records is the run; what it writes needs nothing else."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import math
+import re
+import socket
+from dataclasses import dataclass, field, replace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from analysis.runs.replay import record_run, ring_at, wheel_angles, write_replay
+from analysis.runs.replay_scene import RINGS, add_robot
+
+FRAME_S = 1.0 / 32.0
+
+
+@dataclass
+class Recorder:
+    """Takes down what Meshcat is told."""
+
+    transforms: dict[Any, Any] = field(default_factory=dict)
+    properties: dict[Any, Any] = field(default_factory=dict)
+    meshes: dict[Any, Any] = field(default_factory=dict)
+    shapes: dict[Any, Any] = field(default_factory=dict)
+
+    def SetTransform(self, path, X_ParentPath, time_in_recording=None):
+        track = self.transforms.setdefault(path, [])
+        track.append((time_in_recording, X_ParentPath))
+
+    def SetProperty(self, path, property, value, time_in_recording=None):  # noqa: A002
+        track = self.properties.setdefault((path, property), [])
+        track.append((time_in_recording, value))
+
+    def SetObject(self, path, shape, rgba):
+        self.shapes[path] = shape
+
+    def SetTriangleMesh(self, path, vertices, faces, rgba):
+        self.meshes[path] = np.array(vertices)
+
+    def visible(self, path, time):
+        """Whether an object is seen at a time: the last switch counts."""
+        switches = self.properties[path, "visible"]
+        return [state for at, state in switches if at <= time + 1e-9][-1]
+
+
+@pytest.fixture(scope="module")
+def recorded(crossing_run):
+    recorder = Recorder()
+    record_run(cast("Any", recorder), crossing_run)
+    return recorder
+
+
+def _heading(X):
+    return math.atan2(X.rotation().matrix()[1, 0], X.rotation().matrix()[0, 0])
+
+
+@pytest.mark.parametrize(("path", "body"), [("robot", "WB"), ("source", "WS")])
+def test_bodies_are_where_the_columns_say(crossing_run, recorded, path, body):
+    columns, track = crossing_run.columns, recorded.transforms[path]
+    assert len(track) == 16 * 32 + 1
+    for time, X in track[::16]:
+        # Every half second is a frame and a tick.
+        tick = round(time / 0.025)
+        place = [columns[f"p_{body}_x"][tick], columns[f"p_{body}_y"][tick], 0.0]
+        np.testing.assert_allclose(X.translation(), place, atol=1e-9)
+        turned = _heading(X) - columns[f"theta_{body}"][tick]
+        assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_moving_obstacle_moves_and_a_resting_one_rests(recorded):
+    assert "obstacles/box" not in recorded.transforms
+    for time, X in recorded.transforms["obstacles/cart"][::32]:
+        y = -2.0 + min(0.3 * time, 4.0)
+        assert X.translation()[:2] == pytest.approx([3.0, y])
+
+
+@pytest.mark.parametrize("number", [1, 2, 3])
+def test_cones_change_their_look_with_the_echo(crossing_run, recorded, number):
+    echo = crossing_run.columns[f"echo_{number}"] > 0.5
+    assert 0 < np.count_nonzero(echo) < len(echo)
+    cone = f"robot/cone_{number}"
+    for time, seen in zip(crossing_run.time, echo, strict=True):
+        assert recorded.visible(f"{cone}/echo", time) == seen
+        assert recorded.visible(f"{cone}/empty", time) != seen
+
+
+def test_ideal_sensing_records_no_cones(ideal_run):
+    recorder = Recorder()
+    record_run(cast("Any", recorder), ideal_run)
+    assert not [path for path, _ in recorder.properties if "cone" in path]
+
+
+def test_one_ring_is_seen_while_the_source_sounds_and_none_else(recorded):
+    paths = [f"source/ring_{k}" for k in range(1, len(RINGS) + 1)]
+    for time in np.arange(0.015, 15.9, 0.03125):
+        seen = sum(recorded.visible(path, time) for path in paths)
+        assert seen == (1 if math.fmod(time, 2.0) < 0.5 else 0)
+
+
+def test_the_ring_grows():
+    times = np.arange(0.0, 0.3125, 0.0625) + 0.01
+    assert [ring_at(float(t), [(0.0, 0.5)]) for t in times] == [0, 1, 2, 3, 4]
+    assert ring_at(0.5, [(0.0, 0.5)]) is None
+
+
+def test_the_trail_appears_piece_after_piece(crossing_run, recorded):
+    columns = crossing_run.columns
+    pieces = [path for path in recorded.meshes if path.startswith("trail/robot/")]
+    assert len(pieces) == 32
+    for path in pieces:
+        end = 0.5 * (1 + int(path.rsplit("/", 1)[1]))
+        assert not recorded.visible(path, end - FRAME_S)
+        assert recorded.visible(path, end)
+        tick = round(end / 0.025)
+        last = recorded.meshes[path][:2, [20, 41]].mean(axis=1)
+        place = [columns["p_WP_x"][tick], columns["p_WP_y"][tick]]
+        np.testing.assert_allclose(last, place, atol=1e-9)
+
+
+def test_the_ball_is_where_the_source_is_taken_to_be(crossing_run, recorded):
+    columns = crossing_run.columns
+    track = recorded.transforms["estimate"]
+    valid = columns["target_valid"] > 0.5
+    for tick in np.flatnonzero(valid)[::7]:
+        time = crossing_run.time[tick]
+        _, X = [entry for entry in track if entry[0] <= time + 1e-9][-1]
+        place = [columns["p_WS_estimated_x"][tick], columns["p_WS_estimated_y"][tick]]
+        np.testing.assert_allclose(X.translation()[:2], place, atol=1e-4)
+        assert recorded.visible("estimate", time)
+
+
+def _driven(run, x, y, theta):
+    columns = dict(run.columns)
+    columns |= {"p_WB_x": x, "p_WB_y": y, "theta_WB": theta}
+    return replace(run, columns=columns)
+
+
+def test_wheels_that_roll_a_metre_turn_by_a_metre_over_their_radius(ideal_run):
+    part = np.linspace(0.0, 1.0, len(ideal_run.time))
+    heading = np.full_like(part, 0.7)
+    straight = _driven(ideal_run, part * math.cos(0.7), part * math.sin(0.7), heading)
+    for angles in wheel_angles(straight).values():
+        assert angles[-1] == pytest.approx(1.0 / 0.06)
+
+
+def test_a_turn_on_the_spot_turns_the_wheels_against_each_other(ideal_run):
+    part = np.linspace(0.0, 1.0, len(ideal_run.time))
+    # Through pi, where a heading may jump by a turn.
+    heading = (3.0 + part + math.pi) % math.tau - math.pi
+    angles = wheel_angles(_driven(ideal_run, 0.0 * part, 0.0 * part, heading))
+    assert angles["right"][-1] == pytest.approx(0.5 * 0.41 / 0.06)
+    assert angles["left"][-1] == pytest.approx(-0.5 * 0.41 / 0.06)
+
+
+def test_the_robot_has_its_bar_and_three_microphones(crossing_run):
+    built = Recorder()
+    add_robot(cast("Any", built), crossing_run.scenario)
+    assert built.shapes["robot/bar"].depth() == pytest.approx(0.82)
+    places = [built.transforms[f"robot/microphone_{k}"][0][1] for k in (1, 2, 3)]
+    np.testing.assert_allclose(
+        [X.translation()[:2] for X in places],
+        [[0.175, 0.4], [0.175, 0.0], [0.175, -0.4]],
+        atol=1e-12,
+    )
+    assert sum("/echo" in path for path in built.shapes) == 3
+    assert sum("/empty" in path for path in built.shapes) == 3
+
+
+def test_wheels_turn_forward_when_the_robot_drives_forward(recorded, crossing_run):
+    angles = wheel_angles(crossing_run)["left"]
+    for time, X in recorded.transforms["robot/left/wheel"][::16]:
+        turned = _heading(X) - angles[round(time / 0.025)]
+        assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
+    # The wheel's own axis is y of B: its top moves along +x of B.
+    built = Recorder()
+    add_robot(cast("Any", built), crossing_run.scenario)
+    X_BL = built.transforms["robot/left"][0][1]
+    axis = X_BL.rotation().matrix()[:, 2]
+    top = np.array([0.0, 0.0, 0.06])
+    assert np.cross(axis, top)[0] == pytest.approx(0.06)
+
+
+def test_the_page_is_whole_small_and_told_nobody(ideal_run, tmp_path, capfd):
+    path, logger = tmp_path / "replay.html", logging.getLogger("drake")
+    level = logger.level
+    write_replay(ideal_run, path)
+    assert capfd.readouterr() == ("", "")
+    assert logger.level == level
+    page = path.read_text()
+    assert "<title>default, law active: completed - replay</title>" in page
+    assert len(page) < 4e6
+    fetched = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=", page)
+    assert fetched == []
+
+
+def test_a_port_that_is_in_use_is_no_hindrance(ideal_run, tmp_path):
+    with socket.socket() as taken:
+        # Meshcat looks from 7000 on; where this fails, somebody else holds it.
+        with contextlib.suppress(OSError):
+            taken.bind(("localhost", 7000))
+            taken.listen()
+        write_replay(ideal_run, tmp_path / "replay.html")
+    assert (tmp_path / "replay.html").stat().st_size > 2e6
+
+
+def test_the_title_is_escaped(ideal_run, tmp_path):
+    scenario = ideal_run.scenario.model_copy(update={"name": "<b> & \\1"})
+    write_replay(replace(ideal_run, scenario=scenario), tmp_path / "replay.html")
+    page = (tmp_path / "replay.html").read_text()
+    assert "<title>&lt;b&gt; &amp; \\1, law active" in page
+
+
+def test_a_run_of_one_tick_has_a_replay(shortest_run):
+    recorder = Recorder()
+    record_run(cast("Any", recorder), shortest_run)
+    assert len(recorder.transforms["robot"]) == 1
+    assert recorder.meshes == {}

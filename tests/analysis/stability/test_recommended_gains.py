@@ -1,0 +1,94 @@
+"""Gains that meet thresholds, against closed forms and against the blocks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.stability.equilibria import follow_equilibrium
+from analysis.stability.open_loops import open_loop
+from analysis.stability.recommended_gains import (
+    GainThresholds,
+    attraction_loop,
+    gain_figures,
+    recommend_gains,
+)
+from diagrams import load_scenario
+
+ALONE = ["law=none", "obstacles=[]", "source.waypoints_m=[[2, 0]]"]
+
+
+@pytest.mark.parametrize(("at", "share"), [("actuator", 1e-4), ("sensor", 3e-3)])
+def test_loop_is_that_of_the_whole_diagram(at, share):
+    # AutoDiff of the built diagram, tracker and odometry included: what hearing says
+    # is placed by odometry, so that its tick delays nothing while the source rests.
+    # The diagram's integrator takes one third-order step a tick, ours is exact.
+    scenario = load_scenario("default", ALONE)
+    point = follow_equilibrium(scenario)
+    omega = np.geomspace(0.05, 2.5, 20)
+    whole = open_loop(point, at, "along").response(omega)[0, 0]
+    short = attraction_loop(scenario, at).response(omega)[0, 0]
+    np.testing.assert_allclose(short, whole, rtol=share)
+
+
+def test_loop_without_lag_is_the_closed_form():
+    # v+ = v + T a is held, so that p+ = p + T v+: the spring sees no delay,
+    # T^2 z/(z - 1)^2, and the damper half a tick of it, T/(z - 1).
+    fast = load_scenario(
+        "default", ["law=none", "plant.motor_lag_s=1e-5", "integrator.step_s=1e-5"]
+    )
+    omega, T = np.geomspace(0.05, 20.0, 20), 0.025
+    z = np.exp(1j * omega * T)
+    spring, damper = 2.0 / 3.94 * T * T * z / (z - 1.0) ** 2, T / 3.94 / (z - 1.0)
+    found = attraction_loop(fast, "actuator").response(omega)[0, 0]
+    np.testing.assert_allclose(found, spring + damper, rtol=1e-3)
+    inner = attraction_loop(fast, "sensor").response(omega)[0, 0]
+    np.testing.assert_allclose(inner, spring / (1.0 + damper), rtol=1e-3)
+
+
+def test_recommended_gains_meet_everything_and_less_damping_does_not():
+    scenario = load_scenario("default", ["law=conventional"])
+    found = recommend_gains(scenario, springs=(1.0, 2.0))
+    limits = GainThresholds()
+    for choice in found.choices:
+        figures = choice.figures
+        assert figures is not None
+        assert figures.damping_ratio >= limits.damping_ratio
+        assert figures.phase_margin_deg >= limits.phase_margin_deg
+        assert figures.sensitivity_peak <= limits.sensitivity_peak
+        assert figures.disk_margin >= limits.disk_margin
+        assert figures.contact_radius < 1.0
+        less = load_scenario(
+            "default",
+            [
+                "law=conventional",
+                f"attraction.stiffness_n_m={figures.stiffness_n_m}",
+                f"attraction.damping_n_s_m={0.95 * figures.damping_n_s_m}",
+            ],
+        )
+        below = gain_figures(less, limits)
+        assert (
+            below.damping_ratio < limits.damping_ratio
+            or below.phase_margin_deg < limits.phase_margin_deg
+            or below.sensitivity_peak > limits.sensitivity_peak
+            or below.disk_margin < limits.disk_margin
+        )
+    assert found.recommended == found.choices[0].figures
+    assert found.today.damping_ratio == pytest.approx(0.160, abs=1e-3)
+    # D_r v / K_r behind a source at 0.3 m/s.
+    assert found.today.following_lag_m == pytest.approx(0.15)
+
+
+def test_law_that_is_too_stiff_has_no_gains():
+    scenario = load_scenario(
+        "default", ["law=conventional", "repulsion.conventional.stiffness_n_m=5000"]
+    )
+    found = recommend_gains(scenario, springs=(1.0,))
+    assert found.choices[0].figures is None
+    assert found.recommended is None
+
+
+def test_no_spring_is_refused():
+    scenario = load_scenario("default", ["attraction.stiffness_n_m=0"])
+    with pytest.raises(ValueError, match=r"attraction.stiffness_n_m: .* set it above"):
+        recommend_gains(scenario)

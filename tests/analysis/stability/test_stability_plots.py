@@ -1,0 +1,115 @@
+"""Pictures of linear stability: drawn from data objects, with what they say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from analysis.stability import chart_plots, margin_plots, operating_point_plots
+from analysis.stability.burst_gaps import GapChart
+from analysis.stability.contact_mode import contact_limits
+from analysis.stability.delayed_run import check_delay_margin
+from analysis.stability.equilibria import find_equilibria, follow_equilibrium
+from analysis.stability.gang_of_four import gang_of_four
+from analysis.stability.loop_margins import all_margins
+from analysis.stability.root_locus import root_loci
+from analysis.stability.sampled_stability import gain_chart, poles_against_period
+from analysis.stability.step_response import check_step
+from diagrams.scenario import Scenario
+
+
+@pytest.fixture(scope="module")
+def scenario():
+    return Scenario(law="active")
+
+
+@pytest.fixture(scope="module")
+def point(scenario):
+    return follow_equilibrium(scenario)
+
+
+@pytest.fixture(scope="module")
+def loops(point):
+    return [found.margins for found in all_margins(point)]
+
+
+def drawn(figure: Figure) -> Figure:
+    figure.canvas.draw()
+    return figure
+
+
+def test_bode_nyquist_and_nichols_show_every_loop(loops):
+    names = [loop.name for loop in loops]
+    bode = drawn(margin_plots.plot_bode(loops))
+    assert bode.axes[0].get_legend_handles_labels()[1] == names
+    nyquist = drawn(margin_plots.plot_nyquist(loops))
+    assert [axes.get_title() for axes in nyquist.axes[: len(names)]] == names
+    nichols = drawn(margin_plots.plot_nichols(loops))
+    assert nichols.axes[0].get_legend_handles_labels()[1] == names
+
+
+def test_nyquist_curves_stay_out_of_the_disk(loops):
+    """The disk's ends on the real axis are the disk gain margins."""
+    for loop in loops:
+        low, high = margin_plots._disk_ends(loop.disk.alpha)
+        centre, radius = (low + high) / 2, (high - low) / 2
+        assert np.abs(loop.response.L - centre).min() >= radius * (1 - 1e-6)
+        if loop.disk.alpha < 2.0:
+            margin = 10 ** (loop.disk.gain_margin_db / 20)
+            assert min(-low, -1 / high) == pytest.approx(margin, rel=1e-6)
+
+
+def test_gang_of_four_has_four_panels(point):
+    assert len(drawn(margin_plots.plot_gang_of_four(gang_of_four(point))).axes) == 4
+
+
+def test_charts_mark_todays_design(scenario):
+    chart = gain_chart(
+        scenario, stiffnesses_n_m=[1.0, 2.0, 30.0], dampings_n_s_m=[0.5, 1.0, 2.0]
+    )
+    texts = drawn(chart_plots.plot_chart(chart)).axes[0].texts
+    assert [text.get_text() for text in texts] == ["today"]
+    limits = drawn(chart_plots.plot_contact_limits(contact_limits(scenario)))
+    assert len(limits.axes) == 2
+    periods = poles_against_period(scenario, periods_s=[0.01, 0.025, 0.5])
+    assert drawn(chart_plots.plot_poles_against_period(periods))
+
+
+def test_gap_chart_has_a_line_for_each_hold():
+    chart = GapChart(
+        on_s=0.5,
+        gaps_s=np.array([0.0, 1.5, 3.0]),
+        holds=("world", "robot"),
+        multiplier=np.array([[0.9, 0.8, 0.7], [0.9, 1.02, 1.5]]),
+        today=(1.5, "world"),
+    )
+    figure = drawn(chart_plots.plot_gap_chart(chart))
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == ["hold: world", "hold: robot", "today"]
+
+
+def test_root_loci_have_a_panel_each(scenario):
+    loci = root_loci(scenario)
+    figure = drawn(chart_plots.plot_root_loci(loci))
+    titles = [axes.get_title() for axes in figure.axes[: len(loci)]]
+    assert titles == [f"{locus.parameter}\n({locus.loop})" for locus in loci]
+
+
+def test_delay_check_shows_both_runs(point):
+    check = check_delay_margin(point, "wheels", duration_s=20.0)
+    figure = drawn(chart_plots.plot_delay_check(check))
+    assert [axes.get_title()[:4] for axes in figure.axes] == ["0.95", "1.05"]
+
+
+def test_equilibria_are_all_in_the_picture(scenario):
+    search = find_equilibria(scenario)
+    axes = drawn(operating_point_plots.plot_equilibria(search)).axes[0]
+    places = {tuple(np.asarray(line.get_xydata())[0]) for line in axes.lines}
+    for found in search.points:
+        assert tuple(found.p_WP) in places
+
+
+def test_step_shows_the_ideal_run(scenario):
+    figure = drawn(operating_point_plots.plot_step(check_step(scenario)))
+    assert figure.axes[0].get_legend_handles_labels()[1] == ["all ideal"]

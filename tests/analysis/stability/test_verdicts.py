@@ -1,0 +1,52 @@
+"""Numbers against thresholds."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from analysis.stability.verdicts import Criterion, compare_verdicts, judge
+
+MARGIN = Criterion(
+    "phase margin", "deg", "at least", 45.0, "robust", "fragile", "textbook"
+)
+
+
+@pytest.mark.parametrize(
+    ("sense", "below", "at", "above"),
+    [
+        ("at least", False, True, True),
+        ("above", False, False, True),
+        ("at most", True, True, False),
+        ("below", True, False, False),
+    ],
+)
+def test_limits_are_met_from_the_right_side(sense, below, at, above):
+    criterion = Criterion("x", "", sense, 1.0, "good", "bad", "test")
+    met = [criterion.met_by(value) for value in (0.9, 1.0, 1.1)]
+    assert met == [below, at, above]
+
+
+def test_verdicts_say_what_follows():
+    assert judge(MARGIN, 60.0).text == "robust"
+    assert judge(MARGIN, 20.2).verdict == "fail"
+    assert judge(MARGIN, math.inf).verdict == "pass"
+    missing = judge(MARGIN, None, "there is no loop")
+    assert (missing.verdict, missing.text) == ("not applicable", "there is no loop")
+    assert MARGIN.threshold == "\u2265 45 deg"
+
+
+def test_laws_of_one_verdict_stand_together():
+    rows = compare_verdicts(
+        {
+            "a": [judge(MARGIN, 20.0)],
+            "b": [judge(MARGIN, 50.0)],
+            "c": [judge(MARGIN, 30.0)],
+        }
+    )
+    assert len(rows) == 1
+    assert rows[0].text == "a and c: fragile. b: robust."
+    assert rows[0].verdicts == {"a": "fail", "b": "pass", "c": "fail"}
+    same = compare_verdicts({law: [judge(MARGIN, 20.0)] for law in "abc"})
+    assert same[0].text == "All: fragile."
