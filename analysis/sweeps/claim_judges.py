@@ -70,6 +70,13 @@ def _shift(median: dict[str, Any], unit: str) -> str:
     )
 
 
+def _both(median: dict[str, Any], name: str, unit: str) -> str:
+    return (
+        f"{name} {median['first']:.2f} {unit} (conventional) and "
+        f"{median['second']:.2f} {unit} (active); {_shift(median, unit)}"
+    )
+
+
 def _sign(interval: dict[str, Any]) -> int:
     """+1 or -1 where the whole interval lies on that side of zero, else 0."""
     return int(interval["low"] > 0.0) - int(interval["high"] < 0.0)
@@ -132,15 +139,15 @@ def avoids_more(scenario: str, law: str) -> Judge:
 
 
 def smoother(scenario: str) -> Judge:
-    """Active has less jerk and more SPARC where both succeed."""
+    """Active has less jerk and more SPARC where both push and succeed."""
 
     def judge(summary: dict[str, Any]) -> tuple[str, str]:
-        metrics = _pair(summary, scenario, "conventional", "active")["metrics"]
+        metrics = _pair(summary, scenario, "conventional", "active")["encounters"]
         jerk, sparc = metrics.get("jerk_rms_m_s3"), metrics.get("sparc")
         if jerk is None or sparc is None:
-            return "no layout on which both succeed", "not shown"
+            return "no layout on which both push and succeed", "not shown"
         figure = (
-            f"conventional less active: rms jerk {_shift(jerk, 'm/s^3')}; SPARC "
+            f"{_both(jerk, 'rms jerk', 'm/s^3')}; SPARC "
             f"{sparc['difference']:+.3f} ({sparc['low']:+.3f}, {sparc['high']:+.3f})"
         )
         signs = {_sign(jerk), -_sign(sparc)}
@@ -157,10 +164,7 @@ def earlier(summary: dict[str, Any]) -> tuple[str, str]:
     median = _pair(summary, STATIC, "conventional", "active")["metrics"][
         "reaction_distance_m"
     ]
-    figure = (
-        f"first push of 0.5 N at {median['first']:.2f} m (conventional) and "
-        f"{median['second']:.2f} m (active); {_shift(median, 'm')}"
-    )
+    figure = _both(median, "first push of 0.5 N at", "m")
     return figure, _verdict(_sign(median), wanted=-1)
 
 
@@ -185,11 +189,11 @@ def jams(summary: dict[str, Any]) -> tuple[str, str]:
 
 def vibrates(summary: dict[str, Any]) -> tuple[str, str]:
     """Conventional moves less smoothly than active past a moving obstacle."""
-    metrics = _pair(summary, ONE, "conventional", "active")["metrics"]
+    metrics = _pair(summary, ONE, "conventional", "active")["encounters"]
     jerk, turns = metrics["jerk_rms_m_s3"], metrics["turn_reversals_per_s"]
     figure = (
-        f"conventional less active, both succeeding: rms jerk {_shift(jerk, 'm/s^3')}; "
-        f"reversals of turning {_shift(turns, '1/s')}"
+        f"{_both(jerk, 'rms jerk', 'm/s^3')}; reversals of turning "
+        f"{turns['difference']:+.3f} 1/s ({turns['low']:+.3f}, {turns['high']:+.3f})"
     )
     signs = {_sign(jerk), _sign(turns)} - {0}
     sign = signs.pop() if len(signs) == 1 else 0

@@ -11,7 +11,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
+import numpy as np
 import pandas as pd
+from numpy.typing import NDArray
 
 from analysis.runs.run_table import (
     ALL_RUNS,
@@ -47,6 +49,9 @@ class Pair:
     success: PairedRate
     collision: PairedRate
     metrics: dict[str, PairedMedian]
+    encounters: dict[str, PairedMedian]
+    """Those of successful runs, of layouts on which both laws pushed back from an
+    obstacle: elsewhere nothing tells the laws apart but the source's own body."""
 
 
 @dataclass(frozen=True)
@@ -130,14 +135,8 @@ def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
 def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
     first, second = runs.first_rows, runs.second_rows
     both = successes(first) & successes(second)
-    metrics = {}
-    for name in (*ALL_RUNS, *SUCCESSES):
-        one, other = figure(first, name), figure(second, name)
-        if name in SUCCESSES:
-            one, other = one[both], other[both]
-        median = paired_median(one, other, seed=stream(seed, name))
-        if median.pairs:
-            metrics[name] = median
+    met = both & _pushed(first) & _pushed(second)
+    everywhere = np.ones(len(first), dtype=bool)
     return Pair(
         scenario=scenario,
         field=runs.field,
@@ -146,5 +145,33 @@ def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
         fields=runs.fields,
         success=paired_rate(successes(first), successes(second)),
         collision=paired_rate(collisions(first), collisions(second)),
-        metrics=metrics,
+        metrics={
+            **_medians(first, second, ALL_RUNS, everywhere, seed),
+            **_medians(first, second, SUCCESSES, both, seed),
+        },
+        encounters=_medians(first, second, SUCCESSES, met, seed),
     )
+
+
+def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """(n,) whether the law pushed back from an obstacle at all."""
+    return np.isfinite(figure(rows, "reaction_distance_m"))
+
+
+def _medians(
+    first: pd.DataFrame,
+    second: pd.DataFrame,
+    names: Sequence[str],
+    chosen: NDArray[np.bool_],
+    seed: int,
+) -> dict[str, PairedMedian]:
+    """Figures of the chosen pairs; those that no pair has are left out."""
+    medians = {
+        name: paired_median(
+            figure(first, name)[chosen],
+            figure(second, name)[chosen],
+            seed=stream(seed, name),
+        )
+        for name in names
+    }
+    return {name: median for name, median in medians.items() if median.pairs}

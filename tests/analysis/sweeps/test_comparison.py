@@ -146,3 +146,19 @@ def test_pairs_differ_in_one_field_alone():
         ("law", "none", "active", {"hearing": "ideal"}),
         ("hearing", "audio", "ideal", {"law": "active"}),
     ]
+
+
+def test_encounters_are_of_layouts_on_which_both_pushed():
+    """Both succeed on layouts 2 and 3 of these; only on 3 do both push."""
+    rows = table()
+    rows.loc[rows["run"] >= 2, "cause"] = "reached"
+    rows["reaction_distance_m"] = [
+        1.0 if (run, cell) in {(2, 0), (3, 0), (3, 1)} else math.nan
+        for run, cell in zip(rows["run"], rows["cell"], strict=True)
+    ]
+    plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
+    (pair,) = compare_runs(plan, rows, "here").pairs
+    assert pair.metrics["jerk_rms_m_s3"].pairs == 3
+    assert pair.encounters["jerk_rms_m_s3"].pairs == 1
+    assert pair.encounters["jerk_rms_m_s3"].first == 1.0 + 3
+    assert "minimum_clearance_m" not in pair.encounters
