@@ -17,7 +17,6 @@ from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
     "Reading",
-    "read_barrier",
     "read_contact",
     "read_cycle",
     "read_damping",
@@ -28,6 +27,7 @@ __all__ = [
     "read_passive",
     "read_prediction",
     "read_routes",
+    "read_start",
     "read_trials",
     "read_worst_case",
     "read_worst_margin",
@@ -134,13 +134,12 @@ def read_passive(study: Study) -> Reading:
     return float(share)
 
 
-def read_barrier(study: Study) -> Reading:
-    """Least energy at contact over kinetic energy at top speed."""
+def read_start(study: Study) -> Reading:
+    """1 where no path that the energy allows leads from the start to contact."""
     data = study.found.get("certificates")
     if not data:
         return "there is no energy certificate"
-    certificate = data[0].certificate
-    return certificate.contact_energy_j / certificate.model.top_kinetic_energy_j
+    return float(data[0].certificate.start_certified)
 
 
 def read_trials(study: Study) -> Reading:
