@@ -274,7 +274,7 @@ class CellSearch:
         angles = np.arctan2(forces[..., 1], forces[..., 0])
         steps = np.angle(np.exp(1j * (np.roll(angles, -1, axis=1) - angles)))
         nearest = self._vectors(corners)[1].argmin(axis=0).reshape(-1, 4)
-        switches = (nearest != nearest[:, :1]).any(axis=1) & ~self._all_bodies
+        switches = (nearest != nearest[:, :1]).any(axis=1) & (not self._all_bodies)
         return Leftover(
             centres=centres,
             strengths=np.linalg.norm(self.forces(centres), axis=1),

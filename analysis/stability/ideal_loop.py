@@ -113,16 +113,18 @@ class IdealLoop:
             return
         block = self.block("controller", twin=True)
         context = block.CreateDefaultContext()
-        for name, value in (
-            ("p_WS_estimated", [2.0, 0.0]),
-            ("target_valid", [1.0]),
-            ("collision_vectors_B", [0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),
-            ("features", [1.0, 0.0, 0.0]),
-            ("pose_WB_estimated", [0.0, 0.0, 0.0]),
-            ("v_WP", [0.0, 0.0]),
-        ):
-            port = block.GetInputPort(name)
-            port.FixValue(context, seed(value))
+        inputs = {
+            "p_WS_estimated": [2.0, 0.0],
+            "target_valid": [1.0],
+            "collision_vectors_B": [0.5, 0.0, 0.0, 0.0, 0.0, 0.0],
+            "features": [1.0, 0.0, 0.0],
+            "pose_WB_estimated": [0.0, 0.0, 0.0],
+            "v_WP": [0.0, 0.0],
+        }
+        variables = seed(np.concatenate(list(inputs.values())))
+        ends = np.cumsum([len(value) for value in inputs.values()])
+        for name, part in zip(inputs, np.split(variables, ends[:-1]), strict=True):
+            block.GetInputPort(name).FixValue(context, part)
         try:
             block.GetOutputPort("acceleration_W").Eval(context)
         except Exception as error:  # whatever a user's function raises
