@@ -154,6 +154,28 @@ def test_scatter_is_at_the_cramer_rao_bound():
     assert correlation == pytest.approx(0.5, abs=0.05)
 
 
+def test_errors_of_channels_with_unequal_noise_are_their_own():
+    """The noise of one channel against the signal of the next, by hand and by trial.
+
+    var of t_k - t_0 is the sum of what channels 0 and k add, and their covariance
+    what channel 0 adds. At high SNR a channel adds in proportion to its noise.
+    """
+    levels = np.array([0.05, 0.1, 0.2])
+    rows = shifted(band_noise(5000, 500.0, 8_000.0, seed=3), [0.0, 20.4, 33.9])
+    errors, stated = [], []
+    for seed in range(150):
+        noise = Generator(Philox(key=seed)).standard_normal(rows.shape)
+        found = measured((rows + rows.std() * levels[:, None] * noise).astype("f4"))
+        errors.append((found.tau[0] - 20.4 / FS, found.tau[1] - 33.9 / FS))
+        stated.append(found.covariance)
+    mean = np.mean(stated, axis=0)
+    scatter = np.sqrt(np.mean(np.square(errors), axis=0))
+    np.testing.assert_allclose(np.sqrt(np.diag(mean)), scatter, rtol=0.25)
+    # All pairs joined, each channel's part is the mean over its two neighbours.
+    share = mean[0, 1] / (mean[1, 1] - mean[0, 1])
+    assert share == pytest.approx((levels[0] / levels[2]) ** 2, rel=0.3)
+
+
 @pytest.mark.parametrize(
     ("settings", "complaint"),
     [

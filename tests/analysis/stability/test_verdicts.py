@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import pytest
 
+from analysis.stability.energy_certificate import certify_energy
+from analysis.stability.stability import Study
+from analysis.stability.verdict_readings import read_start
 from analysis.stability.verdicts import Criterion, compare_verdicts, judge
 
 MARGIN = Criterion(
@@ -50,3 +54,14 @@ def test_laws_of_one_verdict_stand_together():
     assert rows[0].verdicts == {"a": "fail", "b": "pass", "c": "fail"}
     same = compare_verdicts({law: [judge(MARGIN, 20.0)] for law in "abc"})
     assert same[0].text == "All: fragile."
+
+
+@pytest.mark.parametrize(("spring_n_m", "certified"), [(0.01, 0.0), (1000.0, 1.0)])
+def test_a_start_is_certified_by_the_spring_before_it(two_boxes, spring_n_m, certified):
+    """A box stands on the way down to the source; 1000 N/m hold 320 J, 0.01 nothing."""
+    stiffness = f"repulsion.conventional.stiffness_n_m={spring_n_m}"
+    damping = "repulsion.conventional.damping_n_s_m=0.001"
+    scenario = two_boxes("conventional", stiffness, damping)
+    certificate = certify_energy(scenario, cell_m=0.02)
+    found = {"certificates": [SimpleNamespace(certificate=certificate)]}
+    assert read_start(Study(scenario, found)) == certified
