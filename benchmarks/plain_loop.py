@@ -84,7 +84,8 @@ class PlainLoop:
         fix: SourceFix | None = None
         before: dict[int, list[float]] = {}
         x, y, _ = self.path.pose(0.0)
-        history = np.tile([x, y, 0.0, 0.0], (self.ticks + 1, 1))
+        history = np.zeros((2, self.ticks + 1, 2))
+        history[0] = x, y
         last = (np.array(state[:3]), np.zeros(3))
         states = [state]
         for tick in range(round(scenario.duration_s / T)):
@@ -160,12 +161,12 @@ class PlainLoop:
         scenario = self.scenario
         x, y, _ = self.path.pose(time)
         vx, vy, _ = self.path.velocity(time)
-        history[-1] = x, y, vx, vy
+        history[0, -1], history[1, -1] = (x, y), (vx, vy)
         v, omega = body_twist(state[5:], scenario.robot)
         theta = state[2]
         velocity = np.array([v * np.cos(theta), v * np.sin(theta), omega])
         now = (np.array(state[:3]), velocity)
-        emission = make_emission(time, self.waveform, scenario.sound, history.copy())
+        emission = make_emission(time, self.waveform, scenario.sound, *history.copy())
         audio = record_frame(
             [emission],
             time,
@@ -175,7 +176,7 @@ class PlainLoop:
             parameters=scenario.microphones,
             seed=self.mic_seed,
         )
-        history[:-1] = history[1:]
+        history[:, :-1] = history[:, 1:]
         frame = audio.counts.astype(np.float32)
         fix, self.memory = self.localiser.localise(frame, self.memory)
         return fix, now

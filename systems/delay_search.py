@@ -15,11 +15,18 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
+from scipy.optimize import brentq
 
 from systems.delay_peaks import whitening
 from systems.delay_plan import DelayPlan
 
-__all__ = ["DelaySearch", "amdf", "search_delays"]
+__all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
+
+# Largest coherence: there is always some noise.
+_WHOLE = 0.99
+
+# Nothing is as high above noise as so many standard deviations.
+_HIGHEST = 38.0
 
 
 @dataclass(frozen=True)
@@ -158,7 +165,7 @@ def _chance_of_noise(
     log_product, weakest = 0.0, 0.0
     for z, count in zip(heights.tolist(), counts.tolist(), strict=True):
         below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(
-            -count * math.exp(-0.5 * z * z) if z < 38.0 else 0.0
+            -count * math.exp(-0.5 * z * z) if z < _HIGHEST else 0.0
         )
         log_product += math.log(max(1.0 - below, 1e-300))
         weakest = max(weakest, 1.0 - below)
@@ -168,6 +175,31 @@ def _chance_of_noise(
         total += term
         term *= -log_product / (k + 1)
     return min(math.exp(log_product) * total, 1.0), weakest
+
+
+def weakest_sound(plan: DelayPlan, rate: float) -> float:
+    """Level of the weakest sound that is not taken for noise.
+
+    For a given energy, no sound correlates higher above the noise than one with
+    the noise's own spectrum (Cauchy-Schwarz), so that this holds for every sound.
+
+    Args:
+        plan: Rates, band and array.
+        rate: Probability below which noise does not explain a correlation.
+
+    Returns:
+        Energy of the sound over that of the noise, within the band.
+    """
+    bins = np.arange(plan.band.start, plan.band.stop)
+    counts = 2.0 * plan.gates / plan.grid * math.sqrt(np.mean(bins**2.0))
+
+    def excess(z: float) -> float:
+        return _chance_of_noise(np.full(len(counts), z), counts)[0] - rate
+
+    z = brentq(excess, 0.0, _HIGHEST) if excess(0.0) > 0.0 else 0.0
+    independent = 2.0 * len(bins) * plan.frame_samples / plan.length
+    coherence = min(z / math.sqrt(independent), _WHOLE)
+    return coherence / (1.0 - coherence)
 
 
 def _correlation_search(

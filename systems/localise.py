@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from systems.array_shape import ArrayShape
 from systems.coherent import arrival_delays, refine_source
 from systems.delay_plan import DelayPlan
-from systems.delay_search import DelaySearch
+from systems.delay_search import DelaySearch, weakest_sound
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
 from systems.frame_energy import frame_energy
@@ -49,6 +49,10 @@ _ECHO_AMBIGUITY = 0.7
 # In the first frame of a sound it may not have reached all channels: noise alone
 # would seem to be heard there with more than this probability.
 _SHARED_CHANCE = 1e-3
+
+# Of the frames that hold the weakest sound that can be heard so many are quieter
+# than expected by this many standard deviations: 1 %.
+_QUIET = 2.33
 
 # A sound begins within a frame whose energy is spread over less than this share
 # of it.
@@ -128,6 +132,13 @@ class Localiser:
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
+        channels = plan.shape.count
+        self._scatter = _QUIET * math.sqrt(2.0 / (channels * plan.frame_samples))
+        # A band that is found may be as narrow as it likes.
+        self._rise = 0.0
+        if parameters.band == "set":
+            rate = parameters.false_alarm_rate
+            self._rise = 2.0 * channels * weakest_sound(plan, rate)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -167,7 +178,7 @@ class Localiser:
             ValueError: The frame is no frame of this array, or not finite.
         """
         energy = self._checked_energy(frame)
-        if energy <= memory.energy:  # no louder than the noise
+        if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
         seen = look(
             frame,
@@ -187,6 +198,11 @@ class Localiser:
             return self._fix(frame, self._delays(frame, seen)), after
         begins = not memory.heard and energy_spread(frame) < _WHOLE_FRAME
         return self._locate(frame, seen, after, begins=begins)
+
+    def _quietest(self, memory: HearingMemory) -> float:
+        """Energy that 99 of 100 frames reach that hold a sound above the noise."""
+        noise = (1.0 - self._scatter) * memory.energy
+        return noise + self._rise * memory.noise_energy
 
     def _locate(
         self,

@@ -67,7 +67,8 @@ def make_emission(
     time: float,
     waveform: NDArray[np.float32],
     sound: SoundParameters,
-    path: NDArray[np.float64],
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
 ) -> Emission:
     """What has left the loudspeaker up to a time.
 
@@ -75,10 +76,10 @@ def make_emission(
         time: Now, a multiple of 10 us, s.
         waveform: Bursts end to end, from ``make_waveform``.
         sound: The gate.
-        path: (k, 4) x, y, vx, vy of the source in W at the last k ticks, the
-            last one now; m and m/s.
+        p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
+        v_WS: (k, 2) its velocity, m/s.
     """
-    ages = _tick_ages(len(path))
+    ages = _tick_ages(len(p_WS))
     count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
@@ -87,8 +88,8 @@ def make_emission(
         start_time=first / SAMPLE_RATE_HZ,
         sample_rate_hz=float(SAMPLE_RATE_HZ),
         knot_times=time - ages,
-        p_WS=np.ascontiguousarray(path[:, :2]),
-        v_WS=np.ascontiguousarray(path[:, 2:]),
+        p_WS=p_WS,
+        v_WS=v_WS,
         level_pa=sound.level_pa,
         sounding=samples is not None,
     )
@@ -175,21 +176,20 @@ class SoundEmitter(LeafSystem):
         )
 
     def _start(self, context, discrete_state) -> None:
-        at_rest = [*np.asarray(self._pose_WS.Eval(context))[:2], 0.0, 0.0]
-        discrete_state.set_value(np.tile(at_rest, self._ticks))
+        path = np.zeros((2, self._ticks, 2))
+        path[0] = self._pose_WS.Eval(context)[:2]
+        discrete_state.set_value(path.ravel())
 
     def _remember(self, context, discrete_state):
         emission = self._emission.Eval(context)
-        path = np.empty((self._ticks, 4))
-        path[:, :2] = emission.p_WS[1:]
-        path[:, 2:] = emission.v_WS[1:]
+        path = np.concatenate((emission.p_WS[1:], emission.v_WS[1:]))
         discrete_state.set_value(path.ravel())
 
     def _emit(self, context, output):
-        path = np.empty((self._ticks + 1, 4))
-        held = context.get_discrete_state(0).CopyToVector()
-        path[:-1] = held.reshape(self._ticks, 4)
-        path[-1, :2] = self._pose_WS.Eval(context)[:2]
-        path[-1, 2:] = self._v_WS.Eval(context)[:2]
+        held = context.get_discrete_state(0).value().reshape(2, self._ticks, 2)
+        path = np.empty((2, self._ticks + 1, 2))
+        path[:, :-1] = held
+        path[0, -1] = self._pose_WS.Eval(context)[:2]
+        path[1, -1] = self._v_WS.Eval(context)[:2]
         time = context.get_time()
-        output.set_value(make_emission(time, self._waveform, self._sound, path))
+        output.set_value(make_emission(time, self._waveform, self._sound, *path))

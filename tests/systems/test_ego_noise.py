@@ -117,8 +117,8 @@ def test_microphones_hear_it_beside_the_converters_noise(tmp_path):
         counts = []
         for tick in range(8, 48):
             time = tick * FRAME_PERIOD_S
-            path = np.tile([2.0, 0.0, 0.0, 0.0], (6, 1))
-            sent = make_emission(time, make_waveform(sound), sound, path)
+            p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
+            sent = make_emission(time, make_waveform(sound), sound, p_WS, v_WS)
             context = block.CreateDefaultContext()
             context.SetTime(time)
             block.GetInputPort("emission").FixValue(context, Value(sent))
