@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
+
+from systems.propagation import REORDER
+from systems.transforms import filled_rows
 
 __all__ = [
     "EDGE_SAMPLES",
@@ -41,16 +45,6 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
     return 1.0 / (size + floor + np.finfo(np.float32).tiny)
 
 
-def _ramp(rests: NDArray[np.float64]) -> NDArray[np.float32]:
-    """(n, EDGE_SAMPLES) rising edges that begin late by some part of a sample."""
-    place = np.arange(EDGE_SAMPLES) + 0.5 - rests[:, np.newaxis]
-    share = np.clip(place / EDGE_SAMPLES, 0.0, 1.0)
-    return (0.5 - 0.5 * np.cos(np.pi * share)).astype(np.float32)
-
-
-_EVEN_RAMPS = _ramp(np.zeros(1)), _ramp(np.zeros(1))
-
-
 def cut_to_overlap(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
@@ -61,27 +55,33 @@ def cut_to_overlap(
         arrivals: (n,) arrival at each channel after channel 0, samples. Channels
             are cut at whole samples; their edges follow what is left of it.
     """
-    whole = np.rint(arrivals)
-    rests = arrivals - whole
-    starts = (whole - whole.min()).astype(np.int64)
-    rising, falling = (_ramp(rests), _ramp(-rests)) if rests.any() else _EVEN_RAMPS
-    return _cut(frame, starts, rising, falling)
+    cut, length = _cut(frame, arrivals, *frame.shape)
+    return np.ascontiguousarray(cut[:, :length])
 
 
 @njit(cache=True)
-def _cut(frame, starts, rising, falling):  # pragma: no cover  (compiled)
-    """``cut_to_overlap`` from starts, and edges that are alike or one a channel."""
+def _cut(frame, arrivals, rows, columns):  # pragma: no cover  (compiled)
+    """``cut_to_overlap``, with zeros after and below, and its length."""
     channels, samples = frame.shape
-    length = samples - starts.max()
-    cut = np.empty((channels, length), dtype=frame.dtype)
-    edge = rising.shape[1] if length >= 2 * rising.shape[1] else 0
+    whole = np.rint(arrivals)
+    earliest = whole.min()
+    length = samples - int(whole.max() - earliest)
+    cut = np.zeros((rows, columns), dtype=frame.dtype)
+    edge = EDGE_SAMPLES if length >= 2 * EDGE_SAMPLES else 0
     for m in range(channels):
-        ramp = m if rising.shape[0] > 1 else 0
-        cut[m] = frame[m, starts[m] : starts[m] + length]
+        start, late = int(whole[m] - earliest), arrivals[m] - whole[m]
+        cut[m, :length] = frame[m, start : start + length]
         for k in range(edge):
-            cut[m, k] *= rising[ramp, k]
-            cut[m, length - 1 - k] *= falling[ramp, k]
-    return cut
+            cut[m, k] *= _ramp(k - late)
+            cut[m, length - 1 - k] *= _ramp(k + late)
+    return cut, length
+
+
+@njit(cache=True)
+def _ramp(k):  # pragma: no cover  (compiled)
+    """A raised cosine's sample of number k, which need not be whole."""
+    share = min(max((k + 0.5) / EDGE_SAMPLES, 0.0), 1.0)
+    return np.float32(0.5 - 0.5 * math.cos(math.pi * share))
 
 
 @njit(cache=True)
@@ -99,6 +99,55 @@ def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
         for k in range(bins):
             cross[p, k] = spectra[i, k].conjugate() * spectra[j, k]
     return cross, energy
+
+
+@njit(cache=True, fastmath=REORDER)
+def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compiled)
+    """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
+
+    The turns come from a few cosines by doubling: the rest is sums and products.
+    """
+    bins = cross.size
+    cosine, sine = np.empty(bins), np.empty(bins)
+    cosine[0], sine[0] = math.cos(first * t), math.sin(first * t)
+    done = 1
+    while done < bins:
+        c, s = math.cos(step * t * done), math.sin(step * t * done)
+        for k in range(min(done, bins - done)):
+            cosine[done + k] = cosine[k] * c - sine[k] * s
+            sine[done + k] = sine[k] * c + cosine[k] * s
+        done *= 2
+    for k in range(bins):
+        x, y = np.float64(cross[k].real), np.float64(cross[k].imag)
+        real[k] = x * cosine[k] - y * sine[k]
+        imaginary[k] = x * sine[k] + y * cosine[k]
+
+
+@njit(cache=True, fastmath=REORDER)
+def _slope_and_curve(
+    real, imaginary, weights, first, step
+):  # pragma: no cover  (compiled)
+    """Derivatives of a correlation: sums of -w W Im(z) and of w^2 W Re(z)."""
+    slope, curve = 0.0, 0.0
+    for k in range(real.size):
+        w = first + k * step
+        slope -= w * weights[k] * imaginary[k]
+        curve += w * w * weights[k] * real[k]
+    return slope, curve
+
+
+@njit(cache=True, fastmath=REORDER)
+def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled)
+    """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
+    plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(real.size):
+        w, weight = first + k * step, np.float64(weights[k])
+        plain += real[k]
+        aligned += weight * real[k]
+        total += weight * math.sqrt(real[k] * real[k] + imaginary[k] * imaginary[k])
+        squares += (w * weight) ** 2 * real[k]
+        noise += (w * weight) ** 2
+    return plain, aligned, total, squares, noise
 
 
 @njit(cache=True)
@@ -119,40 +168,26 @@ def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (c
         and sums (p, 3) of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
     """
     pairs, bins = cross.shape
-    tau = np.zeros(pairs)
-    plain = np.zeros(pairs)
-    agreement = np.zeros(pairs)
-    sums = np.zeros((pairs, 3))
+    tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
+    sums = np.empty((pairs, 3))
+    real, imaginary = np.empty(bins), np.empty(bins)
     for p in range(pairs):
         t = start[p]
         for _ in range(_ITERATIONS):
-            slope, aligned, total = 0.0, 0.0, 0.0
-            plain[p] = 0.0
-            sums[p] = 0.0
-            turn = complex(math.cos(first * t), math.sin(first * t))
-            advance = complex(math.cos(step * t), math.sin(step * t))
-            w = first
-            for k in range(bins):
-                z = cross[p, k] * turn
-                weight = weights[p, k]
-                slope -= w * weight * z.imag
-                plain[p] += z.real
-                aligned += weight * z.real
-                total += weight * math.sqrt(z.real * z.real + z.imag * z.imag)
-                sums[p, 0] += w * w * weight * z.real
-                sums[p, 1] += w * w * weight * weight * z.real
-                sums[p, 2] += w * w * weight * weight
-                turn *= advance
-                w += step
             tau[p] = t
-            agreement[p] = aligned / max(total, 1e-300)
-            curve = sums[p, 0]
+            _turned(cross[p], first, step, t, real, imaginary)
+            slope, curve = _slope_and_curve(real, imaginary, weights[p], first, step)
             if not newton or curve <= 0.0:
                 break
             move = min(max(slope / curve, -0.5), 0.5)
             if abs(move) < _TOLERANCE:
                 break
             t += move
+        plain[p], aligned, total, squares, noise = _sums(
+            real, imaginary, weights[p], first, step
+        )
+        agreement[p] = aligned / max(total, 1e-300)
+        sums[p] = curve, squares, noise
     return tau, plain, agreement, sums
 
 
@@ -183,14 +218,10 @@ class PairTables:
         )
 
 
+@njit(cache=True)
 def arrival_variances(
-    r: NDArray[np.float64],
-    sums: NDArray[np.float64],
-    energy: NDArray[np.float64],
-    tables: PairTables,
-    bins: int,
-    padding: float,
-) -> NDArray[np.float64]:
+    r, sums, energy, pairs, to_shares, bins, padding
+):  # pragma: no cover  (compiled)
     """(n,) of each channel's time of arrival, samples^2.
 
     With noise of power n a bin and signal of power s, a correlation's peak moves
@@ -198,37 +229,105 @@ def arrival_variances(
     sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2: for equal
     weights and much signal that is the bound of Knapp and Carter (1976).
     """
-    shares = np.exp(tables.to_shares @ np.log(np.clip(r, 1e-3, 1.0)))
-    return padding * _arrival_variances(shares, sums, energy, tables.pairs, bins)
-
-
-@njit(cache=True)
-def _arrival_variances(
-    shares, sums, energy, pairs, bins
-):  # pragma: no cover  (compiled)
     channels = energy.size
     n, s = np.empty(channels), np.empty(channels)
     for m in range(channels):
-        q = min(max(shares[m], 1e-3), 1.0 - 1e-9)
+        exponent = 0.0
+        for p in range(len(pairs)):
+            exponent += to_shares[m, p] * math.log(min(max(r[p], 1e-3), 1.0))
+        q = min(max(math.exp(exponent), 1e-3), 1.0 - 1e-9)
         n[m], s[m] = (1.0 - q) * energy[m] / bins, q * energy[m]
     parts = np.zeros(channels)
     for p in range(len(pairs)):
         i, j = pairs[p]
         curve, squares, noise = sums[p]
-        scale = 1.0 / (2.0 * curve * curve)
+        scale = padding / (2.0 * curve * curve * (channels - 1))
         cross = 0.5 * n[i] * n[j] * noise
         # Each channel's part: noise of one against the signal of the other.
         parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)
         parts[j] += scale * (n[j] * squares * math.sqrt(s[i] / s[j]) + cross)
-    return parts / (channels - 1)
+    return parts
 
 
-@dataclass(frozen=True)
-class Peaks:
+@njit(cache=True)
+def _reconcile(
+    tau, arrivals, pairs, to_delays, reconciled
+):  # pragma: no cover  (compiled)
+    """Fills in the arrivals that fit all delays best.
+
+    Returns:
+        How far they are from the given ones at most, and each delay from them.
+    """
+    moved, closure = 0.0, 0.0
+    reconciled[0] = 0.0
+    for m in range(1, reconciled.size):
+        reconciled[m] = 0.0
+        for p in range(tau.size):
+            reconciled[m] += to_delays[m - 1, p] * tau[p]
+        moved = max(moved, abs(reconciled[m] - arrivals[m]))
+    for p in range(tau.size):
+        i, j = pairs[p]
+        closure = max(closure, abs(tau[p] - (reconciled[j] - reconciled[i])))
+    return moved, closure
+
+
+@njit(cache=True)
+def _measure(
+    cross,
+    energy,
+    weights,
+    arrivals,
+    pairs,
+    to_delays,
+    to_shares,
+    first,
+    length,
+    cut_samples,
+    newton,
+):  # pragma: no cover  (compiled)
+    """Fields of ``Peaks``; a correlation of 0 where there is no peak."""
+    step = 2.0 * math.pi / length
+    whole = np.rint(arrivals)
+    start = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        start[p] = (arrivals[j] - whole[j]) - (arrivals[i] - whole[i])
+    tau, plain, agreement, sums = _refine(
+        cross, weights, first * step, step, start, newton
+    )
+    reconciled, variances = np.empty(len(energy)), np.empty(len(energy))
+    r = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        tau[p] += whole[j] - whole[i]
+        r[p] = plain[p] / math.sqrt(energy[i] * energy[j])
+    correlation, angular_frequency, noise_energy = 0.0, 0.0, 0.0
+    moved, closure = _reconcile(tau, arrivals, pairs, to_delays, reconciled)
+    if r.min() > 0.0 and sums[:, 0].min() > 0.0:
+        # The soft edges cost energy: the mean square of a raised cosine is 3/8.
+        padding = length / (cut_samples - 1.25 * EDGE_SAMPLES)
+        variances[:] = arrival_variances(
+            r, sums, energy, pairs, to_shares, cross.shape[1], padding
+        )
+        correlation = min(r.min(), agreement.min(), 1.0)
+        angular_frequency = math.sqrt((sums[:, 0] / plain).min())
+        noise_energy = (1.0 - r.mean()) * energy.mean() / length * padding
+    return (
+        reconciled,
+        variances,
+        correlation,
+        angular_frequency,
+        noise_energy,
+        moved,
+        closure,
+    )
+
+
+class Peaks(NamedTuple):
     """Peaks of all pairs' correlations."""
 
-    tau: NDArray[np.float64]
-    """(p,) delays of the pairs, samples."""
+    arrivals: NDArray[np.float64]
+    """(n,) arrival at each channel after channel 0 that fits all delays, samples."""
     variances: NDArray[np.float64]
     """(n,) of each channel's time of arrival, samples^2."""
     correlation: float
@@ -238,6 +337,10 @@ class Peaks:
     noise_energy: float
     """Of what the mean channel does not share with the others, within the band,
     units of the frame squared."""
+    moved: float
+    """Largest change of an arrival, samples."""
+    closure: float
+    """Largest disagreement of a pair's own delay with ``arrivals``, samples."""
 
 
 def find_peaks(
@@ -264,29 +367,26 @@ def find_peaks(
     Returns:
         The peaks, or None where there is none.
     """
-    whole = np.rint(arrivals)
-    cut = cut_to_overlap(frame, whole)
-    spectra = fft.rfft(cut, length)[:, band]
+    rows = filled_rows(len(frame))
+    cut, cut_samples = _cut(frame, np.rint(arrivals), rows, length)
+    spectra = fft.rfft(cut)[: len(frame), band]
     cross, energy = _pair_spectra(spectra, tables.pairs)
     if not energy.min() > 0.0:
         return None
-    first, second = tables.pairs.T
     weights = whitening(cross) if phat else np.ones(cross.shape, dtype=np.float32)
-    step = 2.0 * math.pi / length
-    rest = arrivals - whole
-    tau, plain, agreement, sums = _refine(
-        cross, weights, band.start * step, step, rest[second] - rest[first], newton
+    peaks = Peaks(
+        *_measure(
+            cross,
+            energy,
+            weights,
+            arrivals,
+            tables.pairs,
+            tables.to_delays,
+            tables.to_shares,
+            band.start,
+            length,
+            cut_samples,
+            newton,
+        )
     )
-    r = plain / np.sqrt(energy[first] * energy[second])
-    if not (r.min() > 0.0 and sums[:, 0].min() > 0.0):
-        return None
-    # The soft edges cost energy: the mean square of a raised cosine is 3/8.
-    padding = length / (cut.shape[1] - 1.25 * EDGE_SAMPLES)
-    correlation = min(r.min(), agreement.min() if phat else 1.0, 1.0)
-    return Peaks(
-        tau=tau + (whole[second] - whole[first]),
-        variances=arrival_variances(r, sums, energy, tables, spectra.shape[1], padding),
-        correlation=float(correlation),
-        angular_frequency=math.sqrt(float((sums[:, 0] / plain).min())),
-        noise_energy=float((1.0 - r.mean()) * energy.mean() / length * padding),
-    )
+    return peaks if peaks.correlation > 0.0 else None

@@ -138,37 +138,25 @@ def estimate_delays(
         )
         if peaks is None:
             return None
-        reconciled = plan.tables.to_delays @ peaks.tau
-        moved = np.abs(reconciled - arrivals[1:]).max()
-        arrivals = np.concatenate(([0.0], reconciled))
-        if moved < _SETTLED:
-            return _estimate(
-                peaks, arrivals, search, band, plan, rounded=chosen.by_amdf
-            )
+        arrivals = peaks.arrivals
+        if peaks.moved < _SETTLED:
+            return _estimate(peaks, search, band, plan, rounded=chosen.by_amdf)
     return None
 
 
 def _estimate(
-    peaks: Peaks,
-    arrivals: NDArray[np.float64],
-    search: DelaySearch,
-    band: slice,
-    plan: DelayPlan,
-    *,
-    rounded: bool,
+    peaks: Peaks, search: DelaySearch, band: slice, plan: DelayPlan, *, rounded: bool
 ) -> DelayEstimate:
     rate = plan.sample_rate_hz
     variances = peaks.variances
     if rounded:
         # Rounding of arrivals to whole samples: 1/12 a pair.
         variances = variances + 1.0 / 24.0
-    first, second = plan.tables.pairs.T
-    gaps = peaks.tau - (arrivals[second] - arrivals[first])
     return DelayEstimate(
-        tau=arrivals[1:] / rate,
+        tau=peaks.arrivals[1:] / rate,
         covariance=(variances[0] + np.diag(variances[1:])) / rate**2,
         correlation=peaks.correlation,
-        closure=float(np.abs(gaps).max()) / rate,
+        closure=peaks.closure / rate,
         ambiguity=search.ambiguity,
         chance=search.chance,
         angular_frequency=peaks.angular_frequency * rate,
