@@ -9,7 +9,7 @@ noise alone would reach it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 from systems.delay_peaks import whitening
 from systems.delay_plan import DelayPlan
+from systems.propagation import REORDER
 
 __all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
 
@@ -29,8 +30,7 @@ _WHOLE = 0.99
 _HIGHEST = 38.0
 
 
-@dataclass(frozen=True)
-class DelaySearch:
+class DelaySearch(NamedTuple):
     """What the first look at a frame tells."""
 
     arrivals: NDArray[np.float64]
@@ -68,7 +68,7 @@ def amdf(
     return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, fastmath=REORDER)
 def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
     n = x_i.size
     out = np.empty(2 * max_lag + 1)
@@ -104,57 +104,48 @@ def _peak(values):  # pragma: no cover  (compiled)
     return best, second / top
 
 
-@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})
-def _cross_spectra(spectra, edges, first, out):  # pragma: no cover  (compiled)
-    """Fills out (e, bins) with cross-spectra, from the bin ``first`` on.
+@njit(cache=True, fastmath=REORDER)
+def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
+    """Cross-spectra (e, size) of the edges, from the bin ``first`` on.
 
     Returns:
-        (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the energy of
-        the mean channel.
+        They, (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the
+        energies (n,) of the channels.
     """
     channels, bins = spectra.shape
-    moments = np.zeros((edges.shape[0], 2))
-    for e in range(edges.shape[0]):
+    cross = np.zeros((len(edges), size), dtype=spectra.dtype)
+    moments, energy = np.zeros((len(edges), 2)), np.zeros(channels)
+    for e in range(len(edges)):
         i, j = edges[e]
         for k in range(bins):
             c = spectra[i, k].conjugate() * spectra[j, k]
-            out[e, first + k] = c
+            cross[e, first + k] = c
             square = c.real * c.real + c.imag * c.imag
             moments[e, 0] += square
             moments[e, 1] += square * np.float32((first + k) ** 2)
-    energy = 0.0
     for m in range(channels):
         for k in range(bins):
             a = spectra[m, k]
-            energy += a.real * a.real + a.imag * a.imag
-    return moments, energy / channels
+            energy[m] += a.real * a.real + a.imag * a.imag
+    return cross, moments, energy
 
 
 @njit(cache=True)
-def _gated_peaks(correlation, gates):  # pragma: no cover  (compiled)
-    """Per edge: lag of the highest peak within the gate, ambiguity, height."""
-    lags = np.empty(gates.size)
-    ambiguity = 0.0
-    heights = np.empty(gates.size)
-    size = correlation.shape[1]
-    for e in range(gates.size):
-        gate = gates[e]
-        gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
-        gated[:gate] = correlation[e, size - gate :]
-        gated[gate:] = correlation[e, : gate + 1]
-        best, ratio = _peak(gated)
-        lags[e] = best - gate
-        heights[e] = gated[best]
-        if 0 < best < 2 * gate:  # vertex of the parabola
-            rise, fall = gated[best] - gated[best - 1], gated[best] - gated[best + 1]
-            lags[e] += 0.5 * (rise - fall) / max(rise + fall, np.float32(1e-30))
-        ambiguity = max(ambiguity, ratio)
-    return lags, ambiguity, heights
+def _gated_peak(correlation, gate):  # pragma: no cover  (compiled)
+    """Lag of the highest peak within the gate, second peak over it, its height."""
+    gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
+    gated[:gate] = correlation[correlation.size - gate :]
+    gated[gate:] = correlation[: gate + 1]
+    best, ratio = _peak(gated)
+    lag = float(best - gate)
+    if 0 < best < 2 * gate:  # vertex of the parabola
+        rise, fall = gated[best] - gated[best - 1], gated[best] - gated[best + 1]
+        lag += 0.5 * (rise - fall) / max(rise + fall, np.float32(1e-30))
+    return lag, ratio, gated[best]
 
 
-def _chance_of_noise(
-    heights: NDArray[np.float64], counts: NDArray[np.float64]
-) -> tuple[float, float]:
+@njit(cache=True)
+def _chance_of_noise(heights, counts):  # pragma: no cover  (compiled)
     """Probability that noise reaches all peaks together, and the lowest of them.
 
     Args:
@@ -163,18 +154,48 @@ def _chance_of_noise(
             crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
     """
     log_product, weakest = 0.0, 0.0
-    for z, count in zip(heights.tolist(), counts.tolist(), strict=True):
-        below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(
-            -count * math.exp(-0.5 * z * z) if z < _HIGHEST else 0.0
-        )
+    for e in range(heights.size):
+        z = heights[e]
+        crossings = counts[e] * math.exp(-0.5 * z * z) if z < _HIGHEST else 0.0
+        below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(-crossings)
         log_product += math.log(max(1.0 - below, 1e-300))
         weakest = max(weakest, 1.0 - below)
     # Fisher: the product of m independent probabilities.
     term, total = 1.0, 0.0
-    for k in range(len(heights)):
+    for k in range(heights.size):
         total += term
         term *= -log_product / (k + 1)
     return min(math.exp(log_product) * total, 1.0), weakest
+
+
+@njit(cache=True)
+def _judge(
+    correlation, moments, edges, gates, padding, stretch
+):  # pragma: no cover  (compiled)
+    """Arrivals, ambiguity, chance and weakest of ``DelaySearch``.
+
+    Args:
+        correlation: (e, grid) of the edges.
+        moments: From ``_cross_spectra``.
+        edges: (e, 2) channels, a tree.
+        gates: (e,) largest lags.
+        padding: Length of the transform over that of the frame.
+        stretch: Samples of the frame a sample of the correlation.
+    """
+    count, grid = correlation.shape
+    arrivals, ambiguity = np.zeros(count + 1), 0.0
+    heights, counts = np.empty(count), np.empty(count)
+    for e in range(count):
+        lag, ratio, height = _gated_peak(correlation[e], gates[e])
+        i, j = edges[e]
+        arrivals[j] = arrivals[i] + lag * stretch
+        ambiguity = max(ambiguity, ratio)
+        # Padding makes the bins dependent: fewer count than are summed.
+        heights[e] = height / (math.sqrt(2.0 * padding * moments[e, 0]) + 1e-300)
+        rms_bin = math.sqrt(moments[e, 1] / (moments[e, 0] + 1e-300))
+        counts[e] = 2.0 * gates[e] / grid * rms_bin
+    chance, weakest = _chance_of_noise(heights, counts)
+    return arrivals, ambiguity, chance, weakest
 
 
 def weakest_sound(plan: DelayPlan, rate: float) -> float:
@@ -203,27 +224,16 @@ def weakest_sound(plan: DelayPlan, rate: float) -> float:
 
 
 def _correlation_search(
-    spectra: NDArray[np.complex64], plan: DelayPlan, band: slice, *, phat: bool
+    cross: NDArray[np.complex64],
+    moments: NDArray[np.float64],
+    energy: float,
+    plan: DelayPlan,
 ) -> DelaySearch:
-    cross = np.zeros((len(plan.edges), plan.grid // 2 + 1), dtype=np.complex64)
-    moments, energy = _cross_spectra(spectra, plan.edges, band.start, cross)
-    if phat:
-        cross[:, band] *= whitening(cross[:, band])
     correlation = fft.irfft(cross, plan.grid, overwrite_x=True, norm="forward")
-    lags, ambiguity, heights = _gated_peaks(correlation, plan.gates)
-    # Padding makes the bins dependent: fewer count than are summed.
     padding = plan.length / plan.frame_samples
-    deviations = np.sqrt(2.0 * padding * moments[:, 0]) + 1e-300
-    rms_bins = np.sqrt(moments[:, 1] / (moments[:, 0] + 1e-300))
-    counts = 2.0 * plan.gates / plan.grid * rms_bins
-    chance, weakest = _chance_of_noise(heights / deviations, counts)
-    return DelaySearch(
-        arrivals=_arrivals(lags * (plan.length / plan.grid), plan),
-        ambiguity=float(ambiguity),
-        chance=chance,
-        weakest=weakest,
-        energy=energy / plan.length,
-    )
+    stretch = plan.length / plan.grid
+    judged = _judge(correlation, moments, plan.edges, plan.gates, padding, stretch)
+    return DelaySearch(*judged, energy / plan.length)
 
 
 def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]:
@@ -257,8 +267,8 @@ def search_delays(
     *,
     phat: bool = False,
     by_amdf: bool = False,
-) -> DelaySearch:
-    """Looks for a sound in a frame.
+) -> DelaySearch | None:
+    """Looks for a sound in a frame; None where a channel is silent.
 
     Args:
         frame: (n, frame_samples), any unit.
@@ -269,14 +279,20 @@ def search_delays(
         by_amdf: Whether the delays are those of the papers' function.
             Detection rests on the correlation all the same.
     """
-    found = _correlation_search(spectra, plan, band, phat=False)
-    if phat:
+    size = plan.grid // 2 + 1
+    cross, moments, energies = _cross_spectra(spectra, plan.edges, band.start, size)
+    if not energies.min() > 0.0:
+        return None
+    white = cross.copy() if phat else None
+    found = _correlation_search(cross, moments, energies.mean(), plan)
+    if white is not None:
         # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
         # the plain correlation counts as well, and noise is judged by it.
-        white = _correlation_search(spectra, plan, band, phat=True)
-        arrivals, ambiguity = white.arrivals, max(found.ambiguity, white.ambiguity)
+        white[:, band] *= whitening(white[:, band])
+        seen = _correlation_search(white, moments, energies.mean(), plan)
+        arrivals, ambiguity = seen.arrivals, max(found.ambiguity, seen.ambiguity)
     elif by_amdf:
         arrivals, ambiguity = _amdf_search(frame, plan)
     else:
         return found
-    return replace(found, arrivals=arrivals, ambiguity=ambiguity)
+    return found._replace(arrivals=arrivals, ambiguity=ambiguity)

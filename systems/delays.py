@@ -14,12 +14,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import fft
 
 from systems.delay_peaks import Peaks, find_peaks
 from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch, search_delays
 from systems.occupied_band import occupied_band
+from systems.transforms import transform_rows
 
 __all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look"]
 
@@ -83,9 +83,7 @@ def look(
         The search and the bins that it used, or None where a channel is silent.
     """
     chosen = METHODS[method]
-    if not frame.any(axis=1).all():
-        return None
-    spectra = fft.rfft(frame, plan.length)[:, plan.band]
+    spectra = transform_rows(frame, plan.length)[:, plan.band]
     band = plan.band
     if find_band:
         first, last = occupied_band(spectra, plan.sample_rate_hz / plan.length)
@@ -94,7 +92,7 @@ def look(
     search = search_delays(
         frame, spectra, plan, band, phat=chosen.phat, by_amdf=chosen.by_amdf
     )
-    return search, band
+    return None if search is None else (search, band)
 
 
 def estimate_delays(

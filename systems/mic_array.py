@@ -21,7 +21,7 @@ from systems.array_tolerances import (
 from systems.cache import declare_cache
 from systems.ego_noise import EgoNoise, driving_share
 from systems.noise import BEFORE_THE_RUN, tick_generator
-from systems.propagation import microphone_paths, propagate
+from systems.propagation import check_reach, microphone_paths, propagate
 from systems.reverberation import Reverberation
 from systems.robot import RobotParameters
 from systems.room import RoomParameters
@@ -81,14 +81,10 @@ def record_frame(
     Raises:
         ValueError: A source is out of the emission's reach.
     """
-    begin = time - FRAME_PERIOD_S
-    times = begin + array.instants
-    p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
-    arriving = (p_WM, v_WM, FRAME_SAMPLES, array.c, rise)
-    direct = [propagate(emission, times, *arriving) for emission in emissions]
+    direct = _direct_sound(emissions, time, before, now, array, rise)
     pressure = _total([*direct, *reflections])
     tick = round(time / FRAME_PERIOD_S)
-    noise = frame_noise((len(p_WM), FRAME_SAMPLES), seed, tick)
+    noise = frame_noise((len(array.p_BM), FRAME_SAMPLES), seed, tick)
     snr = 10.0 ** (parameters.snr_db_at_1m / 20.0)
     if ego_noise is not None:
         noise += np.float32(snr) * ego_noise
@@ -99,6 +95,28 @@ def record_frame(
         sample_rate_hz=SAMPLE_RATE_HZ,
         time=time,
     )
+
+
+def _direct_sound(
+    emissions: Sequence[Emission],
+    time: float,
+    before: tuple[NDArray[np.float64], NDArray[np.float64]],
+    now: tuple[NDArray[np.float64], NDArray[np.float64]],
+    array: RealArray,
+    rise: float,
+) -> list[NDArray[np.float32]]:
+    """(n, FRAME_SAMPLES) Pa of each source that sounds."""
+    begin = time - FRAME_PERIOD_S
+    sounding = [emission for emission in emissions if emission.sounding]
+    for emission in emissions:
+        if not emission.sounding:  # the robot's place is good enough for silence
+            check_reach(emission, begin, before[0][:2], array.c)
+    if not sounding:
+        return []
+    times = begin + array.instants
+    p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
+    arriving = (times, p_WM, v_WM, FRAME_SAMPLES, array.c, rise)
+    return [propagate(emission, *arriving) for emission in sounding]
 
 
 def _total(

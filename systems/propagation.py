@@ -22,6 +22,7 @@ __all__ = [
     "KERNEL_REACH",
     "MINIMUM_RANGE_M",
     "REORDER",
+    "check_reach",
     "microphone_paths",
     "propagate",
     "retarded_delays",
@@ -234,6 +235,33 @@ def _interpolate(
             span *= amplitude
 
 
+def check_reach(
+    emission: Emission, time: float, p_WL: NDArray[np.float64], c: float
+) -> None:
+    """Refuses a listener for whom the emission does not reach back.
+
+    Args:
+        emission: What left the source, and where.
+        time: When the listening begins, s.
+        p_WL: (2,) listener, m.
+        c: Speed of sound, m/s.
+
+    Raises:
+        ValueError: What left before the emission begins may be heard.
+    """
+    distance = math.dist(p_WL, emission.p_WS[0])
+    reach = time - emission.start_time - KERNEL_REACH / emission.sample_rate_hz
+    if distance > c * reach:
+        raise _out_of_reach(distance)
+
+
+def _out_of_reach(distance: float) -> ValueError:
+    return ValueError(
+        f"MicArray: the source is {distance:.2f} m away, farther than the emission "
+        "reaches back; raise maximum_range_m of SoundEmitter"
+    )
+
+
 def propagate(
     emission: Emission,
     times: NDArray[np.float64],
@@ -242,7 +270,7 @@ def propagate(
     count: int,
     c: float,
     rise: float = 0.0,
-) -> NDArray[np.float32] | None:
+) -> NDArray[np.float32]:
     """Sound pressure at moving microphones over one frame.
 
     The delay is exact at the knots and follows cubic polynomials between them.
@@ -260,15 +288,11 @@ def propagate(
         rise: Height of the microphones above the source, m.
 
     Returns:
-        (m, count) Pa, or None where the source is silent. Nearer than 1 cm,
-        the amplitude is that at 1 cm.
+        (m, count) Pa. Nearer than 1 cm, the amplitude is that at 1 cm.
 
     Raises:
         ValueError: A microphone hears what left before the emission begins.
     """
-    if not emission.sounding:
-        # One instant a channel is enough to tell that the source is in reach.
-        times, p_WM, v_WM = times[:, :1], p_WM[:, :1], v_WM[:, :1]
     delays, rates = retarded_delays(
         times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c, rise
     )
@@ -276,13 +300,7 @@ def propagate(
     first = (times[:, 0] - emission.start_time) * rate
     delays *= rate
     if (first - delays[:, 0]).min() < KERNEL_REACH:
-        raise ValueError(
-            f"MicArray: the source is {delays[:, 0].max() * c / rate:.2f} m away, "
-            "farther than the emission reaches back; raise maximum_range_m of "
-            "SoundEmitter"
-        )
-    if not emission.sounding:
-        return None
+        raise _out_of_reach(delays[:, 0].max() * c / rate)
     out = np.empty((len(times), count), dtype=np.float32)
     _interpolate(
         emission.samples,

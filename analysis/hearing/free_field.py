@@ -115,9 +115,7 @@ class Loudspeaker:
         begins = np.broadcast_to(begin, len(p_AM))
         times = np.stack((begins, begins + FRAME_PERIOD_S), axis=1)
         p_WM = np.repeat(p_AM[:, None, :], 2, axis=1)
-        heard = propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
-        assert heard is not None
-        return heard
+        return propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
 
 
 @dataclass(frozen=True)
