@@ -107,8 +107,8 @@ class HearingMemory(NamedTuple):
     until such a frame was heard."""
     noise_energy: float
     """Of its mean channel within the band."""
-    echoes: NDArray[np.float32]
-    """(n, bins) see ``systems.precedence``."""
+    echoes: NDArray[np.float32] | None = None
+    """(n, bins) see ``systems.precedence``; None where the noise is louder."""
     heard: bool = False
     """Whether it held a sound."""
 
@@ -159,7 +159,12 @@ class Localiser:
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
-        return HearingMemory(0.0, 0.0, self._sizes.silent())
+        return HearingMemory(0.0, 0.0)
+
+    @property
+    def echo_shape(self) -> tuple[int, int]:
+        """Shape of ``HearingMemory.echoes``."""
+        return self._sizes.shape
 
     def localise(
         self, frame: NDArray[np.float32], memory: HearingMemory
@@ -222,7 +227,7 @@ class Localiser:
         if direct and not begins:
             return self._fix(frame, delays), memory
         dry, echoes, news = keep_first_wave_front(
-            frame, memory.echoes, self._sizes, memory.noise_energy / self._band_samples
+            frame, memory.echoes, self._sizes, self._noise_density(memory)
         )
         memory = memory._replace(echoes=echoes)
         if direct:
@@ -280,8 +285,10 @@ class Localiser:
     ) -> HearingMemory:
         """Noise of a frame's energy, and of that within the band if it is known."""
         echoes = memory.echoes
-        if echoes.any():
+        if echoes is not None:
             echoes = self._sizes.faded(echoes, self.plan.frame_samples)
+            if echoes.max() <= self._sizes.least(self._noise_density(memory)):
+                echoes = None
         if not memory.energy > 0.0:
             return HearingMemory(energy, noise_energy or 0.0, echoes)
         if noise_energy is None:
@@ -291,6 +298,10 @@ class Localiser:
             _averaged(memory.noise_energy, noise_energy),
             echoes,
         )
+
+    def _noise_density(self, memory: HearingMemory) -> float:
+        """Energy of the noise a sample of the band."""
+        return memory.noise_energy / self._band_samples
 
     def _is_direct(self, delays: DelayEstimate, memory: HearingMemory) -> bool:
         """Whether noise alone explains what the channels do not share."""

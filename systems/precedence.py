@@ -49,13 +49,13 @@ class EchoMemory:
         # Its square adds up to a constant over four hops.
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
-    def silent(self) -> NDArray[np.float32]:
-        """(channels, bins) memory of silence."""
-        return np.zeros(self.shape, dtype=np.float32)
-
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
         """The memory after so many samples of silence."""
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
+
+    def least(self, noise_density: float) -> float:
+        """What is remembered at least of noise of so much energy a sample."""
+        return _NOISE_MARGIN * noise_density * float(np.vdot(self.taper, self.taper))
 
 
 @njit(cache=True)
@@ -101,7 +101,7 @@ def _overlap_add(pieces, taper, hop, out):  # pragma: no cover  (compiled)
 
 def keep_first_wave_front(
     frame: NDArray[np.float32],
-    memory: NDArray[np.float32],
+    memory: NDArray[np.float32] | None,
     sizes: EchoMemory,
     noise_density: float = 0.0,
 ) -> tuple[NDArray[np.float32], NDArray[np.float32], float]:
@@ -109,7 +109,7 @@ def keep_first_wave_front(
 
     Args:
         frame: (n, samples) channels, any unit.
-        memory: (n, bins) what the last frame left, or ``sizes.silent()``.
+        memory: (n, bins) what the last frame left; None after silence.
         sizes: Of window and memory.
         noise_density: Mean square of the noise a sample, were it white, units of the
             frame squared; 0 where it is not known.
@@ -120,12 +120,10 @@ def keep_first_wave_front(
     """
     windows = np.lib.stride_tricks.sliding_window_view(frame, sizes.window, axis=1)
     spectra = fft.rfft(windows[:, :: sizes.hop] * sizes.taper)
-    memory = memory.copy()
+    memory = np.zeros(sizes.shape, np.float32) if memory is None else memory.copy()
     decay = np.float32(sizes.decay_a_hop)
-    noise = _NOISE_MARGIN * noise_density * float(np.vdot(sizes.taper, sizes.taper))
-    news = _weigh(
-        spectra, memory, decay, np.float32(_WHITENING_FLOOR), np.float32(noise)
-    )
+    noise = np.float32(sizes.least(noise_density))
+    news = _weigh(spectra, memory, decay, np.float32(_WHITENING_FLOOR), noise)
     pieces = fft.irfft(spectra, sizes.window, overwrite_x=True)
     out = np.zeros(frame.shape, dtype=np.float32)
     _overlap_add(pieces, sizes.taper, sizes.hop, out)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.common.value import Value
@@ -90,10 +92,8 @@ class TDOAEstimator(LeafSystem):
         )
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
-        blank = self._localiser.blank()
-        self._noise = self.DeclareDiscreteState(3)
-        self._echoes = self.DeclareDiscreteState(blank.echoes.size)
-        self._echo_shape = blank.echoes.shape
+        self._memory = self.DeclareDiscreteState(4)
+        self._echoes = self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
         )
@@ -111,24 +111,26 @@ class TDOAEstimator(LeafSystem):
                 f"record at {SAMPLE_RATE_HZ} Hz"
             )
         frame = audio.counts.astype(np.float32)
-        echoes = context.get_discrete_state(self._echoes).value()
-        energy, noise_energy, heard = context.get_discrete_state(self._noise).value()
-        before = HearingMemory(
-            float(energy),
-            float(noise_energy),
-            echoes.astype(np.float32).reshape(self._echo_shape),
-            bool(heard),
-        )
+        before = self._remembered(context)
         fix, after = self._localiser.localise(frame, before)
-        noise = (after.energy, after.noise_energy, after.heard)
-        if noise != (before.energy, before.noise_energy, before.heard):
-            discrete_state.set_value(self._noise, noise)
-        if after.echoes is not before.echoes:
+        if after is not before:
+            numbers = (*after[:2], after.echoes is not None, after.heard)
+            discrete_state.set_value(self._memory, numbers)
+        if after.echoes is not None and after.echoes is not before.echoes:
             discrete_state.set_value(self._echoes, after.echoes.ravel())
         if fix is None and not context.get_discrete_state(_DETECTED).value()[0]:
             return  # silence goes on, and the state is zero already
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
+
+    def _remembered(self, context) -> HearingMemory:
+        numbers = context.get_discrete_state(self._memory).value().tolist()
+        energy, noise_energy, echoing, heard = numbers
+        echoes = None
+        if echoing:
+            held = context.get_discrete_state(self._echoes).value()
+            echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
+        return HearingMemory(energy, noise_energy, echoes, bool(heard))
 
 
 #: Output ports and their sizes.

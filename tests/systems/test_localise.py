@@ -182,12 +182,12 @@ def test_noise_between_sounds_becomes_the_memory():
     # Half of the energy: the transform's positive frequencies.
     expected = 0.5 * 9.0 * N * share
     assert memory.noise_energy == pytest.approx(expected, rel=0.05)
-    assert not memory.echoes.any()
+    assert memory.echoes is None
 
 
 def test_a_sound_leaves_the_level_of_the_noise_alone():
     localiser = listener()
-    before = HearingMemory(456.0, 123.0, localiser.blank().echoes)
+    before = HearingMemory(456.0, 123.0)
     fix, after = localiser.localise(heard(ROW, [polar(10.0, 1.0)]), before)
     assert fix is not None
     assert after.noise_energy == 123.0
@@ -226,7 +226,7 @@ def test_a_silent_or_foreign_channel_gives_no_place(name, method):
             frame[k] = channel
             fix, memory = localiser.localise(frame, localiser.blank())
             assert fix is None
-            assert np.isfinite(memory.echoes).all()
+            assert memory.echoes is None or np.isfinite(memory.echoes).all()
             assert math.isfinite(memory.noise_energy)
 
 
