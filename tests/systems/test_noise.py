@@ -11,8 +11,8 @@ from systems.noise import BEFORE_THE_RUN, _scrambled, standard_normals, tick_gen
 
 def test_scrambler_is_splitmix64():
     """First output of the published generator when seeded with 0, and with its step."""
-    assert _scrambled(0) == 0xE220A8397B1DCDAF
-    assert _scrambled(0x9E3779B97F4A7C15) == 0x6E789E6AA1B965F4
+    assert _scrambled(np.uint64(0)) == 0xE220A8397B1DCDAF
+    assert _scrambled(np.uint64(0x9E3779B97F4A7C15)) == 0x6E789E6AA1B965F4
 
 
 @pytest.mark.parametrize("tick", [0, 1, BEFORE_THE_RUN])
