@@ -10,7 +10,6 @@ from pydrake.math import cos, sin
 from pydrake.systems.framework import LeafSystem_
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-from systems.cache import declare_cache
 from systems.diff_drive_plant import body_twist
 from systems.parameters import Parameters
 from systems.robot import RobotParameters
@@ -112,19 +111,17 @@ def WheelOdometry_(T):
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
             )
-            sources = {self._angles.ticket(), self.xd_ticket()}
-            self._now = declare_cache(self, "pose now", self._advance, sources)
-            self.DeclareVectorOutputPort(
-                name="pose_WB_estimated",
-                size=3,
-                calc=self._pose,
-                prerequisites_of_calc={self._now.ticket()},
-            )
-            self.DeclareVectorOutputPort(
-                name="velocity_WB_estimated",
-                size=3,
-                calc=self._velocity,
-                prerequisites_of_calc={self._now.ticket()},
+            self._pose, _ = (
+                self.DeclareVectorOutputPort(
+                    name=name,
+                    size=3,
+                    calc=calc,
+                    prerequisites_of_calc={self._angles.ticket(), self.xd_ticket()},
+                )
+                for name, calc in (
+                    ("pose_WB_estimated", self._advance),
+                    ("velocity_WB_estimated", self._velocity),
+                )
             )
 
         def _construct_copy(self, other, converter=None):
@@ -136,27 +133,29 @@ def WheelOdometry_(T):
                 converter=converter,
             )
 
-        def _advance(self, context):
-            """Pose and encoder angles now, a list of five."""
+        def _encoder_angles(self, context):
             angles = self._angles.Eval(context).tolist()
             if self._odometry.rounding:
                 pulses = self._odometry.pulses_per_revolution
-                angles = [encoder_angle(angle, pulses) for angle in angles]
-            held = self._held(context)
-            steps = (angles[0] - held[3], angles[1] - held[4])
-            return [*advance_pose(held[:3], steps, self._robot), *angles]
+                return [encoder_angle(angle, pulses) for angle in angles]
+            return angles
 
         def _held(self, context):
             return context.get_discrete_state(0).CopyToVector().tolist()
 
-        def _update(self, context, discrete_state):
-            discrete_state.get_mutable_vector().SetFromVector(self._now.Eval(context))
+        def _advance(self, context, output):
+            left, right = self._encoder_angles(context)
+            *pose, left_then, right_then = self._held(context)
+            steps = (left - left_then, right - right_then)
+            output.SetFromVector(advance_pose(pose, steps, self._robot))
 
-        def _pose(self, context, output):
-            output.SetFromVector(self._now.Eval(context)[:3])
+        def _update(self, context, discrete_state):
+            pose = self._pose.Eval(context).tolist()
+            now = [*pose, *self._encoder_angles(context)]
+            discrete_state.get_mutable_vector().SetFromVector(now)
 
         def _velocity(self, context, output):
-            now, held = self._now.Eval(context), self._held(context)
+            now, held = self._pose.Eval(context), self._held(context)
             output.SetFromVector(
                 [(now[k] - held[k]) / FRAME_PERIOD_S for k in range(3)]
             )

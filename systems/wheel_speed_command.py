@@ -78,7 +78,7 @@ def WheelSpeedCommand_(T):
             - wheel_speeds [rad/s, left and right]
             - v_WP [m/s]
 
-        Discrete state, 25 ms: velocity of the virtual mass and wheel speeds.
+        Discrete state, 25 ms: the outputs, a group each.
         An update at t uses the acceleration at t and acts from t on: from
         echo to wheels 0 ms, from the end of an audio frame to the wheels
         25 ms (the estimator's tick). Outputs are state; no feedthrough.
@@ -98,27 +98,20 @@ def WheelSpeedCommand_(T):
                 name="acceleration_W", size=2
             )
             self._pose = self.DeclareVectorInputPort(name="pose_WB_estimated", size=3)
-            self.DeclareDiscreteState(4)
+            self._v_WP = self.DeclareDiscreteState(2)
+            self._wheel_speeds = self.DeclareDiscreteState(2)
+            self.DeclareStateOutputPort("wheel_speeds", self._wheel_speeds)
+            self.DeclareStateOutputPort("v_WP", self._v_WP)
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
             )
-            for name, calc in (("wheel_speeds", self._wheels), ("v_WP", self._v_WP)):
-                self.DeclareVectorOutputPort(
-                    name=name,
-                    size=2,
-                    calc=calc,
-                    prerequisites_of_calc={self.xd_ticket()},
-                )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, robot=other._robot, converter=converter)
 
-        def _state(self, context):
-            return context.get_discrete_state(0).CopyToVector()
-
         def _update(self, context, discrete_state):
             v_WP = integrate_velocity(
-                self._state(context)[:2].tolist(),
+                context.get_discrete_state(self._v_WP).CopyToVector().tolist(),
                 self._acceleration.Eval(context).tolist(),
                 FRAME_PERIOD_S,
                 self._robot.top_speed_m_s,
@@ -126,13 +119,8 @@ def WheelSpeedCommand_(T):
             theta = self._pose.Eval(context).tolist()[2]
             twist = hand_position_twist(v_WP, theta, self._robot.control_point_m)
             wheels = limited_wheel_speeds(*twist, self._robot)
-            discrete_state.get_mutable_vector().SetFromVector([*v_WP, *wheels])
-
-        def _wheels(self, context, output):
-            output.SetFromVector(self._state(context)[2:])
-
-        def _v_WP(self, context, output):
-            output.SetFromVector(self._state(context)[:2])
+            discrete_state.set_value(self._v_WP, v_WP)
+            discrete_state.set_value(self._wheel_speeds, wheels)
 
     return Impl
 

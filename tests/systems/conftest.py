@@ -29,7 +29,7 @@ class Bench:
         if state is not None and self.context.num_continuous_states():
             self.context.SetContinuousState(self._vector(state))
         elif state is not None:
-            self.context.SetDiscreteState(0, self._vector(state))
+            self._set_discrete_state(self._vector(state))
         for name, value in inputs.items():
             port = block.GetInputPort(name)
             port.FixValue(self.context, self._vector(value))
@@ -41,18 +41,26 @@ class Bench:
             )
         return np.asarray(values, dtype=float)
 
+    def _set_discrete_state(self, values: Any) -> None:
+        begin = 0
+        for k in range(self.context.num_discrete_state_groups()):
+            end = begin + self.context.get_discrete_state(k).size()
+            self.context.SetDiscreteState(k, values[begin:end])
+            begin = end
+
     def output(self, name: str) -> Any:
         """Value of an output port."""
         return self.block.GetOutputPort(name).Eval(self.context)
 
     def updated(self) -> Any:
-        """Discrete state after the periodic update."""
+        """Discrete state after the periodic update, one group after the other."""
         update = self.block.EvalUniquePeriodicDiscreteUpdate(self.context)
-        return update.get_vector(0).CopyToVector()
+        groups = range(update.num_groups())
+        return np.concatenate([update.get_vector(k).CopyToVector() for k in groups])
 
     def tick(self) -> Bench:
         """Takes the periodic update over into the state, 25 ms later."""
-        self.context.SetDiscreteState(0, self.updated())
+        self._set_discrete_state(self.updated())
         self.context.SetTime(self.context.get_time() + 0.025)
         return self
 
