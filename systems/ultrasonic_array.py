@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Annotated, Literal
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 from pydrake.systems.framework import LeafSystem
@@ -13,7 +15,7 @@ from scipy.special import ndtri
 
 from systems.acoustics import AcousticParameters
 from systems.cache import declare_cache
-from systems.geometry import cone_range, control_point, rotate
+from systems.geometry import cone_range
 from systems.noise import standard_normals
 from systems.parameters import Fraction, NonNegative, Parameters, Point, Positive, Size
 from systems.robot import RobotParameters
@@ -70,15 +72,30 @@ class UltrasonicParameters(Parameters):
             )
         return self
 
+    @cached_property
+    def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Axes (3,) in B, rad, places (3, 2) from P, m, and half angle, rad."""
+        half_angle = math.radians(self.beam_half_angle_deg)
+        return np.radians(self.axes_deg), np.array(self.positions_m), half_angle
 
-def world_rectangles(poses_WO, sizes, pose_WS, source_size: Size):
+    @cached_property
+    def least_luck(self) -> float:
+        """Standard normal numbers below this drop an echo."""
+        return float(ndtri(self.dropout_probability))
+
+
+@njit(cache=True)
+def world_rectangles(
+    poses_WO, sizes, pose_WS, source_size
+):  # pragma: no cover  (compiled)
     """All bodies that can be seen or hit, (n + 1, 5); the master robot is last."""
     count = len(sizes) // 2
     rectangles = np.empty((count + 1, 5))
-    rectangles[:count, :3] = poses_WO.reshape(count, 3)
-    rectangles[:count, 3:] = sizes.reshape(count, 2)
+    for k in range(count):
+        rectangles[k, :3] = poses_WO[3 * k : 3 * k + 3]
+        rectangles[k, 3:] = sizes[2 * k : 2 * k + 2]
     rectangles[count, :3] = pose_WS
-    rectangles[count, 3:] = source_size
+    rectangles[count, 3], rectangles[count, 4] = source_size
     return rectangles
 
 
@@ -96,14 +113,26 @@ def cone_ranges(
     Returns:
         (3,) m; infinity where a cone is empty.
     """
-    theta = pose_WB[2]
-    x_P, y_P = control_point(pose_WB, control_point_m)
-    half_angle = math.radians(parameters.beam_half_angle_deg)
+    pose = np.asarray(pose_WB, dtype=np.float64)
+    return _cone_ranges(pose, rectangles, *parameters.beams, control_point_m)
+
+
+@njit(cache=True)
+def _cone_ranges(
+    pose_WB, rectangles, axes, places, half_angle, control_point_m
+):  # pragma: no cover  (compiled)
+    x, y, theta = pose_WB
+    c, s = math.cos(theta), math.sin(theta)
     ranges = np.empty(SENSORS)
-    for k, axis_deg in enumerate(parameters.axes_deg):
-        dx, dy = rotate(theta, *parameters.positions_m[k])
-        axis = theta + math.radians(axis_deg)
-        ranges[k] = cone_range(x_P + dx, y_P + dy, axis, half_angle, rectangles)
+    for k in range(SENSORS):
+        ahead, left = control_point_m + places[k, 0], places[k, 1]
+        ranges[k] = cone_range(
+            x + c * ahead - s * left,
+            y + s * ahead + c * left,
+            theta + axes[k],
+            half_angle,
+            rectangles,
+        )
     return ranges
 
 
@@ -126,14 +155,21 @@ def measured_ranges(
         (3,) ranges in [minimum, maximum], m, and (3,) echoes, 0 or 1. Without
         an echo the range is finite and means nothing.
     """
-    noise, luck = numbers.tolist()
-    needed = float(ndtri(parameters.dropout_probability))
     stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
-    low, high = parameters.minimum_range_m, parameters.maximum_range_m
+    limits = parameters.minimum_range_m, parameters.maximum_range_m
+    errors = stretch, parameters.noise_m, parameters.least_luck
+    return _measured_ranges(true_ranges, numbers, *errors, *limits)
+
+
+@njit(cache=True)
+def _measured_ranges(
+    true_ranges, numbers, stretch, noise_m, least_luck, low, high
+):  # pragma: no cover  (compiled)
     ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
-    for k, true_range in enumerate(true_ranges.tolist()):
-        if true_range <= high and luck[k] >= needed:
-            measured = stretch * true_range + parameters.noise_m * noise[k]
+    for k in range(SENSORS):
+        noise, luck = numbers[0, k], numbers[1, k]
+        if true_ranges[k] <= high and luck >= least_luck:
+            measured = stretch * true_ranges[k] + noise_m * noise
             ranges[k] = min(max(measured, low), high)
             echo[k] = 1.0
     return ranges, echo
