@@ -7,13 +7,12 @@ Three microphones equally spaced in a row have a closed form
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems import near_field
-from systems.array_shape import ArrayShape, EqualRow
+from systems.array_shape import ArrayShape
 from systems.delay_fit import DelayProblem, fit_delays
 from systems.source_fix import SourceFix
 
@@ -44,7 +43,9 @@ def locate_source(
         rarely less than two apertures.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
-        return _from_equal_row(tau, covariance, shape.equal_row, c)
+        fix = near_field.locate_source(tau, covariance, shape.equal_row, c)
+        uncertain = fix.range_valid and fix.range_std >= fix.range
+        return fix.without_range() if uncertain else fix
     u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
         DelayProblem(
             c * np.asarray(tau, dtype=np.float64),
@@ -103,27 +104,4 @@ def angles_of(
         bearing_std if "bearing" in shape.angles else math.inf,
         math.atan2(u[2], math.hypot(u[0], u[1])),
         math.sqrt(of_u[2, 2]) / cosine if known else math.inf,
-    )
-
-
-def _from_equal_row(
-    tau: NDArray[np.float64],
-    covariance: NDArray[np.float64],
-    row: EqualRow,
-    c: float,
-) -> SourceFix:
-    turn = row.to_delays
-    tau_12, tau_13 = (turn @ tau).tolist()
-    fix = near_field.locate_source(
-        tau_12, tau_13, turn @ covariance @ turn.T, row.spacing_m, c
-    )
-    if fix.range_valid and fix.range_std >= fix.range:
-        fix = fix.without_range()
-    axes = row.axes
-    p_AS = axes @ fix.p_AS
-    return replace(
-        fix,
-        bearing=math.atan2(p_AS[1], p_AS[0]),
-        p_AS=p_AS,
-        covariance=axes @ fix.covariance @ axes.T,
     )

@@ -12,8 +12,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
+from systems.array_shape import EqualRow
 from systems.source_fix import SourceFix
 
 __all__ = ["locate_source", "source_from_delays"]
@@ -25,36 +27,19 @@ _LEAST_GAP_M = 1e-9
 _LEAST_COSINE = 1e-3
 
 
-def _bearing_only(bearing: float, bearing_std: float) -> SourceFix:
-    sine, cosine = math.sin(bearing), math.cos(bearing)
-    across = np.array([-sine, cosine])
-    return SourceFix(
-        bearing=bearing,
-        bearing_std=bearing_std,
-        elevation=None,
-        elevation_std=None,
-        range=0.0,
-        range_valid=False,
-        range_std=math.inf,
-        p_AS=np.array([cosine, sine]),
-        covariance=bearing_std**2 * np.outer(across, across),
-    )
-
-
-def _ranges(a: float, b: float, spacing: float) -> tuple[float, float, float] | None:
-    """R1, R2, R3 in m, or None where the delays have no finite range."""
+@njit(cache=True)
+def _ranges(a, b, spacing):  # pragma: no cover  (compiled)
+    """Whether the delays have a finite range, and R1, R2, R3 in m."""
     if b - 2.0 * a <= _LEAST_GAP_M:
-        return None
+        return False, 0.0, 0.0, 0.0
     r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
     r2, r3 = r1 + a, r1 + b
-    if min(r1, r2, r3) <= 0.0 or abs(r3 * r3 - r1 * r1) > 4.0 * spacing * r2:
-        return None
-    return r1, r2, r3
+    valid = min(r1, r2, r3) > 0.0 and abs(r3 * r3 - r1 * r1) <= 4.0 * spacing * r2
+    return valid, r1, r2, r3
 
 
-def source_from_delays(
-    tau_12: float, tau_13: float, spacing: float, c: float
-) -> tuple[float, float, bool]:
+@njit(cache=True)
+def source_from_delays(tau_12, tau_13, spacing, c):  # pragma: no cover  (compiled)
     """Bearing and range of the source from M2.
 
     Args:
@@ -69,57 +54,96 @@ def source_from_delays(
         a source far away.
     """
     a, b = c * tau_12, c * tau_13
-    ranges = _ranges(a, b, spacing)
-    if ranges is None:
+    valid, r1, r2, r3 = _ranges(a, b, spacing)
+    if not valid:
         return math.asin(min(1.0, max(-1.0, b / (2.0 * spacing)))), 0.0, False
-    r1, r2, r3 = ranges
     return math.asin((r3 * r3 - r1 * r1) / (4.0 * spacing * r2)), r2, True
 
 
+@njit(cache=True)
+def _spread(slopes, covariance):  # pragma: no cover  (compiled)
+    """J C J^T."""
+    rows = slopes.shape[0]
+    spread = np.zeros((rows, rows))
+    for i in range(rows):
+        for j in range(rows):
+            for m in range(2):
+                for n in range(2):
+                    spread[i, j] += slopes[i, m] * covariance[m, n] * slopes[j, n]
+    return spread
+
+
+@njit(cache=True)
+def _slopes(bearing, r2, a, b, spacing, c):  # pragma: no cover  (compiled)
+    """(4, 2) what the errors of the two delays do to range, bearing, x and y."""
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    r1, r3 = r2 - a, r2 - a + b
+    gap = b - 2.0 * a
+    to_range = np.array([c * (r1 + r3) / gap, -c * r3 / gap])
+    to_y = np.array([c * b * r2, -c * a * r3]) / (spacing * gap)
+    slopes = np.empty((4, 2))
+    slopes[0] = to_range
+    slopes[1] = (to_y - sine * to_range) / (r2 * max(cosine, _LEAST_COSINE))
+    slopes[2] = cosine * to_range - r2 * sine * slopes[1]
+    slopes[3] = sine * to_range + r2 * cosine * slopes[1]
+    return slopes
+
+
+@njit(cache=True)
+def _locate(
+    tau, covariance, to_delays, axes, spacing, c
+):  # pragma: no cover  (compiled)
+    """Place, its covariance, and errors of bearing and range, in the array's axes."""
+    tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
+    tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
+    of_delays = _spread(to_delays, covariance)
+    bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    if valid:
+        slopes = _slopes(bearing, r2, c * tau_12, c * tau_13, spacing, c)
+        place = np.array([r2 * cosine, r2 * sine])
+    else:
+        turn = c / (2.0 * spacing * max(cosine, _LEAST_COSINE))
+        slopes = np.zeros((4, 2))
+        slopes[1:, 1] = turn, -turn * sine, turn * cosine
+        place = np.array([cosine, sine])
+    errors = _spread(slopes, of_delays)
+    p_AS = np.zeros(axes.shape[0])
+    for k in range(2):
+        p_AS += axes[:, k] * place[k]
+    range_std = math.sqrt(errors[0, 0]) if valid else np.inf
+    of_p = _spread(axes, errors[2:, 2:])
+    return p_AS, of_p, math.sqrt(errors[1, 1]), r2, valid, range_std
+
+
 def locate_source(
-    tau_12: float,
-    tau_13: float,
+    tau: NDArray[np.float64],
     covariance: NDArray[np.float64],
-    spacing: float,
+    row: EqualRow,
     c: float,
 ) -> SourceFix:
     """As ``source_from_delays``, with what the delays' errors make of it.
 
     Args:
-        tau_12: Delay, s.
-        tau_13: Delay, s.
-        covariance: (2, 2) of the two delays, s^2.
-        spacing: Distance between neighbouring microphones, m.
+        tau: (2,) delays t_k - t_0 in the order of the channels, s.
+        covariance: (2, 2) of them, s^2.
+        row: The microphones.
         c: Speed of sound, m/s.
 
     Returns:
-        The source in axes (ahead, left) at M2.
+        The source in the axes of the array.
     """
-    bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
-    sine, cosine = math.sin(bearing), math.cos(bearing)
-    safe = max(cosine, _LEAST_COSINE)
-    if not valid:
-        to_bearing = np.array([0.0, c / (2.0 * spacing * safe)])
-        return _bearing_only(bearing, math.sqrt(to_bearing @ covariance @ to_bearing))
-    a, b = c * tau_12, c * tau_13
-    r1, r3 = r2 - a, r2 - a + b
-    gap = b - 2.0 * a
-    # Rows: what the two delays' errors do to range, bearing, x and y.
-    slopes = np.empty((4, 2))
-    slopes[0] = c * (r1 + r3) / gap, -c * r3 / gap
-    to_y = c * b * r2 / (spacing * gap), -c * a * r3 / (spacing * gap)
-    slopes[1] = (to_y - sine * slopes[0]) / (r2 * safe)
-    slopes[2] = cosine * slopes[0] - r2 * sine * slopes[1]
-    slopes[3] = sine * slopes[0] + r2 * cosine * slopes[1]
-    errors = slopes @ covariance @ slopes.T
+    p_AS, of_p, bearing_std, distance, valid, range_std = _locate(
+        tau, covariance, row.to_delays, row.axes, row.spacing_m, c
+    )
     return SourceFix(
-        bearing=bearing,
-        bearing_std=math.sqrt(errors[1, 1]),
+        bearing=math.atan2(p_AS[1], p_AS[0]),
+        bearing_std=bearing_std,
         elevation=None,
         elevation_std=None,
-        range=r2,
-        range_valid=True,
-        range_std=math.sqrt(errors[0, 0]),
-        p_AS=np.array([r2 * cosine, r2 * sine]),
-        covariance=errors[2:, 2:],
+        range=distance,
+        range_valid=valid,
+        range_std=range_std,
+        p_AS=p_AS,
+        covariance=of_p,
     )

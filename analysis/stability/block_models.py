@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import DiscreteTimeApproximation, SimulatorConfig
 
 from analysis.stability.autodiff import seed, value_and_gradient
+from analysis.stability.diagram_state import set_discrete_state
 from analysis.stability.ideal_loop import IdealLoop
 from analysis.stability.linear_models import LinearModel
 from systems.signals import FRAME_PERIOD_S
@@ -100,8 +101,7 @@ def block_model(
     """One sampled block about an operating point, by its AutoDiff twin alone.
 
     Args:
-        twin: The block as LeafSystem_[AutoDiffXd], with one group of discrete
-            states or none.
+        twin: The block as LeafSystem_[AutoDiffXd].
         state: Its state, just before its update.
         values: Of its input ports, in order.
         ports: The block whose ports have the names to use, if not ``twin``.
@@ -122,7 +122,8 @@ def block_model(
     updated = np.empty(0)
     if count:
         changed = twin.EvalUniquePeriodicDiscreteUpdate(context)
-        updated = changed.get_vector(0).CopyToVector()
+        groups = range(changed.num_groups())
+        updated = np.concatenate([changed.get_vector(k).CopyToVector() for k in groups])
     later = _context(twin, time_s, updated)
     for index, port in enumerate(_ports(ports, "output")):
         if port.get_name() in held:
@@ -149,7 +150,7 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
     context = block.CreateDefaultContext()
     context.SetTime(time_s)
     if len(state):
-        context.SetDiscreteState(0, state)
+        set_discrete_state(context, state)
     return context
 
 

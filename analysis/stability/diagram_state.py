@@ -11,7 +11,15 @@ from pydrake.systems.analysis import InitializeParams
 
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["Port", "Runner", "begin", "get_state", "run_periods", "set_state"]
+__all__ = [
+    "Port",
+    "Runner",
+    "begin",
+    "get_state",
+    "run_periods",
+    "set_discrete_state",
+    "set_state",
+]
 
 #: A port of a block: (role in ``SoundFollower.blocks``, name of the port).
 Port = tuple[str, str]
@@ -81,6 +89,12 @@ def set_state(context: Any, state: Any) -> None:
     """Sets the whole state: continuous first, then the discrete groups."""
     start = context.num_continuous_states()
     context.SetContinuousState(state[:start])
+    set_discrete_state(context, state[start:])
+
+
+def set_discrete_state(context: Any, state: Any) -> None:
+    """Sets the discrete groups from one vector."""
+    start = 0
     for group in range(context.num_discrete_state_groups()):
         size = context.get_discrete_state(group).size()
         context.SetDiscreteState(group, state[start : start + size])

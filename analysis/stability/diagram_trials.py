@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from analysis.runs.intervals import Interval, wilson_interval
 from analysis.runs.scene import touching_point
 from analysis.stability.certificate_trials import BATCH, draw_starts
+from analysis.stability.diagram_state import set_discrete_state
 from analysis.stability.energy_certificate import EnergyCertificate
 from analysis.stability.ideal_loop import frozen_scenario
 from diagrams import (
@@ -167,7 +168,7 @@ def _run(
     wheels = limited_wheel_speeds(v, omega, robot)
     contexts["plant"].SetContinuousState([*pose, 0.0, 0.0, *wheels])
     contexts["odometry"].SetDiscreteState([*pose, 0.0, 0.0])
-    contexts["command"].SetDiscreteState([*velocity, *wheels])
+    set_discrete_state(contexts["command"], [*velocity, *wheels])
     simulator.Initialize()
     simulator.AdvanceTo(scenario.duration_s)
     if rules.collision is None:

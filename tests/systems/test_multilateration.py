@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from systems import near_field
-from systems.array_shape import ArrayShape
+from systems.array_shape import ArrayShape, EqualRow
 from systems.multilateration import locate_source
 
 C = 340.0
@@ -204,7 +204,7 @@ def test_a_row_takes_any_order_of_channels(order, dimension):
     # Seen from the row, the source is on the right: 12 - 3 o'clock.
     times = -np.hypot(0.7 - np.array([-0.4, 0.0, 0.4]), 1.2) / C
     own = near_field.locate_source(
-        times[0] - times[1], times[0] - times[2], covariance, 0.4, C
+        times[0] - times[1:], covariance, EqualRow(0.4, np.eye(2), np.eye(2)), C
     )
     assert fix.range_std == pytest.approx(own.range_std)
 
