@@ -47,7 +47,6 @@ class StopRules:
     follower: SoundFollower
     cause: str = ""
     collision: Collision | None = None
-    _bodies: dict[str, Body] = field(default_factory=dict)
     _pose: list[float] | None = None
     _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
     _valid_time: float = 0.0
@@ -55,8 +54,9 @@ class StopRules:
 
     def __post_init__(self) -> None:
         scenario = self.follower.scenario
-        self._bodies = scenario.bodies()
-        self._source_rests = not self._bodies["source"].path.moves
+        bodies = scenario.bodies()
+        self._source_path = bodies["source"].path
+        self._source_rests = not self._source_path.moves
         self._plant = self.follower.blocks["plant"]
         self._tracker = self.follower.blocks["tracker"]
         self._pose_port = self.follower.port("plant", "pose_WB")
@@ -64,8 +64,13 @@ class StopRules:
         self._here = (
             scenario.attraction.follow_distance_m + scenario.stop.following_band_m
         )
-        robot = scenario.robot
-        self._reach = 0.5 * math.hypot(robot.length_m, robot.width_m) + NEAR_M
+        self._offset = scenario.robot.control_point_m
+        robot = (scenario.robot.length_m, scenario.robot.width_m)
+        # Farther than this from the robot's centre, a body does not touch it.
+        self._reach = [
+            (name, body, 0.5 * (math.hypot(*robot) + math.hypot(*body.size)) + NEAR_M)
+            for name, body in bodies.items()
+        ]
 
     def __call__(self, context: Any) -> EventStatus:
         """Called after every step of the simulator."""
@@ -92,9 +97,8 @@ class StopRules:
         self.collision = self._find_collision(time, pose)
         if self.collision is not None:
             return "collision"
-        offset = self.follower.scenario.robot.control_point_m
-        x_P, y_P = control_point(pose, offset)
-        x_S, y_S, _ = self._bodies["source"].path.pose(time)
+        x_P, y_P = control_point(pose, self._offset)
+        x_S, y_S, _ = self._source_path.pose(time)
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
@@ -119,9 +123,8 @@ class StopRules:
     def _find_collision(self, time: float, pose: list[float]) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first = None
-        for name, body in self._bodies.items():
+        for name, body, reach in self._reach:
             x, y, _ = body.path.pose(time)
-            reach = self._reach + 0.5 * math.hypot(*body.size)
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue
             instant = self._first_contact(time, pose, body)
