@@ -180,22 +180,21 @@ def retarded_delays(
 @njit(cache=True, fastmath=REORDER)
 def _delayed(samples, first, u, kernel, out):  # pragma: no cover  (compiled)
     """Fills out (n,) with samples[first + i + 1/2 + u_i], interpolated."""
-    pairs = kernel.shape[0]
-    count = u.size
-    out[:] = np.float32(0.0)
-    for n in range(pairs):
-        e, o = kernel[n, 0], kernel[n, 1]
-        low = first + n - pairs + 1
-        high = first - n + pairs
-        left, right = samples[low : low + count], samples[high : high + count]
-        for i in range(count):
-            y = u[i] * u[i]
+    begin, last = first - KERNEL_REACH + 1, 2 * KERNEL_REACH - 1
+    near = samples[begin : begin + u.size + last]
+    for i in range(u.size):
+        y = u[i] * u[i]
+        total = np.float32(0.0)
+        for n in range(KERNEL_REACH):
+            e, o = kernel[n, 0], kernel[n, 1]
             even = ((e[3] * y + e[2]) * y + e[1]) * y + e[0]
             odd = u[i] * (((o[3] * y + o[2]) * y + o[1]) * y + o[0])
-            out[i] += (even + odd) * left[i] + (even - odd) * right[i]
+            total += (even + odd) * near[i + n] + (even - odd) * near[i + last - n]
+        out[i] = total
 
 
-@njit(cache=True, fastmath=REORDER)
+# Divisions that check for zero, as Python's do, would keep the loop from vectorising.
+@njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _interpolate(
     samples, kernel, first, delays, rates, c, nearest, out
 ):  # pragma: no cover  (compiled)
@@ -214,10 +213,10 @@ def _interpolate(
         for k in range(spans):
             a, b = delays[m, k], delays[m, k + 1]
             da, db = h * rates[m, k], h * rates[m, k + 1]
+            bend, curl = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
             for i in range(h):
                 s = i / h
-                bend = 3.0 * (b - a) - 2.0 * da - db
-                d = a + s * (da + s * (bend + s * (2.0 * (a - b) + da + db)))
+                d = a + s * (da + s * (bend + s * curl))
                 position = first[m] + k * h + i - d
                 whole = math.floor(position)
                 u[i] = np.float32(position - whole - 0.5)
