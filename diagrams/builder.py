@@ -46,7 +46,7 @@ LOGGED_PORTS = (
     ("tracker", "target_valid"),
     ("odometry", "pose_WB_estimated"),
     ("collision", "collision_vectors_B"),
-    ("collision", "mask"),
+    ("collision", "features"),
     ("controller", "forces_W"),
     ("controller", "obstacle_speeds"),
     ("command", "wheel_speeds"),

@@ -45,7 +45,7 @@ COLUMNS = {
     ("collision", "collision_vectors_B"): tuple(
         f"collision_{slot}_B_{axis}" for slot in (1, 2, 3) for axis in "xy"
     ),
-    ("collision", "mask"): ("collision_1", "collision_2", "collision_3"),
+    ("collision", "features"): ("feature_1", "feature_2", "feature_3"),
     ("controller", "forces_W"): (
         "attraction_x",
         "attraction_y",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -30,6 +29,9 @@ _PHAT_FLOOR = 0.1
 # Newton's method: largest number of steps, and the step at which it ends.
 _ITERATIONS = 10
 _TOLERANCE = 1e-6
+
+# Variance of an arrival that is rounded to whole samples: 1/12 a pair.
+_ROUNDING = 1.0 / 24.0
 
 #: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
 #: whole samples by one over the length and the squared bandwidth: 4e-3 samples of
@@ -86,7 +88,7 @@ def _ramp(k):  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
-    """Cross-spectra (p, bins) of pairs of channels, and energies (n,)."""
+    """Cross-spectra (p, bins) of pairs of channels, weights 1, and energies (n,)."""
     channels, bins = spectra.shape
     energy = np.zeros(channels)
     for m in range(channels):
@@ -98,7 +100,7 @@ def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
         i, j = pairs[p]
         for k in range(bins):
             cross[p, k] = spectra[i, k].conjugate() * spectra[j, k]
-    return cross, energy
+    return cross, np.ones(cross.shape, dtype=np.float32), energy
 
 
 @njit(cache=True, fastmath=REORDER)
@@ -191,8 +193,7 @@ def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (c
     return tau, plain, agreement, sums
 
 
-@dataclass(frozen=True, eq=False)
-class PairTables:
+class PairTables(NamedTuple):
     """Matrices that join pairs of channels to channels."""
 
     pairs: NDArray[np.int64]
@@ -273,19 +274,22 @@ def _reconcile(
 
 @njit(cache=True)
 def _measure(
-    cross,
-    energy,
-    weights,
-    arrivals,
-    pairs,
-    to_delays,
-    to_shares,
-    first,
-    length,
-    cut_samples,
-    newton,
+    cross, weights, energy, arrivals, tables, sizes, newton
 ):  # pragma: no cover  (compiled)
-    """Fields of ``Peaks``; a correlation of 0 where there is no peak."""
+    """Fields of ``Peaks``; a correlation of 0 where there is no peak.
+
+    Args:
+        cross: From ``_pair_spectra``.
+        weights: (p, bins).
+        energy: From ``_pair_spectra``.
+        arrivals: See ``find_peaks``.
+        tables: ``PairTables``.
+        sizes: First bin, length of the transform, samples of the cut channels.
+        newton: See ``find_peaks``.
+    """
+    pairs, to_delays, to_shares = tables
+    first, length, cut_samples = sizes
+    others = len(energy) - 1
     step = 2.0 * math.pi / length
     whole = np.rint(arrivals)
     start = np.empty(len(pairs))
@@ -295,26 +299,31 @@ def _measure(
     tau, plain, agreement, sums = _refine(
         cross, weights, first * step, step, start, newton
     )
-    reconciled, variances = np.empty(len(energy)), np.empty(len(energy))
+    reconciled, covariance = np.empty(others + 1), np.empty((others, others))
     r = np.empty(len(pairs))
     for p in range(len(pairs)):
         i, j = pairs[p]
         tau[p] += whole[j] - whole[i]
-        r[p] = plain[p] / math.sqrt(energy[i] * energy[j])
+        r[p] = plain[p] / max(math.sqrt(energy[i] * energy[j]), 1e-300)
     correlation, angular_frequency, noise_energy = 0.0, 0.0, 0.0
     moved, closure = _reconcile(tau, arrivals, pairs, to_delays, reconciled)
     if r.min() > 0.0 and sums[:, 0].min() > 0.0:
         # The soft edges cost energy: the mean square of a raised cosine is 3/8.
         padding = length / (cut_samples - 1.25 * EDGE_SAMPLES)
-        variances[:] = arrival_variances(
+        variances = arrival_variances(
             r, sums, energy, pairs, to_shares, cross.shape[1], padding
         )
+        if not newton:
+            variances += _ROUNDING
+        covariance[:] = variances[0]
+        for m in range(others):
+            covariance[m, m] += variances[m + 1]
         correlation = min(r.min(), agreement.min(), 1.0)
         angular_frequency = math.sqrt((sums[:, 0] / plain).min())
         noise_energy = (1.0 - r.mean()) * energy.mean() / length * padding
     return (
         reconciled,
-        variances,
+        covariance,
         correlation,
         angular_frequency,
         noise_energy,
@@ -328,8 +337,8 @@ class Peaks(NamedTuple):
 
     arrivals: NDArray[np.float64]
     """(n,) arrival at each channel after channel 0 that fits all delays, samples."""
-    variances: NDArray[np.float64]
-    """(n,) of each channel's time of arrival, samples^2."""
+    covariance: NDArray[np.float64]
+    """(n - 1, n - 1) of the arrivals after the first one, samples^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
     angular_frequency: float
@@ -370,22 +379,17 @@ def find_peaks(
     rows = filled_rows(len(frame))
     cut, cut_samples = _cut(frame, np.rint(arrivals), rows, length)
     spectra = fft.rfft(cut)[: len(frame), band]
-    cross, energy = _pair_spectra(spectra, tables.pairs)
-    if not energy.min() > 0.0:
-        return None
-    weights = whitening(cross) if phat else np.ones(cross.shape, dtype=np.float32)
+    cross, weights, energy = _pair_spectra(spectra, tables.pairs)
+    if phat:
+        weights = whitening(cross)
     peaks = Peaks(
         *_measure(
             cross,
-            energy,
             weights,
+            energy,
             arrivals,
-            tables.pairs,
-            tables.to_delays,
-            tables.to_shares,
-            band.start,
-            length,
-            cut_samples,
+            tables,
+            (band.start, length, cut_samples),
             newton,
         )
     )

@@ -110,7 +110,7 @@ def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
 
     Returns:
         They, (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the
-        energies (n,) of the channels.
+        energy of the mean channel; 0 where one is silent.
     """
     channels, bins = spectra.shape
     cross = np.zeros((len(edges), size), dtype=spectra.dtype)
@@ -127,7 +127,7 @@ def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
         for k in range(bins):
             a = spectra[m, k]
             energy[m] += a.real * a.real + a.imag * a.imag
-    return cross, moments, energy
+    return cross, moments, energy.mean() if energy.min() > 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -280,16 +280,16 @@ def search_delays(
             Detection rests on the correlation all the same.
     """
     size = plan.grid // 2 + 1
-    cross, moments, energies = _cross_spectra(spectra, plan.edges, band.start, size)
-    if not energies.min() > 0.0:
+    cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)
+    if not energy > 0.0:
         return None
     white = cross.copy() if phat else None
-    found = _correlation_search(cross, moments, energies.mean(), plan)
+    found = _correlation_search(cross, moments, energy, plan)
     if white is not None:
         # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
         # the plain correlation counts as well, and noise is judged by it.
         white[:, band] *= whitening(white[:, band])
-        seen = _correlation_search(white, moments, energies.mean(), plan)
+        seen = _correlation_search(white, moments, energy, plan)
         arrivals, ambiguity = seen.arrivals, max(found.ambiguity, seen.ambiguity)
     elif by_amdf:
         arrivals, ambiguity = _amdf_search(frame, plan)

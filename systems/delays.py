@@ -9,7 +9,6 @@ gives the errors of the delays.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -44,8 +43,7 @@ METHODS = {
 }
 
 
-@dataclass(frozen=True)
-class DelayEstimate:
+class DelayEstimate(NamedTuple):
     """Delays of one frame and what speaks for them."""
 
     tau: NDArray[np.float64]
@@ -123,7 +121,8 @@ def estimate_delays(
     search, band = seen
     arrivals = search.arrivals
     for _ in range(_CUTS):
-        if np.ptp(arrivals) > plan.max_lag + 1:
+        reach = arrivals.tolist()
+        if max(reach) - min(reach) > plan.max_lag + 1:
             return None
         peaks = find_peaks(
             frame,
@@ -138,21 +137,17 @@ def estimate_delays(
             return None
         arrivals = peaks.arrivals
         if peaks.moved < _SETTLED:
-            return _estimate(peaks, search, band, plan, rounded=chosen.by_amdf)
+            return _estimate(peaks, search, band, plan)
     return None
 
 
 def _estimate(
-    peaks: Peaks, search: DelaySearch, band: slice, plan: DelayPlan, *, rounded: bool
+    peaks: Peaks, search: DelaySearch, band: slice, plan: DelayPlan
 ) -> DelayEstimate:
     rate = plan.sample_rate_hz
-    variances = peaks.variances
-    if rounded:
-        # Rounding of arrivals to whole samples: 1/12 a pair.
-        variances = variances + 1.0 / 24.0
     return DelayEstimate(
         tau=peaks.arrivals[1:] / rate,
-        covariance=(variances[0] + np.diag(variances[1:])) / rate**2,
+        covariance=peaks.covariance / rate**2,
         correlation=peaks.correlation,
         closure=peaks.closure / rate,
         ambiguity=search.ambiguity,

@@ -31,6 +31,7 @@ from systems.signals import (
     SAMPLE_RATE_HZ,
     AudioFrame,
     Emission,
+    read_only,
 )
 from systems.sound_emitter import MAXIMUM_RANGE_M
 
@@ -89,8 +90,10 @@ def record_frame(
     if ego_noise is not None:
         noise += np.float32(snr) * ego_noise
     noise_pa = emissions[0].level_pa / snr
+    counts = convert(pressure, noise, noise_pa, parameters, array.gains)
+    read_only(counts)
     return AudioFrame(
-        counts=convert(pressure, noise, noise_pa, parameters, array.gains),
+        counts=counts,
         full_scale=parameters.full_scale,
         sample_rate_hz=SAMPLE_RATE_HZ,
         time=time,

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +13,7 @@ __all__ = [
     "SAMPLE_RATE_HZ",
     "AudioFrame",
     "Emission",
+    "read_only",
 ]
 
 #: Period of every discrete block (Han 2019, section 4.1; printed "25 m/s").
@@ -26,24 +26,13 @@ SAMPLE_RATE_HZ = 100_000
 FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
 
 
-class _Immutable:
-    """Shares read-only arrays instead of copying them with the context.
-
-    Drake deep-copies abstract values when it clones a context; numpy's copy
-    of a read-only array would be writable and cost a frame's memory.
-    """
-
-    def __post_init__(self) -> None:
-        for value in vars(self).values():
-            if isinstance(value, np.ndarray):
-                value.setflags(write=False)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> _Immutable:
-        return self
+def read_only(*arrays: NDArray[Any]) -> None:
+    """Protects arrays that are shared from being written to."""
+    for array in arrays:
+        array.setflags(write=False)
 
 
-@dataclass(frozen=True)
-class Emission(_Immutable):
+class Emission(NamedTuple):
     """Sound that has left the loudspeaker, and where it left from.
 
     Sample ``n`` was emitted at ``start_time + n / sample_rate_hz``. The
@@ -68,9 +57,12 @@ class Emission(_Immutable):
     sounding: bool
     """False where every sample is zero, so that listeners may skip it."""
 
+    def __deepcopy__(self, memo: dict[int, Any]) -> Emission:
+        """Itself: Drake would copy a frame's memory with every context."""
+        return self
 
-@dataclass(frozen=True)
-class AudioFrame(_Immutable):
+
+class AudioFrame(NamedTuple):
     """One 25 ms frame of converter counts, covering ``[time - 25 ms, time)``."""
 
     counts: NDArray[np.int16]
@@ -81,3 +73,7 @@ class AudioFrame(_Immutable):
     """Rate of each channel, Hz."""
     time: float
     """End of the frame, s."""
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> AudioFrame:
+        """Itself, as ``Emission``."""
+        return self

@@ -11,7 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission, read_only
 from systems.waveforms import SoundParameters, make_waveform
 
 __all__ = [
@@ -83,15 +83,19 @@ def make_emission(
     count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
+    sounding = samples is not None
+    if not sounding:
+        samples = _silence(count)
+    read_only(samples, p_WS, v_WS)
     return Emission(
-        samples=_silence(count) if samples is None else samples,
+        samples=samples,
         start_time=first / SAMPLE_RATE_HZ,
         sample_rate_hz=float(SAMPLE_RATE_HZ),
         knot_times=time - ages,
         p_WS=p_WS,
         v_WS=v_WS,
         level_pa=sound.level_pa,
-        sounding=samples is not None,
+        sounding=sounding,
     )
 
 

@@ -192,7 +192,7 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     nearest = np.min(distances[:-1], axis=0)
     echoes = [
         np.where(
-            columns[f"collision_{k}"] > 0.5,
+            columns[f"feature_{k}"] > 0.5,
             np.hypot(columns[f"collision_{k}_B_x"], columns[f"collision_{k}_B_y"]),
             np.inf,
         )

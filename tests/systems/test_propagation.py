@@ -206,7 +206,7 @@ def test_source_out_of_reach_is_an_error():
 
 @pytest.mark.parametrize(("distance", "heard"), [(33.0, True), (35.0, False)])
 def test_reach_is_what_sound_travels_in_the_time(distance, heard):
-    """The emission begins 0.1 s before the frame: 34 m, the interpolation 2 cm of it."""
+    """The emission begins 0.1 s before the frame: 34 m less 2 cm."""
     sound = emission(np.cos, (distance, 0.0), reach=0.1)
     begin = sound.start_time + 0.1
     with nullcontext() if heard else pytest.raises(ValueError, match="away"):

@@ -117,7 +117,7 @@ def exact(room, source, velocity, pose, pose_velocity, time):
     ):
         mirrored = Emission(
             **{
-                **vars(sent),
+                **sent._asdict(),
                 "p_WS": signs[:2] * (sent.p_WS - room.corner)
                 + offset[:2]
                 + room.corner,

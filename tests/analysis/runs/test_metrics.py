@@ -213,7 +213,7 @@ def test_reaction_is_to_the_obstacle_and_not_to_the_source():
     x = 0.5 * TICK * np.arange(ticks)
     gap = 1.95 - (x + FRONT)
     columns = {
-        "collision_1": np.ones(ticks),
+        "feature_1": np.ones(ticks),
         "collision_1_B_x": gap,
         "repulsion_x": np.where(gap <= 0.9, -1.0, -0.1),
     }
