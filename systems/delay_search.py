@@ -232,8 +232,10 @@ def _correlation_search(
     correlation = fft.irfft(cross, plan.grid, overwrite_x=True, norm="forward")
     padding = plan.length / plan.frame_samples
     stretch = plan.length / plan.grid
-    judged = _judge(correlation, moments, plan.edges, plan.gates, padding, stretch)
-    return DelaySearch(*judged, energy / plan.length)
+    arrivals, ambiguity, chance, weakest = _judge(
+        correlation, moments, plan.edges, plan.gates, padding, stretch
+    )
+    return DelaySearch(arrivals, ambiguity, chance, weakest, energy / plan.length)
 
 
 def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]:

@@ -83,19 +83,18 @@ def make_emission(
     count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
-    sounding = samples is not None
-    if not sounding:
-        samples = _silence(count)
-    read_only(samples, p_WS, v_WS)
+    emitted = _silence(count) if samples is None else samples
+    knot_times = time - ages
+    read_only(emitted, knot_times, p_WS, v_WS)
     return Emission(
-        samples=samples,
+        samples=emitted,
         start_time=first / SAMPLE_RATE_HZ,
         sample_rate_hz=float(SAMPLE_RATE_HZ),
-        knot_times=time - ages,
+        knot_times=knot_times,
         p_WS=p_WS,
         v_WS=v_WS,
         level_pa=sound.level_pa,
-        sounding=sounding,
+        sounding=samples is not None,
     )
 
 
@@ -181,7 +180,7 @@ class SoundEmitter(LeafSystem):
 
     def _start(self, context, discrete_state) -> None:
         path = np.zeros((2, self._ticks, 2))
-        path[0] = self._pose_WS.Eval(context)[:2]
+        path[0] = np.asarray(self._pose_WS.Eval(context))[:2]
         discrete_state.set_value(path.ravel())
 
     def _remember(self, context, discrete_state):
@@ -193,7 +192,7 @@ class SoundEmitter(LeafSystem):
         held = context.get_discrete_state(0).value().reshape(2, self._ticks, 2)
         path = np.empty((2, self._ticks + 1, 2))
         path[:, :-1] = held
-        path[0, -1] = self._pose_WS.Eval(context)[:2]
-        path[1, -1] = self._v_WS.Eval(context)[:2]
+        for row, port in enumerate((self._pose_WS, self._v_WS)):
+            path[row, -1] = np.asarray(port.Eval(context))[:2]
         time = context.get_time()
         output.set_value(make_emission(time, self._waveform, self._sound, *path))

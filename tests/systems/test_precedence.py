@@ -92,9 +92,7 @@ def test_channels_do_not_touch_each_other(channels):
     dry, memory, _ = keep_first_wave_front(rows, None, sizes)
     alone = EchoMemory(1, FS)
     for k in range(channels):
-        single, its_memory, _ = keep_first_wave_front(
-            rows[k : k + 1], None, alone
-        )
+        single, its_memory, _ = keep_first_wave_front(rows[k : k + 1], None, alone)
         np.testing.assert_allclose(dry[k], single[0], atol=1e-6)
         np.testing.assert_allclose(memory[k], its_memory[0], rtol=1e-6)
 
@@ -154,8 +152,6 @@ def test_little_of_noise_is_news_once_its_level_is_known():
 def test_a_click_in_noise_is_as_it_was_and_the_noise_is_gone():
     noise = np.random.default_rng(4).standard_normal(N) * 0.01
     clean, *_ = keep_first_wave_front(frame(at(CLICK)), None, SIZES)
-    noisy, *_ = keep_first_wave_front(
-        frame(at(CLICK) + noise), None, SIZES, 0.01**2
-    )
+    noisy, *_ = keep_first_wave_front(frame(at(CLICK) + noise), None, SIZES, 0.01**2)
     assert energy(noisy[0], CLICK) == pytest.approx(energy(clean[0], CLICK), rel=0.2)
     assert energy(noisy[0], ECHO) < 0.02 * energy(noisy[0], CLICK)
