@@ -11,7 +11,7 @@ from scipy import signal, stats
 
 from systems.array_shape import ArrayShape
 from systems.delay_plan import DelayPlan
-from systems.delay_search import _chance_of_noise, _peak
+from systems.delay_search import _chance_of_noise, _peak, weakest_sound
 from systems.delays import look
 
 FS, N = 100_000.0, 2500
@@ -58,6 +58,25 @@ def test_chances_of_noise_are_uniform_or_safer(shape, colour):
         count = int(np.count_nonzero(np.array(chances) <= p))
         test = stats.binomtest(count, len(chances), p, alternative="greater")
         assert test.pvalue > 1e-3, (p, count)
+
+
+@pytest.mark.parametrize("rate", [1e-2, 1e-4, 1e-7])
+@pytest.mark.parametrize("shape", [ROW, SQUARE, RING], ids=["3", "4", "8"])
+def test_the_weakest_sound_is_heard_in_half_of_the_frames(shape, rate):
+    """Or in more, with more than three microphones; none 3 dB below, all 3 dB above."""
+    its_plan = plan(shape)
+    energy = weakest_sound(its_plan, rate)
+    shares = []
+    for factor in (0.5, 1.0, 2.0):
+        generator = Generator(Philox(key=8))
+        sound = np.sqrt(factor * energy) * generator.standard_normal((100, 1, N))
+        frames = sound + generator.standard_normal((100, shape.count, N))
+        seen = [look(frame, its_plan) for frame in frames.astype(np.float32)]
+        shares.append(np.mean([found[0].chance <= rate for found in seen]))
+    assert shares[0] <= 0.1
+    assert shares[1] == pytest.approx(0.5, abs=0.15) or shape is not ROW
+    assert shares[1] >= 0.35
+    assert shares[2] >= 0.99
 
 
 @given(
