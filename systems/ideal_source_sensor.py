@@ -106,30 +106,31 @@ def IdealSourceSensor_(T):
             self.set_name("ideal_source_sensor")
             self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
             self._pose_WS = self.DeclareVectorInputPort(name="pose_WS", size=3)
-            self.DeclareDiscreteState(3)
+            self._position = self.DeclareDiscreteState(2)
+            self._detected = self.DeclareDiscreteState(1)
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._measure
             )
-            for name, size, calc in (
-                ("source_bearing", 1, self._bearing),
-                ("source_range", 1, self._range),
-                ("p_PS_B", 2, self._position),
-                ("covariance", 4, self._covariance),
-                ("detected", 1, self._detected),
-                ("range_valid", 1, self._detected),
-            ):
-                self.DeclareVectorOutputPort(
-                    name=name,
-                    size=size,
-                    calc=calc,
-                    prerequisites_of_calc={self.xd_ticket()},
-                )
+            self._declare("source_bearing", 1, self._bearing)
+            self._declare("source_range", 1, self._range)
+            self.DeclareStateOutputPort("p_PS_B", self._position)
+            self._declare("covariance", 4, self._covariance)
+            self.DeclareStateOutputPort("detected", self._detected)
+            self.DeclareStateOutputPort("range_valid", self._detected)
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, **other._config, converter=converter)
 
+        def _declare(self, name, size, calc):
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=size,
+                calc=calc,
+                prerequisites_of_calc={self.xd_ticket()},
+            )
+
         def _state(self, context):
-            return context.get_discrete_state(0).CopyToVector().tolist()
+            return context.get_discrete_state(self._position).CopyToVector().tolist()
 
         def _sounds(self, time: float) -> bool:
             return not self._hearing.burst_gaps or self._config["sound"].sounds(time)
@@ -147,9 +148,10 @@ def IdealSourceSensor_(T):
             )
             if self._noisy:
                 x, y = self._disturbed(x, y, round(time / FRAME_PERIOD_S))
-            discrete_state.get_mutable_vector().SetFromVector(
-                [x, y, T(1.0)] if heard else [T(0.0)] * 3
-            )
+            if not heard:
+                x = y = T(0.0)
+            discrete_state.set_value(self._position, [x, y])
+            discrete_state.set_value(self._detected, [T(float(heard))])
 
         def _disturbed(self, x, y, tick):
             rng = tick_generator(self._config["seed"], tick)
@@ -162,18 +164,15 @@ def IdealSourceSensor_(T):
             return distance * math.cos(bearing), distance * math.sin(bearing)
 
         def _bearing(self, context, output):
-            x, y, _ = self._state(context)
+            x, y = self._state(context)
             output.SetFromVector([atan2(y, x)])
 
         def _range(self, context, output):
-            x, y, _ = self._state(context)
+            x, y = self._state(context)
             output.SetFromVector([safe_norm(x, y)])
 
-        def _position(self, context, output):
-            output.SetFromVector(self._state(context)[:2])
-
         def _covariance(self, context, output):
-            x, y, _ = self._state(context)
+            x, y = self._state(context)
             bearing = atan2(y, x)
             across = math.radians(self._hearing.bearing_noise_deg) ** 2 * (
                 x * x + y * y
@@ -189,10 +188,6 @@ def IdealSourceSensor_(T):
                     along * s * s + across * c * c,
                 ]
             )
-
-        def _detected(self, context, output):
-            output.SetFromVector([self._state(context)[2]])
-
     return Impl
 
 

@@ -188,7 +188,7 @@ class ImpedanceLoop:
         *_, vectors_W = self._forces.Eval(context)
         rows = [value for row in vectors_W for value in row]
         rows += [self._scalar(0.0)] * (3 * SLOTS - len(rows))
-        discrete_state.get_mutable_vector().SetFromVector(rows)
+        discrete_state.set_value(rows)
 
     def _acceleration(self, context, output):
         F_m, F_b, *_ = self._forces.Eval(context)

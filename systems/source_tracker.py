@@ -125,7 +125,7 @@ def SourceTracker_(T):
 
         def _start(self, context, discrete_state):
             track = self._model.start(self._pose.Eval(context))
-            discrete_state.get_mutable_vector().SetFromVector(track.pack())
+            discrete_state.set_value(track.pack())
 
         def _track(self, context):
             """The track with the present estimate folded in."""
@@ -142,7 +142,7 @@ def SourceTracker_(T):
         def _update(self, context, discrete_state):
             track, pose = self._now.Eval(context), self._pose.Eval(context)
             track = self._model.older(track, pose)
-            discrete_state.get_mutable_vector().SetFromVector(track.pack())
+            discrete_state.set_value(track.pack())
 
         def _target(self, context, output):
             track, pose = self._now.Eval(context), self._pose.Eval(context)

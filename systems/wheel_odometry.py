@@ -152,7 +152,7 @@ def WheelOdometry_(T):
         def _update(self, context, discrete_state):
             pose = self._pose.Eval(context).tolist()
             now = [*pose, *self._encoder_angles(context)]
-            discrete_state.get_mutable_vector().SetFromVector(now)
+            discrete_state.set_value(now)
 
         def _velocity(self, context, output):
             now, held = self._pose.Eval(context), self._held(context)
