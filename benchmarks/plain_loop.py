@@ -17,7 +17,7 @@ from diagrams.builder import block_seed
 from systems.active_impedance_controller import active_force
 from systems.array_tolerances import draw_tolerances, real_array
 from systems.collision_vector import collision_vectors, echo_points
-from systems.diff_drive_plant import body_twist, plant_derivatives
+from systems.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
 from systems.geometry import control_point, rotate
 from systems.impedance import attraction_force, repulsion_force
 from systems.mic_array import microphones_B, record_frame
@@ -183,10 +183,11 @@ class PlainLoop:
 
     def _drive(self, state: Any, wheels: Any) -> Any:
         """One third-order Runge-Kutta step, the one that Drake takes."""
-        robot, plant = self.scenario.robot, self.scenario.plant
+        numbers = PlantNumbers.of(self.scenario.robot, self.scenario.plant)
+        commanded = np.array(wheels)
 
         def slope(at: NDArray[np.float64]) -> NDArray[np.float64]:
-            return np.array(plant_derivatives(at.tolist(), wheels, robot, plant))
+            return plant_derivatives(at, commanded, numbers)
 
         start = np.array(state)
         k1 = slope(start)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
 from pydantic import Field, Strict
 from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import cos, sin
@@ -17,6 +19,7 @@ from systems.robot import RobotParameters
 __all__ = [
     "DiffDrivePlant",
     "DiffDrivePlant_",
+    "PlantNumbers",
     "PlantParameters",
     "body_twist",
     "plant_derivatives",
@@ -39,36 +42,75 @@ def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
     """Forward speed, m/s, and yaw rate, rad/s, from wheel speeds in rad/s."""
     left = robot.wheel_radius_m * (1.0 - slip[0]) * wheel_speeds[0]
     right = robot.wheel_radius_m * (1.0 - slip[1]) * wheel_speeds[1]
-    return (left + right) / 2.0, (right - left) / robot.wheel_separation_m
+    return _rim_twist(left, right, robot.wheel_separation_m)
 
 
-def plant_derivatives(state, commanded, robot, plant):
-    """Time derivatives of the plant.
+@register_jitable
+def _rim_twist(left, right, separation):
+    return (left + right) / 2.0, (right - left) / separation
+
+
+class PlantNumbers(NamedTuple):
+    """What the plant's motion hangs on, for compiled code."""
+
+    left_rim_m: float
+    """Way of the left end of the axle for an angle of its wheel, m/rad."""
+    right_rim_m: float
+    """The same of the right end, m/rad."""
+    wheel_separation_m: float
+    """Distance between the wheels, m."""
+    top_wheel_speed: float
+    """Commands saturate here, rad/s."""
+    motor_lag_s: float
+    """Time constant of the wheels' speeds, s."""
+
+    @classmethod
+    def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
+        """From the parameters."""
+        left, right = plant.slip
+        return cls(
+            robot.wheel_radius_m * (1.0 - left),
+            robot.wheel_radius_m * (1.0 - right),
+            robot.wheel_separation_m,
+            robot.top_wheel_speed,
+            plant.motor_lag_s,
+        )
+
+
+@njit(cache=True)
+def plant_derivatives(state, commanded, numbers):
+    """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
 
     Args:
-        state: x, y, theta, left and right wheel angle, left and right wheel
-            speed; m, rad, rad/s; floats or AutoDiffXd.
-        commanded: Left and right wheel speed, rad/s.
-        robot: Dimensions; its top wheel speed saturates the command.
-        plant: Motor lag and slip.
+        state: (7,) x, y, theta, left and right wheel angle, left and right wheel
+            speed; m, rad, rad/s.
+        commanded: (2,) left and right wheel speed, rad/s.
+        numbers: ``PlantNumbers``.
 
     Returns:
-        Seven derivatives in the order of the state.
+        (7,) derivatives in the order of the state.
     """
     theta, left, right = state[2], state[5], state[6]
-    v, omega = body_twist((left, right), robot, plant.slip)
-    limit = robot.top_wheel_speed
-    return [
-        v * cos(theta),
-        v * sin(theta),
-        omega,
-        left,
-        right,
-        (_saturate(commanded[0], limit) - left) / plant.motor_lag_s,
-        (_saturate(commanded[1], limit) - right) / plant.motor_lag_s,
-    ]
+    v, omega = _rim_twist(
+        numbers.left_rim_m * left,
+        numbers.right_rim_m * right,
+        numbers.wheel_separation_m,
+    )
+    limit, lag = numbers.top_wheel_speed, numbers.motor_lag_s
+    rates = np.empty_like(state)
+    rates[0], rates[1], rates[2] = v * np.cos(theta), v * np.sin(theta), omega
+    rates[3], rates[4] = left, right
+    rates[5] = (_saturate(commanded[0], limit) - left) / lag
+    rates[6] = (_saturate(commanded[1], limit) - right) / lag
+    return rates
 
 
+@njit(cache=True)
+def _all_finite(state, commanded):  # pragma: no cover  (compiled)
+    return np.isfinite(state.sum() + commanded.sum())
+
+
+@register_jitable
 def _saturate(value, limit):
     if value > limit:
         return value * 0.0 + limit
@@ -119,6 +161,7 @@ def DiffDrivePlant_(T):
             super().__init__(converter=converter)
             self._robot = robot or RobotParameters()
             self._plant = plant or PlantParameters()
+            self._numbers = PlantNumbers.of(self._robot, self._plant)
             self._initial_pose = tuple(initial_pose)
             self.set_name("diff_drive_plant")
             self._wheel_speeds = self.DeclareVectorInputPort(
@@ -146,16 +189,14 @@ def DiffDrivePlant_(T):
             )
 
         def DoCalcTimeDerivatives(self, context, derivatives):
-            state = context.get_continuous_state_vector().CopyToVector().tolist()
-            commanded = self._wheel_speeds.Eval(context).tolist()
-            if T is float and not math.isfinite(sum(state, sum(commanded))):
+            state, commanded = self._state(context), self._wheel_speeds.Eval(context)
+            if T is float and not _all_finite(state, commanded):
                 raise ValueError(
                     f"DiffDrivePlant: state {state} or wheel_speeds {commanded} is "
                     "not finite; look for the block upstream that made it so"
                 )
-            derivatives.SetFromVector(
-                plant_derivatives(state, commanded, self._robot, self._plant)
-            )
+            function = plant_derivatives if T is float else plant_derivatives.py_func
+            derivatives.SetFromVector(function(state, commanded, self._numbers))
 
         def _state(self, context):
             return context.get_continuous_state_vector().CopyToVector()

@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.diff_drive_plant import PlantParameters, body_twist, plant_derivatives
+from systems.diff_drive_plant import (
+    PlantNumbers,
+    PlantParameters,
+    body_twist,
+    plant_derivatives,
+)
 from systems.geometry import control_point
 from systems.robot import RobotParameters
 from systems.wheel_speed_command import (
@@ -34,7 +39,8 @@ def test_control_point_moves_with_the_virtual_mass(theta, direction, speed):
     v_WP = (speed * math.cos(direction), speed * math.sin(direction))
     wheels = wheels_for(v_WP, theta)
     state = np.array([0.3, -0.2, theta, 0.0, 0.0, *wheels])
-    rates = np.array(plant_derivatives(state, wheels, ROBOT, PlantParameters()))
+    numbers = PlantNumbers.of(ROBOT, PlantParameters())
+    rates = plant_derivatives(np.array(state), np.array(wheels), numbers)
     h = 1e-6
     ahead = control_point((state + h * rates)[:3], 0.175)
     behind = control_point((state - h * rates)[:3], 0.175)
