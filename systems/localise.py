@@ -135,10 +135,9 @@ class Localiser:
         channels = plan.shape.count
         self._scatter = _QUIET * math.sqrt(2.0 / (channels * plan.frame_samples))
         # A band that is found may be as narrow as it likes.
-        self._rise = 0.0
+        self._weakest = 0.0
         if parameters.band == "set":
-            rate = parameters.false_alarm_rate
-            self._rise = 2.0 * channels * weakest_sound(plan, rate)
+            self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
 
     @classmethod
     def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
@@ -206,8 +205,10 @@ class Localiser:
 
     def _quietest(self, memory: HearingMemory) -> float:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""
-        noise = (1.0 - self._scatter) * memory.energy
-        return noise + self._rise * memory.noise_energy
+        # Both sides of the spectrum, all channels; and what of it is no rumble.
+        in_band = 2.0 * self.plan.shape.count * memory.noise_energy
+        rise = self._weakest * min(in_band, memory.energy)
+        return (1.0 - self._scatter) * memory.energy + rise
 
     def _locate(
         self,

@@ -291,13 +291,15 @@ class MicArray(LeafSystem):
         return round(time / FRAME_PERIOD_S) % self._update_ticks == 0
 
     def _emissions(self, context) -> list[Emission]:
-        emissions: list[Any] = [port.Eval(context) for port in self._sources]
-        for emission, port in zip(emissions, self._sources, strict=True):
+        emissions = []
+        for port in self._sources:
+            emission: Any = port.Eval(context)
             if not isinstance(emission, Emission):
                 raise TypeError(
                     f"MicArray: port {port.get_name()} carries a "
                     f"{type(emission).__name__}; connect the emission of a SoundEmitter"
                 )
+            emissions.append(emission)
         return emissions
 
     def _places(self, context, emissions: list[Emission]) -> NDArray[np.float64]:

@@ -92,7 +92,7 @@ class TDOAEstimator(LeafSystem):
         )
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
-        self._memory = self.DeclareDiscreteState(4)
+        self._memory = self.DeclareDiscreteState(5)
         self._echoes = self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
@@ -111,26 +111,26 @@ class TDOAEstimator(LeafSystem):
                 f"record at {SAMPLE_RATE_HZ} Hz"
             )
         frame = audio.counts.astype(np.float32)
-        before = self._remembered(context)
+        before, located = self._remembered(context)
         fix, after = self._localiser.localise(frame, before)
-        if after is not before:
-            numbers = (*after[:2], after.echoes is not None, after.heard)
-            discrete_state.set_value(self._memory, numbers)
+        flags = after.echoes is not None, after.heard, fix is not None
+        discrete_state.set_value(self._memory, (*after[:2], *flags))
         if after.echoes is not None and after.echoes is not before.echoes:
             discrete_state.set_value(self._echoes, after.echoes.ravel())
-        if fix is None and not context.get_discrete_state(_DETECTED).value()[0]:
-            return  # silence goes on, and the state is zero already
+        if fix is None and not located:
+            return  # silence goes on, and the outputs are zero already
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
 
-    def _remembered(self, context) -> HearingMemory:
+    def _remembered(self, context) -> tuple[HearingMemory, bool]:
+        """What the last frame left, and whether it held a place."""
         numbers = context.get_discrete_state(self._memory).value().tolist()
-        energy, noise_energy, echoing, heard = numbers
+        energy, noise_energy, echoing, heard, located = numbers
         echoes = None
         if echoing:
             held = context.get_discrete_state(self._echoes).value()
             echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
-        return HearingMemory(energy, noise_energy, echoes, bool(heard))
+        return HearingMemory(energy, noise_energy, echoes, bool(heard)), bool(located)
 
 
 #: Output ports and their sizes.
@@ -142,9 +142,6 @@ _PORTS = (
     ("detected", 1),
     ("range_valid", 1),
 )
-
-#: Index of the state group behind the port ``detected``.
-_DETECTED = 4
 
 #: Values of the output ports where nothing is heard.
 _NOTHING = tuple(np.zeros(size) for _, size in _PORTS)
