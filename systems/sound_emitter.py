@@ -44,7 +44,8 @@ def emitted_samples(
         count: Number of samples.
 
     Returns:
-        (count,) Pa at 1 m, or None where all are zero.
+        (count,) Pa at 1 m, a part of the waveform where it can be; None where all
+        are zero.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     period = round(sound.period_s * SAMPLE_RATE_HZ)
@@ -54,10 +55,12 @@ def emitted_samples(
     number = max(0, (first - start - burst) // period)
     while (begin := start + number * period) < first + count:
         low, high = max(begin, first), min(begin + burst, first + count)
+        offset = (number % bursts) * burst - begin
+        if high - low == count:
+            return waveform[low + offset : high + offset]
         if low < high:
             if out is None:
                 out = np.zeros(count, dtype=np.float32)
-            offset = (number % bursts) * burst - begin
             out[low - first : high - first] = waveform[low + offset : high + offset]
         number += 1
     return out
