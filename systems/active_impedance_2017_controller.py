@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.impedance import ImpedanceLoop
 from systems.repulsion import Active2017Parameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = [
     "ActiveImpedance2017Controller",
@@ -39,7 +38,7 @@ def active_2017_force(c, s, gains: Active2017Parameters):
     return spring + gains.damping_n_s_m * (s if s < fast else fast + 0.0 * s)
 
 
-@TemplateSystem.define("ActiveImpedance2017Controller_", T_list=[float, AutoDiffXd])
+@define_for_scalars("ActiveImpedance2017Controller_", __name__)
 def ActiveImpedance2017Controller_(T):
     class Impl(LeafSystem_[T], ImpedanceLoop):
         """Follows the target; pushes off by inverse distance, up to a limit.

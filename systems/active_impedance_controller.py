@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import exp
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.impedance import ImpedanceLoop
 from systems.repulsion import ActiveParameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = [
     "ActiveImpedanceController",
@@ -38,7 +37,7 @@ def active_force(c, s, gains: ActiveParameters):
     return spring + damper * (gains.speed_limit_m_s - s)
 
 
-@TemplateSystem.define("ActiveImpedanceController_", T_list=[float, AutoDiffXd])
+@define_for_scalars("ActiveImpedanceController_", __name__)
 def ActiveImpedanceController_(T):
     class Impl(LeafSystem_[T], ImpedanceLoop):
         """Follows the target; pushes off by distance and speed at any distance.

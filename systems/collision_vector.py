@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from typing import Literal
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.cache import declare_cache
 from systems.parameters import NonNegative, Parameters
+from systems.scalar_types import define_for_scalars
 from systems.ultrasonic_array import SENSORS, UltrasonicParameters
 
 __all__ = [
@@ -188,7 +187,7 @@ def declare_collision_ports(system, slots):
         )
 
 
-@TemplateSystem.define("CollisionVector_", T_list=[float, AutoDiffXd])
+@define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
     class Impl(LeafSystem_[T]):
         """Turns echoes into collision vectors from P (cases I and II).

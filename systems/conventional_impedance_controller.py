@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.impedance import ImpedanceLoop
 from systems.repulsion import ConventionalParameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = [
     "ConventionalImpedanceController",
@@ -32,7 +31,7 @@ def conventional_force(c, s, gains: ConventionalParameters):
     return 0.0 * c
 
 
-@TemplateSystem.define("ConventionalImpedanceController_", T_list=[float, AutoDiffXd])
+@define_for_scalars("ConventionalImpedanceController_", __name__)
 def ConventionalImpedanceController_(T):
     class Impl(LeafSystem_[T], ImpedanceLoop):
         """Follows the target; pushes off linearly within rho_0.

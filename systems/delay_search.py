@@ -15,7 +15,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.optimize import brentq
 
 from systems.delay_peaks import whitening
 from systems.delay_plan import DelayPlan
@@ -211,6 +210,8 @@ def weakest_sound(plan: DelayPlan, rate: float) -> float:
     Returns:
         Energy of the sound over that of the noise, within the band.
     """
+    from scipy.optimize import brentq
+
     bins = np.arange(plan.band.start, plan.band.stop)
     counts = 2.0 * plan.gates / plan.grid * math.sqrt(np.mean(bins**2.0))
 

@@ -8,13 +8,12 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from pydantic import Field, Strict
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import cos, sin
 from pydrake.systems.framework import BasicVector_, LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.parameters import Parameters, Positive
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = [
     "DiffDrivePlant",
@@ -119,7 +118,7 @@ def _saturate(value, limit):
     return value
 
 
-@TemplateSystem.define("DiffDrivePlant_", T_list=[float, AutoDiffXd])
+@define_for_scalars("DiffDrivePlant_", __name__)
 def DiffDrivePlant_(T):
     class Impl(LeafSystem_[T]):
         """Moves the robot: motor lag, saturation, rolling wheels.

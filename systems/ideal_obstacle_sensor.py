@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.cache import declare_cache
 from systems.collision_vector import SLOTS, declare_collision_ports, fill_slots
 from systems.geometry import control_point, nearest_point_on_rectangle, rotate
 from systems.parameters import Positive, Size
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = ["IdealObstacleSensor", "IdealObstacleSensor_", "nearest_vectors"]
 
@@ -47,7 +46,7 @@ def float_of(value) -> float:
     return value if isinstance(value, float) else value.value()
 
 
-@TemplateSystem.define("IdealObstacleSensor_", T_list=[float, AutoDiffXd])
+@define_for_scalars("IdealObstacleSensor_", __name__)
 def IdealObstacleSensor_(T):
     class Impl(LeafSystem_[T]):
         """Gives the exact nearest points of the bodies, in all directions.

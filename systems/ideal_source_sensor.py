@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import math
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import atan2, cos, sin
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.geometry import control_point, rotate, safe_norm
 from systems.noise import tick_generator
 from systems.parameters import NonNegative, Parameters, Positive
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 from systems.waveforms import SoundParameters
 
@@ -43,7 +42,7 @@ def relative_position(pose_WB, pose_WS, control_point_m):
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
 
 
-@TemplateSystem.define("IdealSourceSensor_", T_list=[float, AutoDiffXd])
+@define_for_scalars("IdealSourceSensor_", __name__)
 def IdealSourceSensor_(T):
     class Impl(LeafSystem_[T]):
         """Measures where the source is, exactly or with a set noise.
@@ -188,6 +187,7 @@ def IdealSourceSensor_(T):
                     along * s * s + across * c * c,
                 ]
             )
+
     return Impl
 
 

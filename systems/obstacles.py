@@ -7,12 +7,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import Field, Strict, model_validator
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.parameters import NonNegative, Parameters, Point, Size
 from systems.paths import WaypointPath, seconds
+from systems.scalar_types import define_for_scalars
 
 __all__ = ["ObstacleParameters", "Obstacles", "Obstacles_"]
 
@@ -54,7 +53,7 @@ class ObstacleParameters(Parameters):
         )
 
 
-@TemplateSystem.define("Obstacles_", T_list=[float, AutoDiffXd])
+@define_for_scalars("Obstacles_", __name__)
 def Obstacles_(T):
     class Impl(LeafSystem_[T]):
         """Publishes where the boxes are, and how large.

@@ -13,7 +13,6 @@ import math
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy.signal.windows import kaiser
 
 from systems.signals import Emission
 
@@ -53,7 +52,7 @@ def _interpolation_kernel() -> NDArray[np.float32]:
     u = np.linspace(-0.5, 0.5, 257)
     x = np.arange(_TAPS) - (KERNEL_REACH - 0.5) - u[:, None]
     fine = np.linspace(-KERNEL_REACH, KERNEL_REACH, 4801)
-    weights = np.sinc(x) * np.interp(x, fine, kaiser(4801, _BETA))
+    weights = np.sinc(x) * np.interp(x, fine, np.kaiser(4801, _BETA))
     weights /= weights.sum(axis=1, keepdims=True)
     powers = np.vander(u * u, 4, increasing=True)
     near, far = weights[:, :KERNEL_REACH], weights[:, : KERNEL_REACH - 1 : -1]

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.impedance import ImpedanceLoop
 from systems.repulsion import RepulsionParameters
+from systems.scalar_types import define_for_scalars
 
 __all__ = ["RadialLawController", "RadialLawController_", "no_force"]
 
@@ -17,7 +16,7 @@ def no_force(c, s, repulsion: RepulsionParameters):
     return 0.0 * c
 
 
-@TemplateSystem.define("RadialLawController_", T_list=[float, AutoDiffXd])
+@define_for_scalars("RadialLawController_", __name__)
 def RadialLawController_(T):
     class Impl(LeafSystem_[T], ImpedanceLoop):
         """Follows the target; pushes off by any function of c and s.

@@ -6,12 +6,11 @@ import math
 from typing import Annotated, Literal
 
 from pydantic import Strict, model_validator
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.parameters import NonNegative, Parameters, Point, Positive
 from systems.paths import WaypointPath, seconds
+from systems.scalar_types import define_for_scalars
 
 __all__ = ["SourceRobot", "SourceRobotParameters", "SourceRobot_"]
 
@@ -53,7 +52,7 @@ class SourceRobotParameters(Parameters):
         )
 
 
-@TemplateSystem.define("SourceRobot_", T_list=[float, AutoDiffXd])
+@define_for_scalars("SourceRobot_", __name__)
 def SourceRobot_(T):
     class Impl(LeafSystem_[T]):
         """Moves the source along waypoints at constant speed.

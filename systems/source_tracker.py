@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.cache import declare_cache
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 from systems.tracker_model import Estimate, Track, TrackerModel, TrackerParameters
 
 __all__ = ["SourceTracker", "SourceTracker_"]
 
 
-@TemplateSystem.define("SourceTracker_", T_list=[float, AutoDiffXd])
+@define_for_scalars("SourceTracker_", __name__)
 def SourceTracker_(T):
     class Impl(LeafSystem_[T]):
         """Knows where the source is, from the estimates that it hears.

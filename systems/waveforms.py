@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-import scipy.signal
 import soxr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
@@ -129,6 +128,8 @@ def _time(seconds: float) -> NDArray[np.float64]:
 
 def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     """Sweeps of one frame's length, so that every frame holds the whole band."""
+    import scipy.signal
+
     time = _time(FRAME_PERIOD_S)
     sweep = scipy.signal.chirp(
         time, sound.low_hz, FRAME_PERIOD_S, sound.high_hz, phi=-90.0
@@ -179,6 +180,8 @@ def band_limited(
     samples: NDArray[np.float64], low_hz: float, high_hz: float
 ) -> NDArray[np.float64]:
     """Zero-phase Butterworth band-pass."""
+    import scipy.signal
+
     sections = scipy.signal.butter(
         4, (low_hz, high_hz), "bandpass", fs=SAMPLE_RATE_HZ, output="sos"
     )

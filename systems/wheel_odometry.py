@@ -5,14 +5,13 @@ from __future__ import annotations
 import math
 
 from pydantic import Field
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import cos, sin
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.diff_drive_plant import body_twist
 from systems.parameters import Parameters
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -60,7 +59,7 @@ def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
     )
 
 
-@TemplateSystem.define("WheelOdometry_", T_list=[float, AutoDiffXd])
+@define_for_scalars("WheelOdometry_", __name__)
 def WheelOdometry_(T):
     class Impl(LeafSystem_[T]):
         """Estimates pose and velocity from the wheels' encoders.

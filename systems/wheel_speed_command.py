@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from pydrake.autodiffutils import AutoDiffXd
 from pydrake.math import abs as magnitude
 from pydrake.systems.framework import LeafSystem_
-from pydrake.systems.scalar_conversion import TemplateSystem
 
 from systems.geometry import rotate, safe_norm
 from systems.robot import RobotParameters
+from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -63,7 +62,7 @@ def limited_wheel_speeds(v, omega, robot: RobotParameters):
     return left, right
 
 
-@TemplateSystem.define("WheelSpeedCommand_", T_list=[float, AutoDiffXd])
+@define_for_scalars("WheelSpeedCommand_", __name__)
 def WheelSpeedCommand_(T):
     class Impl(LeafSystem_[T]):
         """Integrates the virtual mass at P and commands the wheels.
