@@ -21,7 +21,7 @@ def main() -> int:
     stay_on_one_core()
     return print_figures(
         [
-            Figure("full audio, times real time", real_time_factor(()), ">=", 40.0),
+            Figure("full audio, times real time", real_time_factor(()), ">=", 60.0),
             Figure(
                 "ideal sensors, times real time", real_time_factor(IDEAL), ">=", 150.0
             ),

@@ -72,7 +72,8 @@ def test_the_weakest_sound_is_heard_in_half_of_the_frames(shape, rate):
         sound = np.sqrt(factor * energy) * generator.standard_normal((100, 1, N))
         frames = sound + generator.standard_normal((100, shape.count, N))
         seen = [look(frame, its_plan) for frame in frames.astype(np.float32)]
-        shares.append(np.mean([found[0].chance <= rate for found in seen]))
+        chances = [found[0].chance for found in seen if found is not None]
+        shares.append(np.mean(np.array(chances) <= rate))
     assert shares[0] <= 0.1
     assert shares[1] == pytest.approx(0.5, abs=0.15) or shape is not ROW
     assert shares[1] >= 0.35
