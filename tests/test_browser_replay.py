@@ -27,7 +27,15 @@ def _picture(chromium: Chromium, page: Path, time: float) -> np.ndarray:
     sought = page.parent / f"at_{time}.html"
     sought.write_text(page.read_text().replace("</body>", script))
     shot = page.parent / f"at_{time}.png"
-    chromium(sought, "--virtual-time-budget=8000", f"--screenshot={shot}")
+    # A large picture takes a slow machine longer to draw than virtual time allows a
+    # frame, and Chromium then waits for ever; by stages, it waits for the picture.
+    chromium(
+        sought,
+        "--window-size=600,400",
+        "--virtual-time-budget=8000",
+        "--run-all-compositor-stages-before-draw",
+        f"--screenshot={shot}",
+    )
     assert shot.is_file()
     return np.asarray(imread(shot))[:, :, :3]
 
@@ -46,7 +54,7 @@ def _place(picture: np.ndarray, channel: int) -> np.ndarray:
     """Mean column and row of the pixels in which one colour rules."""
     others = np.delete(picture, channel, axis=2).max(axis=2)
     rows, columns = np.nonzero(picture[:, :, channel] > others + 0.25)
-    assert len(rows) > 100, "the body of this colour is not in the picture"
+    assert len(rows) > 50, "the body of this colour is not in the picture"
     return np.array([columns.mean(), rows.mean()])
 
 
@@ -66,5 +74,5 @@ def test_the_picture_moves(pictures):
 def test_the_source_drives_to_the_right_and_the_robot_after_it(pictures):
     # x of W is to the right; the source is orange, the robot blue.
     early, late = pictures
-    assert _place(late, 0)[0] > _place(early, 0)[0] + 30.0
-    assert _place(late, 2)[0] > _place(early, 2)[0] + 30.0
+    assert _place(late, 0)[0] > _place(early, 0)[0] + 20.0
+    assert _place(late, 2)[0] > _place(early, 2)[0] + 20.0
