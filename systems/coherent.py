@@ -23,8 +23,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from systems.array_shape import ArrayShape
-from systems.delay_peaks import EDGE_SAMPLES, cut_to_overlap
 from systems.multilateration import locate_source
+from systems.overlap import EDGE_SAMPLES, cut_to_overlap
 from systems.source_fix import SourceFix
 
 __all__ = ["arrival_delays", "refine_source"]

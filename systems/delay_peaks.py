@@ -10,34 +10,18 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.propagation import REORDER
+from systems.correlation_peak import refine_peaks
+from systems.overlap import EDGE_SAMPLES, cut_rows
 from systems.transforms import filled_rows
 
-__all__ = [
-    "EDGE_SAMPLES",
-    "PairTables",
-    "Peaks",
-    "cut_to_overlap",
-    "find_peaks",
-    "whitening",
-]
+__all__ = ["PairTables", "Peaks", "find_peaks", "whitening"]
 
 # Weights of PHAT fall to zero where the cross-spectrum is below this share of
 # its mean: bins of noise would otherwise weigh as much as bins of sound.
 _PHAT_FLOOR = 0.1
 
-# Newton's method: largest number of steps, and the step at which it ends.
-_ITERATIONS = 10
-_TOLERANCE = 1e-6
-
 # Variance of an arrival that is rounded to whole samples: 1/12 a pair.
 _ROUNDING = 1.0 / 24.0
-
-#: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
-#: whole samples by one over the length and the squared bandwidth: 4e-3 samples of
-#: a 25 ms frame, as much as the noise at 30 dB. These leave a twentieth of it, and
-#: nothing where they follow the delays below the sample.
-EDGE_SAMPLES = 16
 
 
 def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -45,45 +29,6 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
     size = np.abs(cross)
     floor = _PHAT_FLOOR * size.mean(axis=-1, keepdims=True)
     return 1.0 / (size + floor + np.finfo(np.float32).tiny)
-
-
-def cut_to_overlap(
-    frame: NDArray[np.float32], arrivals: NDArray[np.float64]
-) -> NDArray[np.float32]:
-    """(n, m) the stretch that all channels share, with soft edges.
-
-    Args:
-        frame: (n, samples) channels.
-        arrivals: (n,) arrival at each channel after channel 0, samples. Channels
-            are cut at whole samples; their edges follow what is left of it.
-    """
-    cut, length = _cut(frame, arrivals, *frame.shape)
-    return np.ascontiguousarray(cut[:, :length])
-
-
-@njit(cache=True)
-def _cut(frame, arrivals, rows, columns):  # pragma: no cover  (compiled)
-    """``cut_to_overlap``, with zeros after and below, and its length."""
-    channels, samples = frame.shape
-    whole = np.rint(arrivals)
-    earliest = whole.min()
-    length = samples - int(whole.max() - earliest)
-    cut = np.zeros((rows, columns), dtype=frame.dtype)
-    edge = EDGE_SAMPLES if length >= 2 * EDGE_SAMPLES else 0
-    for m in range(channels):
-        start, late = int(whole[m] - earliest), arrivals[m] - whole[m]
-        cut[m, :length] = frame[m, start : start + length]
-        for k in range(edge):
-            cut[m, k] *= _ramp(k - late)
-            cut[m, length - 1 - k] *= _ramp(k + late)
-    return cut, length
-
-
-@njit(cache=True)
-def _ramp(k):  # pragma: no cover  (compiled)
-    """A raised cosine's sample of number k, which need not be whole."""
-    share = min(max((k + 0.5) / EDGE_SAMPLES, 0.0), 1.0)
-    return np.float32(0.5 - 0.5 * math.cos(math.pi * share))
 
 
 @njit(cache=True)
@@ -101,96 +46,6 @@ def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
         for k in range(bins):
             cross[p, k] = spectra[i, k].conjugate() * spectra[j, k]
     return cross, np.ones(cross.shape, dtype=np.float32), energy
-
-
-@njit(cache=True, fastmath=REORDER)
-def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compiled)
-    """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
-
-    The turns come from a few cosines by doubling: the rest is sums and products.
-    """
-    bins = cross.size
-    cosine, sine = np.empty(bins), np.empty(bins)
-    cosine[0], sine[0] = math.cos(first * t), math.sin(first * t)
-    done = 1
-    while done < bins:
-        c, s = math.cos(step * t * done), math.sin(step * t * done)
-        for k in range(min(done, bins - done)):
-            cosine[done + k] = cosine[k] * c - sine[k] * s
-            sine[done + k] = sine[k] * c + cosine[k] * s
-        done *= 2
-    for k in range(bins):
-        x, y = np.float64(cross[k].real), np.float64(cross[k].imag)
-        real[k] = x * cosine[k] - y * sine[k]
-        imaginary[k] = x * sine[k] + y * cosine[k]
-
-
-@njit(cache=True, fastmath=REORDER)
-def _slope_and_curve(
-    real, imaginary, weights, first, step
-):  # pragma: no cover  (compiled)
-    """Derivatives of a correlation: sums of -w W Im(z) and of w^2 W Re(z)."""
-    slope, curve = 0.0, 0.0
-    for k in range(real.size):
-        w = first + k * step
-        slope -= w * weights[k] * imaginary[k]
-        curve += w * w * weights[k] * real[k]
-    return slope, curve
-
-
-@njit(cache=True, fastmath=REORDER)
-def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled)
-    """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
-    plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(real.size):
-        w, weight = first + k * step, np.float64(weights[k])
-        plain += real[k]
-        aligned += weight * real[k]
-        total += weight * math.sqrt(real[k] * real[k] + imaginary[k] * imaginary[k])
-        squares += (w * weight) ** 2 * real[k]
-        noise += (w * weight) ** 2
-    return plain, aligned, total, squares, noise
-
-
-@njit(cache=True)
-def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (compiled)
-    """Peaks of weighted cross-correlations, and sums for their errors.
-
-    Args:
-        cross: (p, n) cross-spectra of the pairs.
-        weights: (p, n) W.
-        first: Angular frequency of the first bin, rad a sample.
-        step: From bin to bin, rad a sample.
-        start: (p,) where the search begins, samples.
-        newton: Whether to search, or to stay there.
-
-    Returns:
-        tau (p,) in samples. With z the cross-spectrum turned back by tau:
-        the sum of Re(z) (p,); the share of sum W |z| that is in phase (p,);
-        and sums (p, 3) of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
-    """
-    pairs, bins = cross.shape
-    tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
-    sums = np.empty((pairs, 3))
-    real, imaginary = np.empty(bins), np.empty(bins)
-    for p in range(pairs):
-        t = start[p]
-        for _ in range(_ITERATIONS):
-            tau[p] = t
-            _turned(cross[p], first, step, t, real, imaginary)
-            slope, curve = _slope_and_curve(real, imaginary, weights[p], first, step)
-            if not newton or curve <= 0.0:
-                break
-            move = min(max(slope / curve, -0.5), 0.5)
-            if abs(move) < _TOLERANCE:
-                break
-            t += move
-        plain[p], aligned, total, squares, noise = _sums(
-            real, imaginary, weights[p], first, step
-        )
-        agreement[p] = aligned / max(total, 1e-300)
-        sums[p] = curve, squares, noise
-    return tau, plain, agreement, sums
 
 
 class PairTables(NamedTuple):
@@ -296,7 +151,7 @@ def _measure(
     for p in range(len(pairs)):
         i, j = pairs[p]
         start[p] = (arrivals[j] - whole[j]) - (arrivals[i] - whole[i])
-    tau, plain, agreement, sums = _refine(
+    tau, plain, agreement, sums = refine_peaks(
         cross, weights, first * step, step, start, newton
     )
     reconciled, covariance = np.empty(others + 1), np.empty((others, others))
@@ -377,7 +232,7 @@ def find_peaks(
         The peaks, or None where there is none.
     """
     rows = filled_rows(len(frame))
-    cut, cut_samples = _cut(frame, np.rint(arrivals), rows, length)
+    cut, cut_samples = cut_rows(frame, np.rint(arrivals), rows, length)
     spectra = fft.rfft(cut)[: len(frame), band]
     cross, weights, energy = _pair_spectra(spectra, tables.pairs)
     if phat:
