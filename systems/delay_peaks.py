@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.correlation_peak import refine_peaks
+from systems.correlation_peak import measure_peaks
 from systems.overlap import EDGE_SAMPLES, cut_rows
 from systems.transforms import filled_rows
 
@@ -19,9 +18,6 @@ __all__ = ["PairTables", "Peaks", "find_peaks", "whitening"]
 # Weights of PHAT fall to zero where the cross-spectrum is below this share of
 # its mean: bins of noise would otherwise weigh as much as bins of sound.
 _PHAT_FLOOR = 0.1
-
-# Variance of an arrival that is rounded to whole samples: 1/12 a pair.
-_ROUNDING = 1.0 / 24.0
 
 
 def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -74,119 +70,6 @@ class PairTables(NamedTuple):
         )
 
 
-@njit(cache=True)
-def arrival_variances(
-    r, sums, energy, pairs, to_shares, bins, padding
-):  # pragma: no cover  (compiled)
-    """(n,) of each channel's time of arrival, samples^2.
-
-    With noise of power n a bin and signal of power s, a correlation's peak moves
-    by the noise over its curvature,
-    sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2: for equal
-    weights and much signal that is the bound of Knapp and Carter (1976).
-    """
-    channels = energy.size
-    n, s = np.empty(channels), np.empty(channels)
-    for m in range(channels):
-        exponent = 0.0
-        for p in range(len(pairs)):
-            exponent += to_shares[m, p] * math.log(min(max(r[p], 1e-3), 1.0))
-        q = min(max(math.exp(exponent), 1e-3), 1.0 - 1e-9)
-        n[m], s[m] = (1.0 - q) * energy[m] / bins, q * energy[m]
-    parts = np.zeros(channels)
-    for p in range(len(pairs)):
-        i, j = pairs[p]
-        curve, squares, noise = sums[p]
-        scale = padding / (2.0 * curve * curve * (channels - 1))
-        cross = 0.5 * n[i] * n[j] * noise
-        # Each channel's part: noise of one against the signal of the other.
-        parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)
-        parts[j] += scale * (n[j] * squares * math.sqrt(s[i] / s[j]) + cross)
-    return parts
-
-
-@njit(cache=True)
-def _reconcile(
-    tau, arrivals, pairs, to_delays, reconciled
-):  # pragma: no cover  (compiled)
-    """Fills in the arrivals that fit all delays best.
-
-    Returns:
-        How far they are from the given ones at most, and each delay from them.
-    """
-    moved, closure = 0.0, 0.0
-    reconciled[0] = 0.0
-    for m in range(1, reconciled.size):
-        reconciled[m] = 0.0
-        for p in range(tau.size):
-            reconciled[m] += to_delays[m - 1, p] * tau[p]
-        moved = max(moved, abs(reconciled[m] - arrivals[m]))
-    for p in range(tau.size):
-        i, j = pairs[p]
-        closure = max(closure, abs(tau[p] - (reconciled[j] - reconciled[i])))
-    return moved, closure
-
-
-@njit(cache=True)
-def _measure(
-    cross, weights, energy, arrivals, tables, sizes, newton
-):  # pragma: no cover  (compiled)
-    """Fields of ``Peaks``; a correlation of 0 where there is no peak.
-
-    Args:
-        cross: From ``_pair_spectra``.
-        weights: (p, bins).
-        energy: From ``_pair_spectra``.
-        arrivals: See ``find_peaks``.
-        tables: ``PairTables``.
-        sizes: First bin, length of the transform, samples of the cut channels.
-        newton: See ``find_peaks``.
-    """
-    pairs, to_delays, to_shares = tables
-    first, length, cut_samples = sizes
-    others = len(energy) - 1
-    step = 2.0 * math.pi / length
-    whole = np.rint(arrivals)
-    start = np.empty(len(pairs))
-    for p in range(len(pairs)):
-        i, j = pairs[p]
-        start[p] = (arrivals[j] - whole[j]) - (arrivals[i] - whole[i])
-    tau, plain, agreement, sums = refine_peaks(
-        cross, weights, first * step, step, start, newton
-    )
-    reconciled, covariance = np.empty(others + 1), np.empty((others, others))
-    r = np.empty(len(pairs))
-    for p in range(len(pairs)):
-        i, j = pairs[p]
-        tau[p] += whole[j] - whole[i]
-        r[p] = plain[p] / max(math.sqrt(energy[i] * energy[j]), 1e-300)
-    correlation, angular_frequency, noise_energy = 0.0, 0.0, 0.0
-    moved, closure = _reconcile(tau, arrivals, pairs, to_delays, reconciled)
-    if r.min() > 0.0 and sums[:, 0].min() > 0.0:
-        # The soft edges cost energy: the mean square of a raised cosine is 3/8.
-        padding = length / (cut_samples - 1.25 * EDGE_SAMPLES)
-        variances = arrival_variances(
-            r, sums, energy, pairs, to_shares, cross.shape[1], padding
-        )
-        if not newton:
-            variances += _ROUNDING
-        covariance[:] = variances[0]
-        for m in range(others):
-            covariance[m, m] += variances[m + 1]
-        correlation = min(r.min(), agreement.min(), 1.0)
-        angular_frequency = math.sqrt((sums[:, 0] / plain).min())
-        noise_energy = (1.0 - r.mean()) * energy.mean() / length * padding
-    return (
-        reconciled,
-        covariance,
-        correlation,
-        angular_frequency,
-        noise_energy,
-        moved,
-        closure,
-    )
-
-
 class Peaks(NamedTuple):
     """Peaks of all pairs' correlations."""
 
@@ -237,14 +120,15 @@ def find_peaks(
     cross, weights, energy = _pair_spectra(spectra, tables.pairs)
     if phat:
         weights = whitening(cross)
+    # The soft edges cost energy: the mean square of a raised cosine is 3/8.
     peaks = Peaks(
-        *_measure(
+        *measure_peaks(
             cross,
             weights,
             energy,
             arrivals,
             tables,
-            (band.start, length, cut_samples),
+            (band.start, length, cut_samples - 1.25 * EDGE_SAMPLES),
             newton,
         )
     )

@@ -17,6 +17,7 @@ __all__ = [
     "cone_range",
     "contact_time",
     "control_point",
+    "fan_ranges",
     "nearest_point_on_rectangle",
     "rectangle_clearance",
     "rectangle_corners",
@@ -166,6 +167,35 @@ def cone_range(x, y, axis, half_angle, rectangles):  # pragma: no cover  (compil
         if inside:
             best = 0.0
     return best
+
+
+@njit(cache=True)
+def fan_ranges(
+    pose_WB, rectangles, axes, places, half_angle, control_point_m
+):  # pragma: no cover  (compiled)
+    """``cone_range`` of each sensor of a body, (n,) m.
+
+    Args:
+        pose_WB: (3,) x, y, theta of the body, m and rad.
+        rectangles: (m, 5) rectangles in W.
+        axes: (n,) directions of the cones in B, rad.
+        places: (n, 2) sensors from P in B axes, m.
+        half_angle: Half of the opening angle, rad.
+        control_point_m: Distance of P ahead of the origin of B, m.
+    """
+    x, y, theta = pose_WB
+    c, s = math.cos(theta), math.sin(theta)
+    ranges = np.empty(axes.size)
+    for k in range(axes.size):
+        ahead, left = control_point_m + places[k, 0], places[k, 1]
+        ranges[k] = cone_range(
+            x + c * ahead - s * left,
+            y + s * ahead + c * left,
+            theta + axes[k],
+            half_angle,
+            rectangles,
+        )
+    return ranges
 
 
 @njit(cache=True)

@@ -15,7 +15,7 @@ from scipy.special import ndtri
 
 from systems.acoustics import AcousticParameters
 from systems.cache import declare_cache
-from systems.geometry import cone_range
+from systems.geometry import fan_ranges
 from systems.noise import standard_normals
 from systems.parameters import Fraction, NonNegative, Parameters, Point, Positive, Size
 from systems.robot import RobotParameters
@@ -114,26 +114,7 @@ def cone_ranges(
         (3,) m; infinity where a cone is empty.
     """
     pose = np.asarray(pose_WB, dtype=np.float64)
-    return _cone_ranges(pose, rectangles, *parameters.beams, control_point_m)
-
-
-@njit(cache=True)
-def _cone_ranges(
-    pose_WB, rectangles, axes, places, half_angle, control_point_m
-):  # pragma: no cover  (compiled)
-    x, y, theta = pose_WB
-    c, s = math.cos(theta), math.sin(theta)
-    ranges = np.empty(SENSORS)
-    for k in range(SENSORS):
-        ahead, left = control_point_m + places[k, 0], places[k, 1]
-        ranges[k] = cone_range(
-            x + c * ahead - s * left,
-            y + s * ahead + c * left,
-            theta + axes[k],
-            half_angle,
-            rectangles,
-        )
-    return ranges
+    return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
 
 
 def measured_ranges(
