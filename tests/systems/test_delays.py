@@ -71,6 +71,15 @@ def test_amdf_finds_whole_samples_of_either_sign():
     assert found.tau[1] * FS == pytest.approx(-5, abs=1e-9)
 
 
+def test_whole_samples_cost_a_twelfth_of_one_a_pair():
+    """The variance of rounding, 1/12, beside which that of noise is nothing."""
+    signal = band_noise(4 * N, 500, 8_000)
+    rows = noisy(shifted(signal, [0, 12, 31]), 60.0, 1)
+    rounded = measured(rows, "amdf").covariance * FS**2
+    np.testing.assert_allclose(np.diag(rounded), 1.0 / 12.0, rtol=0.01)
+    np.testing.assert_allclose(rounded[0, 1], 1.0 / 24.0, rtol=0.01)
+
+
 def test_amdf_is_the_mean_over_the_overlap():
     """Against a plain loop over the definition."""
     x = Generator(Philox(key=4)).standard_normal((2, 50)).astype(np.float32)

@@ -232,6 +232,34 @@ def test_99_percent_of_the_weakest_sounds_are_searched(monkeypatch):
     assert searched_share(monkeypatch, listener(band="found"), weakest) >= 0.98
 
 
+def test_rumble_does_not_keep_a_sound_from_being_searched(monkeypatch):
+    """In the band it may have a thousand times the energy that counts as loud."""
+    frame = heard(ROW, [polar(10.0, 1.0)])
+    localiser = listener()
+    _, first = localiser.localise(1e-3 * frame, localiser.blank())
+    assert first.heard
+    quiet = HearingMemory(energy=0.7 * float(np.sum(frame**2.0)), noise_energy=1e12)
+    calls = []
+    monkeypatch.setattr(localise, "look", lambda *a, **k: calls.append(1))
+    localiser.localise(frame, quiet)
+    assert calls
+
+
+def test_echoes_are_remembered_until_the_noise_is_louder():
+    """They fall by exp(-0.5) a frame, from a thousand times the least to it."""
+    localiser = listener()
+    frame = np.random.default_rng(0).standard_normal((3, N)).astype(np.float32)
+    memory = HearingMemory(3.0 * N, 0.15 * N)
+    least = localiser._sizes.least(localiser._noise_density(memory))
+    echoes = np.full(localiser.echo_shape, 1e3 * least, dtype=np.float32)
+    memory, frames = memory._replace(echoes=echoes), 0
+    while memory.echoes is not None:
+        _, memory = localiser.localise(np.float32(0.9) * frame, memory)
+        frames += 1
+    # The level of the noise falls, too, which takes them a little longer.
+    assert math.log(1e3) / 0.5 <= frames <= math.log(1e3) / 0.5 + 3
+
+
 def test_a_sound_leaves_the_level_of_the_noise_alone():
     localiser = listener()
     before = HearingMemory(456.0, 123.0)

@@ -279,6 +279,8 @@ def test_wrong_emission_is_refused():
         recorded({"samples": 1})
 
 
-def test_source_out_of_reach_is_refused():
+@pytest.mark.parametrize("sounding", [True, False])
+def test_source_out_of_reach_is_refused(sounding):
+    """In silence, too: sound from before the emission might arrive."""
     with pytest.raises(ValueError, match=r"MicArray.*maximum_range_m"):
-        recorded(emission((60.0, 0.0)))
+        recorded(emission((60.0, 0.0), sounding=sounding))

@@ -207,6 +207,11 @@ def test_a_row_takes_any_order_of_channels(order, dimension):
         times[0] - times[1:], covariance, EqualRow(0.4, np.eye(2), np.eye(2)), C
     )
     assert fix.range_std == pytest.approx(own.range_std)
+    # Ahead and left of the row are +y and -x.
+    turned = np.array([[0.0, -1.0], [1.0, 0.0]])
+    expected = turned @ own.covariance @ turned.T
+    np.testing.assert_allclose(fix.covariance[:2, :2], expected, rtol=1e-6)
+    np.testing.assert_allclose(fix.covariance[2:], 0.0, atol=1e-20)
 
 
 def test_far_sources_have_a_bearing_only():

@@ -120,3 +120,15 @@ def test_bearing_alone_is_a_unit_vector():
     assert along @ fix.covariance @ along == pytest.approx(0.0, abs=1e-18)
     assert across @ fix.covariance @ across == pytest.approx(fix.bearing_std**2)
     assert (fix.range, fix.range_valid, fix.range_std) == (0.0, False, math.inf)
+
+
+def test_errors_of_a_bearing_without_range_are_across_it():
+    """A plane wave from the left; sin(bearing) = c tau_13 / 2 l."""
+    tau_13 = 2.0 * L * math.sin(0.6) / C
+    covariance = np.array([[2.0, 0.7], [0.7, 3.0]]) * 1e-16
+    fix = locate_source(np.array([tau_13 / 2.0, tau_13]), covariance, ROW, C)
+    assert (fix.range_valid, fix.bearing) == (False, pytest.approx(0.6))
+    std = C * math.sqrt(3e-16) / (2.0 * L * math.cos(0.6))
+    across = np.array([-math.sin(0.6), math.cos(0.6)])
+    assert fix.bearing_std == pytest.approx(std)
+    np.testing.assert_allclose(fix.covariance, std**2 * np.outer(across, across))

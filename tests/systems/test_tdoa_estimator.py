@@ -190,6 +190,19 @@ def test_speed_of_sound_that_the_estimator_believes_in():
     assert math.sin(bearing) == pytest.approx(1.03 * 0.5, abs=2e-3)
 
 
+def test_a_sound_that_ends_is_read_no_longer():
+    block = TDOAEstimator()
+    context, updates = listen(block, audio(heard(chirp, 30.0, 2.0, 30.0)))
+    context.SetDiscreteState(updates)
+    assert read(block, context)["detected"] == 1.0
+    noise = Generator(Philox(key=1)).standard_normal((3, N))
+    block.GetInputPort("audio").FixValue(context, Value(audio(noise)))
+    silence = block.EvalUniquePeriodicDiscreteUpdate(context).Clone()
+    context.SetDiscreteState(silence)
+    for values in read(block, context).values():
+        np.testing.assert_array_equal(values, 0.0)
+
+
 def test_nothing_heard_reads_zero():
     block = TDOAEstimator()
     noise = Generator(Philox(key=1)).standard_normal((3, N))
