@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-import time
 
 import pytest
 
@@ -15,15 +14,14 @@ from benchmarks.sweeps import memory_growth_mb
 
 def test_usage_counts_descendants():
     before = tree_usage(os.getpid())
-    code = "x = bytes(range(256)) * 400_000; sum(x); input()"
+    code = "x = bytes(range(256)) * 400_000; sum(x); print(flush=True); input()"
     with subprocess.Popen(
-        [sys.executable, "-c", code], stdin=subprocess.PIPE
+        [sys.executable, "-c", code],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
     ) as process:
-        for _ in range(200):
-            during = tree_usage(os.getpid())
-            if during.processor_s >= before.processor_s + 0.1:
-                break
-            time.sleep(0.05)
+        process.stdout.readline()
+        during = tree_usage(os.getpid())
         process.communicate(b"\n")
     assert during.resident_mb >= before.resident_mb + 95.0
     assert during.processor_s >= before.processor_s + 0.1
