@@ -116,7 +116,7 @@ class PlainLoop:
     def _track(self, track: Track, fix: Any, pose: Any) -> Any:
         if fix is not None:
             ports = port_values(fix, self.p_PA_B)
-            estimate = Estimate(ports[2].tolist(), ports[3].tolist(), fix.range_valid)
+            estimate = Estimate(ports[2], ports[3], fix.range_valid)
             track = self.tracker.hear(track, estimate, pose)
         target = self.tracker.position(track, pose)
         return self.tracker.older(track, pose), target
@@ -177,8 +177,7 @@ class PlainLoop:
             seed=self.mic_seed,
         )
         history[:, :-1] = history[:, 1:]
-        frame = audio.counts.astype(np.float32)
-        fix, self.memory = self.localiser.localise(frame, self.memory)
+        fix, self.memory = self.localiser.localise(audio.counts, self.memory)
         return fix, now
 
     def _drive(self, state: Any, wheels: Any) -> Any:

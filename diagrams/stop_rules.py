@@ -26,6 +26,8 @@ NEAR_M = 0.1
 #: Instants looked at between two ticks.
 BETWEEN_TICKS = 5
 
+_GO_ON = EventStatus.DidNothing()
+
 
 @dataclass(frozen=True)
 class Collision:
@@ -55,8 +57,7 @@ class StopRules:
     def __post_init__(self) -> None:
         scenario = self.follower.scenario
         bodies = scenario.bodies()
-        self._source_path = bodies["source"].path
-        self._source_rests = not self._source_path.moves
+        self._source_rests = not bodies["source"].path.moves
         self._plant = self.follower.blocks["plant"]
         self._tracker = self.follower.blocks["tracker"]
         self._pose_port = self.follower.port("plant", "pose_WB")
@@ -76,7 +77,7 @@ class StopRules:
         """Called after every step of the simulator."""
         time = context.get_time()
         if self._pose is not None and time - self._time < 0.5 * FRAME_PERIOD_S:
-            return EventStatus.DidNothing()
+            return _GO_ON
         pose = self._pose_port.Eval(self._plant.GetMyContextFromRoot(context)).tolist()
         target = self._tracker.GetMyContextFromRoot(context)
         valid = self._valid_port.Eval(target)[0] > 0.5
@@ -84,7 +85,7 @@ class StopRules:
         self._pose, self._time = pose, time
         if self.cause:
             return EventStatus.ReachedTermination(self.follower.diagram, self.cause)
-        return EventStatus.DidNothing()
+        return _GO_ON
 
     def final_cause(self) -> str:
         """Cause of the run, once the simulator has returned."""
@@ -94,11 +95,12 @@ class StopRules:
 
     def _judge(self, time: float, pose: list[float], *, valid: bool) -> str:
         stop = self.follower.scenario.stop
-        self.collision = self._find_collision(time, pose)
+        places = {name: body.path.pose(time) for name, body, _ in self._reach}
+        self.collision = self._find_collision(time, pose, places)
         if self.collision is not None:
             return "collision"
         x_P, y_P = control_point(pose, self._offset)
-        x_S, y_S, _ = self._source_path.pose(time)
+        x_S, y_S, _ = places["source"]
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
@@ -120,11 +122,16 @@ class StopRules:
             return ""
         return "stuck" if time - then >= stop.stuck_after_s else ""
 
-    def _find_collision(self, time: float, pose: list[float]) -> Collision | None:
+    def _find_collision(
+        self,
+        time: float,
+        pose: list[float],
+        places: dict[str, tuple[float, float, float]],
+    ) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first = None
         for name, body, reach in self._reach:
-            x, y, _ = body.path.pose(time)
+            x, y, _ = places[name]
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue
             instant = self._first_contact(time, pose, body)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pydrake.math import exp
 from pydrake.systems.framework import LeafSystem_
 
 from systems.impedance import ImpedanceLoop
 from systems.repulsion import ActiveParameters
+from systems.scalar_math import exp
 from systems.scalar_types import define_for_scalars
 
 __all__ = [

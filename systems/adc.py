@@ -9,11 +9,10 @@ from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.noise import standard_normals
 from systems.parameters import Fraction, Parameters, Positive
 from systems.signals import SAMPLE_RATE_HZ
 
-__all__ = ["MicArrayParameters", "channel_skew", "convert", "frame_noise"]
+__all__ = ["MicArrayParameters", "channel_skew", "convert"]
 
 
 class MicArrayParameters(Parameters):
@@ -92,11 +91,6 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
             "microphones; give one for each, or []"
         )
     return np.array(skew) if skew else np.zeros(count)
-
-
-def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
-    """White noise of unit variance that only the seed and the tick decide."""
-    return standard_normals(shape, seed, tick)
 
 
 @njit(cache=True)

@@ -61,9 +61,9 @@ def echo_point(range_, axis, position):
 def echo_points(ranges, echo, sensors: UltrasonicParameters):
     """The three points that the sensors see, None where there is no echo."""
     return [
-        echo_point(range_, math.radians(axis_deg), position) if heard > 0.5 else None
-        for range_, heard, axis_deg, position in zip(
-            ranges, echo, sensors.axes_deg, sensors.positions_m, strict=True
+        echo_point(range_, axis, position) if heard > 0.5 else None
+        for range_, heard, axis, position in zip(
+            ranges, echo, sensors.axes, sensors.positions_m, strict=True
         )
     ]
 

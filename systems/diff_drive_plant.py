@@ -8,11 +8,11 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from pydantic import Field, Strict
-from pydrake.math import cos, sin
 from pydrake.systems.framework import BasicVector_, LeafSystem_
 
 from systems.parameters import Parameters, Positive
 from systems.robot import RobotParameters
+from systems.scalar_math import cos, sin
 from systems.scalar_types import define_for_scalars
 
 __all__ = [
@@ -105,8 +105,17 @@ def plant_derivatives(state, commanded, numbers):
 
 
 @njit(cache=True)
-def _all_finite(state, commanded):  # pragma: no cover  (compiled)
-    return np.isfinite(state.sum() + commanded.sum())
+def _checked_derivatives(state, commanded, numbers):  # pragma: no cover  (compiled)
+    """``plant_derivatives``, and whether all that they rest on is finite."""
+    rates = plant_derivatives(state, commanded, numbers)
+    return rates, np.isfinite(state.sum() + commanded.sum())
+
+
+def _not_finite(state, commanded) -> ValueError:
+    return ValueError(
+        f"DiffDrivePlant: state {state} or wheel_speeds {commanded} is not finite; "
+        "look for the block upstream that made it so"
+    )
 
 
 @register_jitable
@@ -188,14 +197,14 @@ def DiffDrivePlant_(T):
             )
 
         def DoCalcTimeDerivatives(self, context, derivatives):
-            state, commanded = self._state(context), self._wheel_speeds.Eval(context)
-            if T is float and not _all_finite(state, commanded):
-                raise ValueError(
-                    f"DiffDrivePlant: state {state} or wheel_speeds {commanded} is "
-                    "not finite; look for the block upstream that made it so"
-                )
-            function = plant_derivatives if T is float else plant_derivatives.py_func
-            derivatives.SetFromVector(function(state, commanded, self._numbers))
+            motion = self._state(context), self._wheel_speeds.Eval(context)
+            if T is float:
+                rates, finite = _checked_derivatives(*motion, self._numbers)
+                if not finite:
+                    raise _not_finite(*motion)
+            else:
+                rates = plant_derivatives.py_func(*motion, self._numbers)
+            derivatives.SetFromVector(rates)
 
         def _state(self, context):
             return context.get_continuous_state_vector().CopyToVector()

@@ -11,7 +11,8 @@ import math
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from pydrake.math import cos, sin, sqrt
+
+from systems.scalar_math import cos, sin, sqrt
 
 __all__ = [
     "cone_range",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import math
 
-from pydrake.math import atan2, cos, sin
+from pydrake.math import atan2
 from pydrake.systems.framework import LeafSystem_
 
 from systems.geometry import control_point, rotate, safe_norm
 from systems.noise import tick_generator
 from systems.parameters import NonNegative, Parameters, Positive
 from systems.robot import RobotParameters
+from systems.scalar_math import cos, sin
 from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 from systems.waveforms import SoundParameters

@@ -166,12 +166,12 @@ class Localiser:
         return self._sizes.shape
 
     def localise(
-        self, frame: NDArray[np.float32], memory: HearingMemory
+        self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
     ) -> tuple[SourceFix | None, HearingMemory]:
         """Where the sound of a frame comes from.
 
         Args:
-            frame: (n, samples) channels, any unit.
+            frame: (n, samples) channels, any unit; counts will do.
             memory: What the last frame left.
 
         Returns:
@@ -184,6 +184,7 @@ class Localiser:
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
+        frame = frame.astype(np.float32, copy=False)
         seen = look(
             frame,
             self.plan,
@@ -245,7 +246,7 @@ class Localiser:
         errors = echo_errors(plan.shape, plan.c, news, delays.angular_frequency)
         return self._fix(frame, delays, errors), memory
 
-    def _checked_energy(self, frame: NDArray[np.float32]) -> float:
+    def _checked_energy(self, frame: NDArray[np.float32 | np.int16]) -> float:
         expected = (self.plan.shape.count, self.plan.frame_samples)
         if frame.shape != expected:
             raise ValueError(

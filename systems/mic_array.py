@@ -11,7 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.adc import MicArrayParameters, convert
 from systems.array_tolerances import (
     RealArray,
     Tolerances,
@@ -20,7 +20,7 @@ from systems.array_tolerances import (
 )
 from systems.cache import declare_cache
 from systems.ego_noise import EgoNoise, driving_share
-from systems.noise import BEFORE_THE_RUN, tick_generator
+from systems.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.propagation import check_reach, microphone_paths, propagate
 from systems.reverberation import Reverberation
 from systems.robot import RobotParameters

@@ -8,6 +8,7 @@ docs/design.md explains.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Literal
 
 from pydantic import model_validator
@@ -78,13 +79,13 @@ class ActiveParameters(Parameters):
             )
         return self
 
-    @property
+    @cached_property
     def alpha_m(self) -> float:
         """Decay length of the spring, m (Han 2019, eq. 21)."""
         ratio = self.reference_stiffness_n_m / self.matched_stiffness_n_m
         return matched_decay(self.reach_m, ratio)
 
-    @property
+    @cached_property
     def beta_m_s(self) -> float:
         """Growth speed of the damper, m/s (eq. 22, misprinted)."""
         ratio = self.matched_damping_n_s_m / self.reference_damping_n_s_m

@@ -192,10 +192,10 @@ class SoundEmitter(LeafSystem):
         discrete_state.set_value(path.ravel())
 
     def _emit(self, context, output):
-        held = context.get_discrete_state(0).value().reshape(2, self._ticks, 2)
-        path = np.empty((2, self._ticks + 1, 2))
-        path[:, :-1] = held
-        for row, port in enumerate((self._pose_WS, self._v_WS)):
-            path[row, -1] = np.asarray(port.Eval(context))[:2]
+        held, split = context.get_discrete_state(0).value(), 2 * self._ticks
+        position = self._pose_WS.Eval(context)[:2]
+        velocity = self._v_WS.Eval(context)[:2]
+        p_WS = np.concatenate((held[:split], position)).reshape(-1, 2)
+        v_WS = np.concatenate((held[split:], velocity)).reshape(-1, 2)
         time = context.get_time()
-        output.set_value(make_emission(time, self._waveform, self._sound, *path))
+        output.set_value(make_emission(time, self._waveform, self._sound, p_WS, v_WS))

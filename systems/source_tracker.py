@@ -131,8 +131,8 @@ def SourceTracker_(T):
             track = Track.unpack(context.get_discrete_state(0).CopyToVector())
             if self._detected.Eval(context)[0] > 0.5:
                 estimate = Estimate(
-                    self._p_PS_B.Eval(context).tolist(),
-                    self._covariance.Eval(context).tolist(),
+                    self._p_PS_B.Eval(context),
+                    self._covariance.Eval(context),
                     bool(self._range_valid.Eval(context)[0] > 0.5),
                 )
                 track = self._model.hear(track, estimate, self._pose.Eval(context))

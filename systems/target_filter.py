@@ -12,7 +12,7 @@ the logarithms of their covariances' determinants: minus a log-likelihood. When
 the robot moves, the image runs, which no source does for nothing.
 
 All of it is written for flat arrays and numbers alone, so that numba compiles
-it for floats, and ``fold.py_func`` and ``predicted.py_func`` run it on
+it for floats, and ``fold.py_func`` and ``expected.py_func`` run it on
 AutoDiffXd. The functions change their first argument.
 
 Layouts (m, s, in W):
@@ -44,8 +44,8 @@ __all__ = [
     "ages",
     "blank_memory",
     "chosen_track",
+    "expected",
     "fold",
-    "predicted",
 ]
 
 TRACK = 16
@@ -409,8 +409,9 @@ def fold(memory, sighting, settings):
 
 
 @njit(cache=True)
-def predicted(track, seconds, settings):
-    """A copy of the track as it is expected to be some seconds later."""
-    later = track.copy()
-    _predict(later, seconds, settings)
-    return later
+def expected(memory, settings):
+    """A copy of the chosen track as it is expected to be now."""
+    track = chosen_track(memory).copy()
+    if track[0] < NEVER_HEARD_S:
+        _predict(track, track[0], settings)
+    return track

@@ -110,9 +110,8 @@ class TDOAEstimator(LeafSystem):
                 f"TDOAEstimator: audio has a rate of {audio.sample_rate_hz:g} Hz; "
                 f"record at {SAMPLE_RATE_HZ} Hz"
             )
-        frame = audio.counts.astype(np.float32)
         before, located = self._remembered(context)
-        fix, after = self._localiser.localise(frame, before)
+        fix, after = self._localiser.localise(audio.counts, before)
         flags = after.echoes is not None, after.heard, fix is not None
         discrete_state.set_value(self._memory, (*after[:2], *flags))
         if after.echoes is not None and after.echoes is not before.echoes:

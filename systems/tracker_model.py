@@ -5,22 +5,23 @@ from __future__ import annotations
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 from pydantic import Field
 
 from systems.array_shape import ArrayShape
-from systems.geometry import control_point, rotate
+from systems.geometry import rotate
 from systems.parameters import NonNegative, Parameters, Positive
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 from systems.target_filter import (
-    NEVER_HEARD_S,
     FilterSettings,
     ages,
     blank_memory,
     chosen_track,
+    expected,
     fold,
-    predicted,
 )
 
 __all__ = [
@@ -61,10 +62,10 @@ class TrackerParameters(Parameters):
 class Estimate(NamedTuple):
     """What a hearing block says; floats or AutoDiffXd."""
 
-    p_PS_B: list[Any]
-    """Source from P, m; a unit vector where only the bearing is known."""
-    covariance: list[Any]
-    """Of p_PS_B, row by row, m^2."""
+    p_PS_B: NDArray[Any]
+    """(2,) source from P, m; a unit vector where only the bearing is known."""
+    covariance: NDArray[Any]
+    """(4,) of p_PS_B, row by row, m^2."""
     ranged: bool
     """Whether the range is known."""
 
@@ -72,12 +73,12 @@ class Estimate(NamedTuple):
 class Track(NamedTuple):
     """The tracker's memory; floats or AutoDiffXd."""
 
-    pose_1: Any
-    """Odometry pose one tick ago."""
-    pose_2: Any
-    """Odometry pose two ticks ago."""
-    pose_heard: Any
-    """Odometry pose of the moment of the last estimate."""
+    pose_1: NDArray[Any]
+    """(3,) odometry pose one tick ago."""
+    pose_2: NDArray[Any]
+    """(3,) odometry pose two ticks ago."""
+    pose_heard: NDArray[Any]
+    """(3,) odometry pose of the moment of the last estimate."""
     memory: NDArray[Any]
     """The filter's, see ``systems.target_filter``."""
 
@@ -96,13 +97,67 @@ class Track(NamedTuple):
         return chosen_track(self.memory)[0]
 
 
+@register_jitable
 def past_pose(pose_now, pose_1, pose_2, age):
     """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line."""
     ticks = age / FRAME_PERIOD_S
-    newer, older, part = (
-        (pose_now, pose_1, ticks) if ticks <= 1.0 else (pose_1, pose_2, ticks - 1.0)
-    )
-    return [a + part * (b - a) for a, b in zip(newer, older, strict=True)]
+    if ticks <= 1.0:
+        return pose_now + ticks * (pose_1 - pose_now)
+    return pose_1 + (ticks - 1.0) * (pose_2 - pose_1)
+
+
+class _Microphones(NamedTuple):
+    """Where they are on the robot, m."""
+
+    control_point: float
+    """Distance of P ahead of the origin of B."""
+    centre_x: float
+    """Their centroid from P in B axes."""
+    centre_y: float
+    """See centre_x."""
+    ahead_x: float
+    """Normal of their row in B; anything where they are in no row."""
+    ahead_y: float
+    """See ahead_x."""
+
+
+@register_jitable
+def _turned(c, s, x, y):
+    """(x, y) turned by the angle of cosine c and sine s."""
+    return c * x - s * y, s * x + c * y
+
+
+@njit(cache=True)
+def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
+    """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
+
+    Args:
+        p_PS_B: See ``Estimate``.
+        covariance: See ``Estimate``.
+        ranged: 1 where the range is known, or 0.
+        poses: Of the robot now, one tick and two ticks ago, (3,) each.
+        age: Of the estimate, s.
+        microphones: ``_Microphones``.
+
+    Returns:
+        Pose of the robot (3,) at the moment that the estimate is valid for, and
+        the sighting (10,) of ``systems.target_filter``.
+    """
+    pose = past_pose(*poses, age)
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x_P = pose[0] + microphones.control_point * c
+    y_P = pose[1] + microphones.control_point * s
+    dx, dy = _turned(c, s, microphones.centre_x, microphones.centre_y)
+    nx, ny = _turned(c, s, microphones.ahead_x, microphones.ahead_y)
+    x, y = _turned(c, s, p_PS_B[0], p_PS_B[1])
+    if ranged > 0.0:
+        x, y = x_P + x, y_P + y
+    # R C R^T
+    ax, ay = _turned(c, s, covariance[0], covariance[2])
+    bx, by = _turned(c, s, covariance[1], covariance[3])
+    xx, xy = _turned(c, s, ax, bx)
+    _, yy = _turned(c, s, ay, by)
+    return pose, np.array([x, y, xx, xy, yy, x_P + dx, y_P + dy, nx, ny, ranged])
 
 
 class TrackerModel:
@@ -122,13 +177,12 @@ class TrackerModel:
         measurement_age_s: float,
     ) -> None:
         self._hold = tracker.hold
-        self._control_point_m = robot.control_point_m
-        self._centre_P = np.mean(robot.microphones_m, axis=0).tolist()
+        centre_P = np.mean(robot.microphones_m, axis=0).tolist()
         ahead = ArrayShape.of(robot.microphones_m).ahead
         both = tracker.resolve_front_back and ahead is not None
         self._hypotheses = 2 if both else 1
-        # Where there is no row its normal does not count.
-        self._ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
+        ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
+        self._microphones = _Microphones(robot.control_point_m, *centre_P, *ahead_B)
         self._tick = FRAME_PERIOD_S * ages(self._hypotheses)
         self._settings = FilterSettings(
             speed_std=tracker.source_top_speed_m_s / 2.0,
@@ -142,23 +196,28 @@ class TrackerModel:
 
     def start(self, pose: Any) -> Track:
         """Nothing heard yet; before time zero the robot was where it starts."""
+        pose = np.asarray(pose)
         return Track(pose, pose, pose, blank_memory(self._hypotheses))
 
     def hear(self, track: Track, estimate: Estimate, pose: Any) -> Track:
         """The track with an estimate folded in that arrives at ``pose``."""
-        age = self._settings.measurement_age
-        then = past_pose(pose, track.pose_1, track.pose_2, age)
-        sighting = self._sighting(estimate, then)
+        poses = np.asarray(pose), track.pose_1, track.pose_2
+        p_PS_B, covariance, ranged = estimate
         memory = track.memory.copy()
-        function = fold.py_func if memory.dtype == object else fold
-        believed = function(memory, sighting, self._settings)
-        heard = np.array(then) if believed else track.pose_heard
+        place, feed = _sighting, fold
+        if memory.dtype == object:
+            place, feed = _sighting.py_func, fold.py_func
+        age = self._settings.measurement_age
+        measured = p_PS_B, covariance, float(ranged)
+        then, sighting = place(*measured, poses, age, self._microphones)
+        believed = feed(memory, sighting, self._settings)
+        heard = then if believed else track.pose_heard
         return track._replace(pose_heard=heard, memory=memory)
 
     def older(self, track: Track, pose: Any) -> Track:
         """The track a tick later, when ``pose`` has become the last one."""
         memory = track.memory + self._tick
-        return Track(pose, track.pose_1, track.pose_heard, memory)
+        return Track(np.asarray(pose), track.pose_1, track.pose_heard, memory)
 
     def position(self, track: Track, pose: Any) -> Any:
         """The target in W for a robot at ``pose``, (2,) m."""
@@ -188,31 +247,7 @@ class TrackerModel:
         return [xx + dx * dx, mixed, mixed, yy + dy * dy]
 
     def _expected(self, track: Track) -> Any:
-        """The track as it is expected to be now."""
-        last = chosen_track(track.memory)
-        if last[0] >= NEVER_HEARD_S:
-            return last
-        function = predicted.py_func if last.dtype == object else predicted
-        return function(last, last[0], self._settings)
-
-    def _sighting(self, estimate: Estimate, pose: Any) -> NDArray[Any]:
-        """An estimate in W, see ``systems.target_filter``."""
-        x_P, y_P = control_point(pose, self._control_point_m)
-        dx, dy = rotate(pose[2], *self._centre_P)
-        ahead = rotate(pose[2], *self._ahead_B)
-        x, y = rotate(pose[2], *estimate.p_PS_B)
-        if estimate.ranged:
-            x, y = x_P + x, y_P + y
-        covariance = _covariance_in_world(estimate.covariance, pose[2])
-        centre = x_P + dx, y_P + dy
-        ranged = float(estimate.ranged)
-        return np.array([x, y, *covariance, *centre, *ahead, ranged])
-
-
-def _covariance_in_world(covariance, theta):
-    """xx, xy and yy of R C R^T for a covariance given row by row."""
-    a = rotate(theta, covariance[0], covariance[2])
-    b = rotate(theta, covariance[1], covariance[3])
-    xx, xy = rotate(theta, a[0], b[0])
-    _, yy = rotate(theta, a[1], b[1])
-    return xx, xy, yy
+        """The chosen track as it is expected to be now."""
+        memory = track.memory
+        function = expected.py_func if memory.dtype == object else expected
+        return function(memory, self._settings)

@@ -73,10 +73,15 @@ class UltrasonicParameters(Parameters):
         return self
 
     @cached_property
+    def axes(self) -> tuple[float, ...]:
+        """Directions of the cones in B, rad."""
+        return tuple(map(math.radians, self.axes_deg))
+
+    @cached_property
     def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
         """Axes (3,) in B, rad, places (3, 2) from P, m, and half angle, rad."""
         half_angle = math.radians(self.beam_half_angle_deg)
-        return np.radians(self.axes_deg), np.array(self.positions_m), half_angle
+        return np.array(self.axes), np.array(self.positions_m), half_angle
 
     @cached_property
     def least_luck(self) -> float:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 
 from pydantic import Field
-from pydrake.math import cos, sin
 from pydrake.systems.framework import LeafSystem_
 
 from systems.diff_drive_plant import body_twist
 from systems.parameters import Parameters
 from systems.robot import RobotParameters
+from systems.scalar_math import cos, sin
 from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pydrake.math import abs as magnitude
 from pydrake.systems.framework import LeafSystem_
 
 from systems.geometry import rotate, safe_norm
@@ -54,8 +53,8 @@ def limited_wheel_speeds(v, omega, robot: RobotParameters):
     half = omega * robot.wheel_separation_m / 2.0
     left = (v - half) / robot.wheel_radius_m
     right = (v + half) / robot.wheel_radius_m
-    largest = magnitude(left)
-    largest = max(largest, magnitude(right))
+    largest = abs(left)
+    largest = max(largest, abs(right))
     if largest > robot.top_wheel_speed:
         scale = robot.top_wheel_speed / largest
         left, right = left * scale, right * scale

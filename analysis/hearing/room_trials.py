@@ -19,11 +19,11 @@ from scipy.signal import oaconvolve
 
 from analysis.runs.intervals import Interval, wilson_interval
 from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.adc import MicArrayParameters, convert
 from systems.geometry import rotate
 from systems.localise import Localiser
 from systems.mic_array import FRAME_SAMPLES, microphones_B
-from systems.noise import tick_generator
+from systems.noise import frame_noise, tick_generator
 from systems.robot import RobotParameters
 from systems.room import RoomParameters, room_images, room_impulse_responses
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
@@ -175,7 +175,7 @@ def _frames(
     burst: NDArray[np.float32],
     microphones: MicArrayParameters,
     seed: int,
-) -> Iterator[NDArray[np.float32]]:
+) -> Iterator[NDArray[np.int16]]:
     """(m, FRAME_SAMPLES) counts, until the burst has been emitted."""
     # Sound begins at any place of a frame, after some frames of noise alone.
     lead = int(tick_generator(seed, 1).integers(4, 5 * FRAME_SAMPLES)) + FRAME_SAMPLES
@@ -191,11 +191,11 @@ def _frames(
     for k in range(frames):
         part = np.ascontiguousarray(pressure[:, k])
         noise = frame_noise(part.shape, seed, k)
-        yield convert(part, noise, noise_pa, microphones).astype(np.float32)
+        yield convert(part, noise, noise_pa, microphones)
 
 
 def _fixes(
-    frames: Iterator[NDArray[np.float32]],
+    frames: Iterator[NDArray[np.int16]],
     localiser: Localiser,
     p_PA_B: NDArray[np.float64],
 ) -> Iterator[Estimate | None]:
@@ -207,7 +207,7 @@ def _fixes(
             yield None
             continue
         ports = port_values(fix, p_PA_B)
-        yield Estimate(ports[2].tolist(), ports[3].tolist(), ranged=fix.range_valid)
+        yield Estimate(ports[2], ports[3], ranged=fix.range_valid)
 
 
 def _tracked(

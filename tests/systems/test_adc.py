@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.adc import MicArrayParameters, convert
+from systems.noise import frame_noise
 
 SILENT = np.zeros((3, 2500), dtype=np.float32)
 

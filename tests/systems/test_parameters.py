@@ -20,7 +20,9 @@ from systems.parameters import (
     Positive,
     Size,
 )
+from systems.repulsion import ActiveParameters
 from systems.robot import RobotParameters
+from systems.ultrasonic_array import UltrasonicParameters
 
 
 class Example(Parameters):
@@ -139,3 +141,15 @@ def test_temperature_overrules_the_set_speed():
     assert AcousticParameters(sound_speed_m_s=300.0).c == 300.0
     both = AcousticParameters(sound_speed_m_s=300.0, temperature_c=20.0)
     assert both.c == pytest.approx(343.5)
+
+
+def test_a_changed_copy_keeps_nothing_that_was_worked_out():
+    """Decay length and cones hang on fields that the copies change."""
+    gains = ActiveParameters()
+    sensors = UltrasonicParameters()
+    assert gains.alpha_m > 0.0
+    assert sensors.beams[2] > 0.0
+    reach = gains.model_copy(update={"reach_m": 2.0 * gains.reach_m})
+    assert reach.alpha_m == pytest.approx(2.0 * gains.alpha_m)
+    wide = sensors.model_copy(update={"beam_half_angle_deg": 30.0})
+    assert wide.beams[2] == pytest.approx(math.pi / 6.0)

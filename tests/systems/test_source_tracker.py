@@ -102,7 +102,8 @@ def test_an_estimate_belongs_to_the_pose_of_its_moment(bench):
     ("age", "x"), [(0.0, 4.0), (0.0125, 3.5), (0.025, 3.0), (0.0375, 2.0), (0.05, 1.0)]
 )
 def test_past_pose_lies_on_a_line_between_ticks(age, x):
-    pose = past_pose([4.0, 0, 0.4], [3.0, 0, 0.3], [1.0, 0, 0.1], age)
+    poses = np.array([[4.0, 0.0, 0.4], [3.0, 0.0, 0.3], [1.0, 0.0, 0.1]])
+    pose = past_pose(*poses, age)
     assert pose == pytest.approx([x, 0.0, x / 10])
 
 
@@ -233,7 +234,7 @@ def test_exact_estimates_are_the_target(steps):
     for step in steps:
         x += step
         pose = np.array([step, x - 2.0, 0.3 + step])
-        estimate = Estimate([x, 1.0], [0.0] * 4, ranged=True)
+        estimate = Estimate(np.array([x, 1.0]), np.zeros(4), ranged=True)
         track = model.hear(track, estimate, pose)
         a, b, theta = past_pose(pose, track.pose_1, track.pose_2, 0.025)
         c, s = math.cos(theta), math.sin(theta)
@@ -334,7 +335,8 @@ def warm_memory(tracker, robot):
     for k in range(12):
         pose = [0.05 + 0.004 * k, 0.1 + 0.008 * k, 0.25 + 0.01 * k]
         x, y = rng.normal([1.7, 0.6], 0.01) if k != 11 else (3.4, 0.6)
-        estimate = Estimate([x, y], [1e-4, 2e-5, 2e-5, 2e-4], ranged=True)
+        covariance = np.array([1e-4, 2e-5, 2e-5, 2e-4])
+        estimate = Estimate(np.array([x, y]), covariance, ranged=True)
         track = model.older(model.hear(track, estimate, pose), pose)
     return model.older(track, pose).pack()
 

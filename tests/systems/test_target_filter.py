@@ -20,8 +20,8 @@ from systems.target_filter import (
     ages,
     blank_memory,
     chosen_track,
+    expected,
     fold,
-    predicted,
 )
 
 T = FRAME_PERIOD_S
@@ -82,10 +82,10 @@ def test_prediction_is_that_of_the_matrix_exponential(seconds):
     fold(memory, sighting([1.0, -2.0], [[0.01, 0.002], [0.002, 0.02]]), SETTINGS)
     memory += 0.3 * ages(len(memory) // HYPOTHESIS)
     fold(memory, sighting([1.1, -1.9], [[0.02, 0.0], [0.0, 0.01]]), SETTINGS)
-    track = chosen_track(memory)
-    x, P = matrices(track)
+    x, P = matrices(chosen_track(memory))
     F, Q = model(seconds)
-    later, covariance = matrices(predicted(track, seconds, SETTINGS))
+    memory += seconds * ages(1)
+    later, covariance = matrices(expected(memory, SETTINGS))
     np.testing.assert_allclose(later, F @ x, atol=1e-12)
     np.testing.assert_allclose(covariance, F @ P @ F.T + Q, rtol=1e-6, atol=1e-12)
 
@@ -148,7 +148,7 @@ def test_errors_and_innovations_are_what_the_covariances_say():
             track = chosen_track(memory)
             heard = tick % 80 < 20
             if track[0] < NEVER_HEARD_S:
-                mean, P = matrices(predicted(track, track[0], SETTINGS))
+                mean, P = matrices(expected(memory, SETTINGS))
                 if tick % 80 in (0, 19):
                     e = mean[:2] - x[:2]
                     errors.append(e @ np.linalg.solve(P[:2, :2], e))
@@ -187,7 +187,7 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
     at = np.array([0.4, -0.3])
     fold(memory, sighting(at + 2.0 * u + off * n, 0.01 * np.eye(2)), SETTINGS)
     memory += 0.5 * ages(len(memory) // HYPOTHESIS)
-    before, P = matrices(predicted(chosen_track(memory), 0.5, SETTINGS))
+    before, P = matrices(expected(memory, SETTINGS))
     fold(memory, bearing(direction, 0.02, centre=at), SETTINGS)
     after, covariance = matrices(chosen_track(memory))
     h = np.array([*n, 0.0, 0.0])

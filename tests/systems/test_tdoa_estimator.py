@@ -11,7 +11,8 @@ from pydantic import ValidationError
 from pydrake.common.value import Value
 
 from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, convert, frame_noise
+from systems.adc import MicArrayParameters, convert
+from systems.noise import frame_noise
 from systems.robot import RobotParameters
 from systems.signals import AudioFrame
 from systems.tdoa_estimator import TDOAEstimator, TDOAParameters, robot_localiser
