@@ -186,7 +186,7 @@ class PlainLoop:
         commanded = np.array(wheels)
 
         def slope(at: NDArray[np.float64]) -> NDArray[np.float64]:
-            return plant_derivatives(at, commanded, numbers)
+            return plant_derivatives(at, commanded, *numbers)
 
         start = np.array(state)
         k1 = slope(start)

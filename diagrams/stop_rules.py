@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
@@ -15,7 +18,7 @@ from diagrams.scenario import Body, robot_rectangle
 from systems.geometry import control_point, rectangle_clearance
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["SUCCESSFUL", "Collision", "StopRules"]
+__all__ = ["SUCCESSFUL", "Collision", "StopRules", "watched"]
 
 #: Causes of runs that did what they should.
 SUCCESSFUL = ("reached", "completed")
@@ -44,11 +47,17 @@ class Collision:
 
 @dataclass
 class StopRules:
-    """A monitor for Drake's simulator; remembers why it stopped the run."""
+    """A monitor for Drake's simulator; remembers why it stopped the run.
+
+    It holds on to the simulator's context, and so to the simulator, which holds
+    its monitor: ``watched`` parts them after the run, or neither would be freed.
+    """
 
     follower: SoundFollower
     cause: str = ""
     collision: Collision | None = None
+    _root: Any = None
+    _contexts: tuple[Any, Any] = (None, None)
     _pose: list[float] | None = None
     _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
     _valid_time: float = 0.0
@@ -78,9 +87,15 @@ class StopRules:
         time = context.get_time()
         if self._pose is not None and time - self._time < 0.5 * FRAME_PERIOD_S:
             return _GO_ON
-        pose = self._pose_port.Eval(self._plant.GetMyContextFromRoot(context)).tolist()
-        target = self._tracker.GetMyContextFromRoot(context)
-        valid = self._valid_port.Eval(target)[0] > 0.5
+        if context is not self._root:
+            self._root = context
+            self._contexts = (
+                self._plant.GetMyContextFromRoot(context),
+                self._tracker.GetMyContextFromRoot(context),
+            )
+        plant, tracker = self._contexts
+        pose = self._pose_port.Eval(plant).tolist()
+        valid = self._valid_port.Eval(tracker)[0] > 0.5
         self.cause = self._judge(time, pose, valid=valid)
         self._pose, self._time = pose, time
         if self.cause:
@@ -169,3 +184,14 @@ class StopRules:
         return robot_rectangle(
             before + part * (now - before), self.follower.scenario.robot
         )
+
+
+@contextmanager
+def watched(simulator: Simulator, follower: SoundFollower) -> Iterator[StopRules]:
+    """Stops what the simulator does meanwhile when the run is over."""
+    rules = StopRules(follower)
+    simulator.set_monitor(rules)
+    try:
+        yield rules
+    finally:
+        simulator.clear_monitor()

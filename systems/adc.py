@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
@@ -66,12 +67,12 @@ class MicArrayParameters(Parameters):
             )
         return self
 
-    @property
+    @cached_property
     def full_scale(self) -> int:
         """Counts of the positive full scale."""
         return 2 ** (self.adc_bits - 1)
 
-    @property
+    @cached_property
     def counts_per_pa(self) -> float:
         """Counts for one pascal."""
         gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)

@@ -50,7 +50,7 @@ def _rim_twist(left, right, separation):
 
 
 class PlantNumbers(NamedTuple):
-    """What the plant's motion hangs on, for compiled code."""
+    """What the plant's motion hangs on, the last arguments of compiled code."""
 
     left_rim_m: float
     """Way of the left end of the axle for an angle of its wheel, m/rad."""
@@ -58,9 +58,9 @@ class PlantNumbers(NamedTuple):
     """The same of the right end, m/rad."""
     wheel_separation_m: float
     """Distance between the wheels, m."""
-    top_wheel_speed: float
+    limit: float
     """Commands saturate here, rad/s."""
-    motor_lag_s: float
+    lag: float
     """Time constant of the wheels' speeds, s."""
 
     @classmethod
@@ -77,25 +77,26 @@ class PlantNumbers(NamedTuple):
 
 
 @njit(cache=True)
-def plant_derivatives(state, commanded, numbers):
+def plant_derivatives(
+    state, commanded, left_rim_m, right_rim_m, wheel_separation_m, limit, lag
+):
     """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
 
     Args:
         state: (7,) x, y, theta, left and right wheel angle, left and right wheel
             speed; m, rad, rad/s.
         commanded: (2,) left and right wheel speed, rad/s.
-        numbers: ``PlantNumbers``.
+        left_rim_m: See ``PlantNumbers``, also for the others.
+        right_rim_m: m/rad.
+        wheel_separation_m: m.
+        limit: rad/s.
+        lag: s.
 
     Returns:
         (7,) derivatives in the order of the state.
     """
     theta, left, right = state[2], state[5], state[6]
-    v, omega = _rim_twist(
-        numbers.left_rim_m * left,
-        numbers.right_rim_m * right,
-        numbers.wheel_separation_m,
-    )
-    limit, lag = numbers.top_wheel_speed, numbers.motor_lag_s
+    v, omega = _rim_twist(left_rim_m * left, right_rim_m * right, wheel_separation_m)
     rates = np.empty_like(state)
     rates[0], rates[1], rates[2] = v * np.cos(theta), v * np.sin(theta), omega
     rates[3], rates[4] = left, right
@@ -105,9 +106,9 @@ def plant_derivatives(state, commanded, numbers):
 
 
 @njit(cache=True)
-def _checked_derivatives(state, commanded, numbers):  # pragma: no cover  (compiled)
+def _checked_derivatives(state, commanded, *numbers):  # pragma: no cover  (compiled)
     """``plant_derivatives``, and whether all that they rest on is finite."""
-    rates = plant_derivatives(state, commanded, numbers)
+    rates = plant_derivatives(state, commanded, *numbers)
     return rates, np.isfinite(state.sum() + commanded.sum())
 
 
@@ -199,11 +200,11 @@ def DiffDrivePlant_(T):
         def DoCalcTimeDerivatives(self, context, derivatives):
             motion = self._state(context), self._wheel_speeds.Eval(context)
             if T is float:
-                rates, finite = _checked_derivatives(*motion, self._numbers)
+                rates, finite = _checked_derivatives(*motion, *self._numbers)
                 if not finite:
                     raise _not_finite(*motion)
             else:
-                rates = plant_derivatives.py_func(*motion, self._numbers)
+                rates = plant_derivatives.py_func(*motion, *self._numbers)
             derivatives.SetFromVector(rates)
 
         def _state(self, context):

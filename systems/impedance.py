@@ -169,7 +169,7 @@ class ImpedanceLoop:
         ]
         F_b, speeds = repulsion_force(
             vectors_W,
-            self._before(context),
+            self._before(context) if vectors_W else {},
             self._radial_force,
             self._repulsion.velocity_term,
             FRAME_PERIOD_S,

@@ -247,7 +247,7 @@ def check_reach(
     Raises:
         ValueError: What left before the emission begins may be heard.
     """
-    distance = math.dist(p_WL, emission.p_WS[0])
+    distance = math.dist(p_WL.tolist(), emission.p_WS[0].tolist())
     reach = time - emission.start_time - KERNEL_REACH / emission.sample_rate_hz
     if distance > c * reach:
         raise _out_of_reach(distance)

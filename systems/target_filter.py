@@ -131,10 +131,9 @@ def _outliers(hypothesis):
 
 
 @register_jitable
-def _predict(track, seconds, settings):
+def _predict(track, seconds, fade, speed_std):
     """Moves a track on in time; its age stays."""
-    fade = settings.velocity_fade
-    variance = settings.speed_std**2
+    variance = speed_std**2
     kept = np.exp(-seconds / fade)
     lost = 1.0 - kept
     gain = fade * lost
@@ -285,7 +284,8 @@ def _begin(track, sighting, settings):
 def _follow(track, sighting, settings):
     """Feeds one track; whether the sighting can belong to it (else: no change)."""
     moved = track.copy()
-    _predict(moved, track[0] - settings.measurement_age, settings)
+    seconds = track[0] - settings.measurement_age
+    _predict(moved, seconds, settings.velocity_fade, settings.speed_std)
     counts, squared, found = _robust_innovation(moved, sighting, settings)
     if counts:
         _correct(moved, found)
@@ -409,9 +409,15 @@ def fold(memory, sighting, settings):
 
 
 @njit(cache=True)
-def expected(memory, settings):
-    """A copy of the chosen track as it is expected to be now."""
+def expected(memory, velocity_fade, speed_std):
+    """A copy of the chosen track as it is expected to be now.
+
+    Args:
+        memory: Its ages are those of now.
+        velocity_fade: See ``FilterSettings``.
+        speed_std: The same.
+    """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:
-        _predict(track, track[0], settings)
+        _predict(track, track[0], velocity_fade, speed_std)
     return track

@@ -250,4 +250,4 @@ class TrackerModel:
         """The chosen track as it is expected to be now."""
         memory = track.memory
         function = expected.py_func if memory.dtype == object else expected
-        return function(memory, self._settings)
+        return function(memory, self._settings.velocity_fade, self._settings.speed_std)

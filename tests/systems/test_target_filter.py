@@ -34,6 +34,7 @@ SETTINGS = FilterSettings(
     assumed_range=3.0,
     measurement_age=0.0,
 )
+MOTION = (SETTINGS.velocity_fade, SETTINGS.speed_std)
 H = np.eye(2, 4)
 #: Where in a track the upper triangles of a 4 x 4 covariance stand.
 PLACES = {(0, 0): 5, (0, 1): 6, (1, 1): 7, (0, 2): 8, (0, 3): 9} | {
@@ -85,7 +86,7 @@ def test_prediction_is_that_of_the_matrix_exponential(seconds):
     x, P = matrices(chosen_track(memory))
     F, Q = model(seconds)
     memory += seconds * ages(1)
-    later, covariance = matrices(expected(memory, SETTINGS))
+    later, covariance = matrices(expected(memory, *MOTION))
     np.testing.assert_allclose(later, F @ x, atol=1e-12)
     np.testing.assert_allclose(covariance, F @ P @ F.T + Q, rtol=1e-6, atol=1e-12)
 
@@ -148,7 +149,7 @@ def test_errors_and_innovations_are_what_the_covariances_say():
             track = chosen_track(memory)
             heard = tick % 80 < 20
             if track[0] < NEVER_HEARD_S:
-                mean, P = matrices(expected(memory, SETTINGS))
+                mean, P = matrices(expected(memory, *MOTION))
                 if tick % 80 in (0, 19):
                     e = mean[:2] - x[:2]
                     errors.append(e @ np.linalg.solve(P[:2, :2], e))
@@ -187,7 +188,7 @@ def test_a_bearing_counts_across_itself_alone(direction, off):
     at = np.array([0.4, -0.3])
     fold(memory, sighting(at + 2.0 * u + off * n, 0.01 * np.eye(2)), SETTINGS)
     memory += 0.5 * ages(len(memory) // HYPOTHESIS)
-    before, P = matrices(expected(memory, SETTINGS))
+    before, P = matrices(expected(memory, *MOTION))
     fold(memory, bearing(direction, 0.02, centre=at), SETTINGS)
     after, covariance = matrices(chosen_track(memory))
     h = np.array([*n, 0.0, 0.0])

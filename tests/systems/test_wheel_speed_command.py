@@ -40,7 +40,7 @@ def test_control_point_moves_with_the_virtual_mass(theta, direction, speed):
     wheels = wheels_for(v_WP, theta)
     state = np.array([0.3, -0.2, theta, 0.0, 0.0, *wheels])
     numbers = PlantNumbers.of(ROBOT, PlantParameters())
-    rates = plant_derivatives(np.array(state), np.array(wheels), numbers)
+    rates = plant_derivatives(np.array(state), np.array(wheels), *numbers)
     h = 1e-6
     ahead = control_point((state + h * rates)[:3], 0.175)
     behind = control_point((state - h * rates)[:3], 0.175)
