@@ -75,8 +75,8 @@ def frame_time_ms(
 
 def frame_figures() -> list[Figure]:
     """Times beside the bounds of the fast method and of maximum likelihood."""
-    gcc = Localiser.of(TDOAParameters(), SHAPE, C)
-    ml = Localiser.of(TDOAParameters(method="ml"), SHAPE, C)
+    gcc = Localiser(TDOAParameters(), SHAPE, C)
+    ml = Localiser(TDOAParameters(method="ml"), SHAPE, C)
     frames = frames_to_hear()
     memory = gcc.blank()
     for frame in frames["noise"]:

@@ -16,10 +16,11 @@ from systems.delay_search import DelaySearch, weakest_sound
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
 from systems.frame_energy import frame_energy
+from systems.half_band import PASSED, halve_rate, halved_samples
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
 from systems.steered_response import NEAREST_M
 
@@ -106,7 +107,7 @@ class HearingMemory(NamedTuple):
     """Of a frame between the sounds, without rumble, units of the frame squared; 0
     until such a frame was heard."""
     noise_energy: float
-    """Of its mean channel within the band."""
+    """Of its mean channel within the band, of what is left at the plan's rate."""
     echoes: NDArray[np.float32] | None = None
     """(n, bins) see ``systems.precedence``; None where the noise is louder."""
     heard: bool = False
@@ -121,40 +122,42 @@ def _averaged(known: float, new: float) -> float:
 class Localiser:
     """Where the sounds of successive frames come from.
 
+    Frames as ``MicArray`` publishes them are heard at half their rate, where that
+    leaves the band, and delays need not be whole samples.
+
     Args:
-        plan: Made for these frames, this band and this array.
-        parameters: Method and thresholds.
+        parameters: Method, band and thresholds.
+        shape: The microphones.
+        c: True speed of sound, m/s.
+
+    Raises:
+        ValueError: The array cannot serve at this rate and band.
     """
 
-    def __init__(self, plan: DelayPlan, parameters: TDOAParameters) -> None:
+    def __init__(self, parameters: TDOAParameters, shape: ArrayShape, c: float) -> None:
+        whole = parameters.method == "amdf"
+        self._halved = not whole and parameters.high_hz <= PASSED * SAMPLE_RATE_HZ
+        plan = DelayPlan(
+            shape=shape,
+            c=parameters.sound_speed_m_s or c,
+            sample_rate_hz=SAMPLE_RATE_HZ / (1 + self._halved),
+            frame_samples=(
+                halved_samples(FRAME_SAMPLES) if self._halved else FRAME_SAMPLES
+            ),
+            low_hz=parameters.low_hz,
+            high_hz=parameters.high_hz,
+        )
         self.plan = plan
         self.parameters = parameters
         self._sizes = EchoMemory(plan.shape.count, plan.sample_rate_hz)
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
         channels = plan.shape.count
-        self._scatter = _QUIET * math.sqrt(2.0 / (channels * plan.frame_samples))
+        self._scatter = _QUIET * math.sqrt(2.0 / (channels * FRAME_SAMPLES))
         # A band that is found may be as narrow as it likes.
         self._weakest = 0.0
         if parameters.band == "set":
             self._weakest = weakest_sound(plan, parameters.false_alarm_rate)
-
-    @classmethod
-    def of(cls, parameters: TDOAParameters, shape: ArrayShape, c: float) -> Localiser:
-        """For frames as ``MicArray`` publishes them.
-
-        Raises:
-            ValueError: The array cannot serve at this rate and band.
-        """
-        plan = DelayPlan(
-            shape=shape,
-            c=parameters.sound_speed_m_s or c,
-            sample_rate_hz=SAMPLE_RATE_HZ,
-            frame_samples=round(FRAME_PERIOD_S * SAMPLE_RATE_HZ),
-            low_hz=parameters.low_hz,
-            high_hz=parameters.high_hz,
-        )
-        return cls(plan, parameters)
 
     def blank(self) -> HearingMemory:
         """The memory before the first frame."""
@@ -171,7 +174,7 @@ class Localiser:
         """Where the sound of a frame comes from.
 
         Args:
-            frame: (n, samples) channels, any unit; counts will do.
+            frame: (n, FRAME_SAMPLES) channels, any unit; counts will do.
             memory: What the last frame left.
 
         Returns:
@@ -184,7 +187,10 @@ class Localiser:
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
-        frame = frame.astype(np.float32, copy=False)
+        if self._halved:
+            frame = halve_rate(frame)
+        else:
+            frame = frame.astype(np.float32, copy=False)
         seen = look(
             frame,
             self.plan,
@@ -206,8 +212,10 @@ class Localiser:
 
     def _quietest(self, memory: HearingMemory) -> float:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""
-        # Both sides of the spectrum, all channels; and what of it is no rumble.
-        in_band = 2.0 * self.plan.shape.count * memory.noise_energy
+        # Both sides of the spectrum, all channels, all samples; and what of it is no
+        # rumble.
+        share = self.plan.frame_samples / FRAME_SAMPLES
+        in_band = 2.0 * self.plan.shape.count * memory.noise_energy / share
         rise = self._weakest * min(in_band, memory.energy)
         return (1.0 - self._scatter) * memory.energy + rise
 
@@ -247,7 +255,7 @@ class Localiser:
         return self._fix(frame, delays, errors), memory
 
     def _checked_energy(self, frame: NDArray[np.float32 | np.int16]) -> float:
-        expected = (self.plan.shape.count, self.plan.frame_samples)
+        expected = (self.plan.shape.count, FRAME_SAMPLES)
         if frame.shape != expected:
             raise ValueError(
                 f"audio: a frame of shape {frame.shape}; give a channel for each of "

@@ -28,7 +28,7 @@ def robot_localiser(
         The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
-    localiser = Localiser.of(parameters, shape, acoustics.c)
+    localiser = Localiser(parameters, shape, acoustics.c)
     return localiser, np.mean(robot.microphones_m, axis=0)
 
 

@@ -65,7 +65,7 @@ def false_alarms(
         seed: Of the noise.
     """
     localisers = [
-        Localiser.of(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
+        Localiser(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
     ]
     memories = [localiser.blank() for localiser in localisers]
     counts = [0] * len(rates)
@@ -107,7 +107,7 @@ def detection_curve(
         range_m: Of the source, m.
         parameters: Of the estimator.
     """
-    localiser = Localiser.of(parameters or TDOAParameters(), shape, c)
+    localiser = Localiser(parameters or TDOAParameters(), shape, c)
     points = []
     for level in levels_db:
         noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-level / 20.0)

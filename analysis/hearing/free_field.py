@@ -56,7 +56,7 @@ def frame_estimator(
     parameters: TDOAParameters, shape: ArrayShape, c: float
 ) -> Estimator:
     """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears."""
-    localiser = Localiser.of(parameters, shape, c)
+    localiser = Localiser(parameters, shape, c)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]
 
 

@@ -10,6 +10,7 @@ from analysis.hearing.detection import detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
 from systems.array_shape import ArrayShape
 from systems.delays import look
+from systems.half_band import halve_rate
 from systems.localise import Localiser, TDOAParameters
 from systems.noise import tick_generator
 from systems.robot import RobotParameters
@@ -40,12 +41,12 @@ def test_false_alarms_are_counted_at_every_rate_by_itself():
 def test_a_chance_is_a_false_alarm_of_every_rate_above_it():
     """Something is heard in a first frame if and only if its rate is higher."""
     noise = tick_generator(9, 3).standard_normal((3, 2500), dtype=np.float32)
-    default = Localiser.of(TDOAParameters(), SHAPE, C)
-    seen = look(noise, default.plan)
+    default = Localiser(TDOAParameters(), SHAPE, C)
+    seen = look(halve_rate(noise), default.plan)
     assert seen is not None
     for factor, heard in ((1.01, True), (0.99, False)):
         rate = factor * seen[0].chance
-        localiser = Localiser.of(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
+        localiser = Localiser(TDOAParameters(false_alarm_rate=rate), SHAPE, C)
         _, memory = localiser.localise(noise, localiser.blank())
         # What is noise leaves its level behind.
         assert (memory.energy == 0.0) == heard
