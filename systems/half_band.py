@@ -12,7 +12,7 @@ from numba import njit
 
 from systems.propagation import REORDER
 
-__all__ = ["PASSED", "halve_rate", "halved_samples"]
+__all__ = ["PASSED", "halve_rate"]
 
 #: Highest frequency that passes, as a share of the rate.
 PASSED = 0.15
@@ -34,11 +34,6 @@ def _taps() -> tuple[np.float32, ...]:
 _TAPS = _taps()
 
 
-def halved_samples(samples: int) -> int:
-    """Samples that ``halve_rate`` leaves of so many."""
-    return samples // 2 - (2 * _PAIRS - 1)
-
-
 @njit(cache=True)
 def halve_rate(frame):  # pragma: no cover  (compiled)
     """Every other sample of what passes.
@@ -47,13 +42,14 @@ def halve_rate(frame):  # pragma: no cover  (compiled)
         frame: (n, samples) channels, floats or counts.
 
     Returns:
-        (n, halved_samples) float32. The filter does not reach beyond the frame: the
-        first sample stands at its tenth.
+        (n, samples // 2) float32, at the second, fourth ... sample. Beyond the
+        frame there is silence: four or five at each end miss a part.
     """
     channels, samples = frame.shape
     half = samples // 2
-    out = np.empty((channels, half - (2 * _PAIRS - 1)), dtype=np.float32)
-    even, odd = np.empty(half, dtype=np.float32), np.empty(half, dtype=np.float32)
+    out = np.empty((channels, half), dtype=np.float32)
+    even = np.zeros(half + 2 * _PAIRS - 1, dtype=np.float32)
+    odd = np.empty(half, dtype=np.float32)
     for m in range(channels):
         _halve_row(frame[m], even, odd, out[m])
     return out
@@ -61,12 +57,13 @@ def halve_rate(frame):  # pragma: no cover  (compiled)
 
 @njit(cache=True, fastmath=REORDER)
 def _halve_row(samples, even, odd, out):  # pragma: no cover  (compiled)
-    """Fills in one channel; even and odd (half,) are scratch."""
-    for k in range(even.size):
-        even[k], odd[k] = samples[2 * k], samples[2 * k + 1]
+    """Fills in one channel; odd (half,) is scratch, and even between its ends."""
+    inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
+    for k in range(odd.size):
+        inside[k], odd[k] = samples[2 * k], samples[2 * k + 1]
     a, b, c, d, e = _TAPS
-    for k in range(out.size):
+    for k in range(odd.size):
         near = a * (even[k + 4] + even[k + 5]) + b * (even[k + 3] + even[k + 6])
         far = c * (even[k + 2] + even[k + 7]) + d * (even[k + 1] + even[k + 8])
         last = e * (even[k] + even[k + 9])
-        out[k] = np.float32(0.5) * odd[k + 4] + (near + far + last)
+        out[k] = np.float32(0.5) * odd[k] + (near + far + last)

@@ -16,7 +16,7 @@ from systems.delay_search import DelaySearch, weakest_sound
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
 from systems.frame_energy import frame_energy
-from systems.half_band import PASSED, halve_rate, halved_samples
+from systems.half_band import PASSED, halve_rate
 from systems.multilateration import locate_source
 from systems.parameters import Fraction, Parameters, Positive
 from systems.precedence import EchoMemory, keep_first_wave_front
@@ -141,9 +141,7 @@ class Localiser:
             shape=shape,
             c=parameters.sound_speed_m_s or c,
             sample_rate_hz=SAMPLE_RATE_HZ / (1 + self._halved),
-            frame_samples=(
-                halved_samples(FRAME_SAMPLES) if self._halved else FRAME_SAMPLES
-            ),
+            frame_samples=FRAME_SAMPLES // (1 + self._halved),
             low_hz=parameters.low_hz,
             high_hz=parameters.high_hz,
         )
@@ -214,8 +212,8 @@ class Localiser:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""
         # Both sides of the spectrum, all channels, all samples; and what of it is no
         # rumble.
-        share = self.plan.frame_samples / FRAME_SAMPLES
-        in_band = 2.0 * self.plan.shape.count * memory.noise_energy / share
+        in_band = 2.0 * self.plan.shape.count * memory.noise_energy
+        in_band *= FRAME_SAMPLES / self.plan.frame_samples
         rise = self._weakest * min(in_band, memory.energy)
         return (1.0 - self._scatter) * memory.energy + rise
 

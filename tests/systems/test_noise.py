@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from systems.noise import BEFORE_THE_RUN, _scrambled, standard_normals, tick_generator
+from systems.noise import (
+    BEFORE_THE_RUN,
+    _scrambled,
+    _tick_word,
+    frame_noise,
+    standard_normals,
+    tick_generator,
+)
 
 
 def test_scrambler_is_splitmix64():
@@ -39,9 +46,10 @@ def test_neighbouring_seeds_and_ticks_are_independent():
     assert np.std(rows[:, 0]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_standard_normals_are_normal():
+@pytest.mark.parametrize("draw", [standard_normals, frame_noise])
+def test_normal_numbers_are_normal(draw):
     """Kolmogorov and Smirnov, four moments, tails, no correlation from one to next."""
-    values = standard_normals((4, 500_000), 3, 5).astype(float).ravel()
+    values = draw((4, 500_000), 3, 5).astype(float).ravel()
     assert stats.kstest(values, "norm").pvalue > 0.01
     # Standard errors of mean, variance, skewness and kurtosis of 2e6 numbers.
     n = values.size
@@ -55,8 +63,34 @@ def test_standard_normals_are_normal():
     assert abs(np.corrcoef(values[:-1], values[1:])[0, 1]) < 4.0 / np.sqrt(n)
 
 
-def test_standard_normals_depend_on_seed_and_tick_alone():
-    first = standard_normals((3, 7), 1, 2)
-    np.testing.assert_array_equal(first, standard_normals((3, 7), 1, 2))
-    assert not np.isin(first, standard_normals((3, 7), 1, 3)).any()
-    assert not np.isin(first, standard_normals((3, 7), 2, 2)).any()
+@pytest.mark.parametrize("draw", [standard_normals, frame_noise])
+def test_normal_numbers_depend_on_seed_and_tick_alone(draw):
+    first = draw((3, 7), 1, 2)
+    np.testing.assert_array_equal(first, draw((3, 7), 1, 2))
+    assert not np.isin(first, draw((3, 7), 1, 3)).any()
+    assert not np.isin(first, draw((3, 7), 2, 2)).any()
+
+
+def test_partners_of_a_pair_have_nothing_in_common():
+    """Neither they nor their squares: both come from one radius."""
+    pairs = frame_noise((800, 1250), 4, 1).astype(float).reshape(800, 2, 625)
+    first, second = pairs[:, 0].ravel(), pairs[:, 1].ravel()
+    for a, b in ((first, second), (first**2, second**2), (first**2, second)):
+        assert abs(np.corrcoef(a, b)[0, 1]) < 4.0 / np.sqrt(first.size)
+
+
+def test_frame_noise_is_what_box_and_muller_say():
+    """In double precision, from the words of splitmix64."""
+    state, step, mask = int(_tick_word(3, 8)), 0x9E3779B97F4A7C15, (1 << 64) - 1
+    places = [np.uint64((state + k * step) & mask) for k in range(625)]
+    words = np.array([_scrambled(place) for place in places], dtype=np.uint64)
+    u = ((words >> 41) + 0.5) / 2.0**23
+    turn = (words >> 16 & 0xFFFFFF).astype(np.int64)
+    angle = (np.where(turn < 2**23, turn, turn - 2**24) + 0.5) / 2.0**23 * np.pi / 4.0
+    upright = (words & 1).astype(bool)
+    cosine, sine = np.cos(angle), np.sin(angle)
+    signs = 1.0 - 2.0 * np.array([words >> 1 & 1, words >> 2 & 1])
+    parts = np.where(upright, [sine, cosine], [cosine, sine])
+    expected = signs * np.sqrt(-2.0 * np.log(u)) * parts
+    found = frame_noise((2, 625), 3, 8)
+    np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-6)
