@@ -6,11 +6,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.simulation import RunResult
-from systems.geometry import cone_range
+from systems.ultrasonic_array import SENSORS, cone_ranges
 
 __all__ = ["Sightings", "sightings"]
 
@@ -49,36 +48,13 @@ def sightings(result: RunResult) -> Sightings | None:
 def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
     """(n,) whether any cone's echo was that body's, at the ticks."""
     scenario, columns = result.scenario, result.columns
-    sensors = scenario.ultrasonic
-    theta = columns["theta_WB"]
-    body = scenario.bodies()[name].rectangles(result.time)
-    known = np.zeros(len(result.time), dtype=bool)
-    for k, ((x, y), axis_deg) in enumerate(
-        zip(sensors.positions_m, sensors.axes_deg, strict=True)
-    ):
-        c, s = np.cos(theta), np.sin(theta)
-        ranges = _cone_ranges(
-            columns["p_WP_x"] + c * x - s * y,
-            columns["p_WP_y"] + s * x + c * y,
-            theta + math.radians(axis_deg),
-            math.radians(sensors.beam_half_angle_deg),
-            body,
-        )
-        echo = columns[f"echo_{k + 1}"] > 0.5
-        known |= echo & (np.abs(columns[f"range_{k + 1}"] - ranges) <= SAME_M)
-    return known
-
-
-@njit(cache=True)
-def _cone_ranges(
-    x: NDArray[np.float64],
-    y: NDArray[np.float64],
-    axis: NDArray[np.float64],
-    half_angle: float,
-    body: NDArray[np.float64],
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) range of one body in one cone at each tick, m."""
-    ranges = np.empty(len(x))
-    for i in range(len(x)):
-        ranges[i] = cone_range(x[i], y[i], axis[i], half_angle, body[i : i + 1])
-    return ranges
+    sensors, control_point_m = scenario.ultrasonic, scenario.robot.control_point_m
+    bodies = scenario.bodies()[name].rectangles(result.time)
+    ranges = [
+        cone_ranges(pose, body[np.newaxis], sensors, control_point_m)
+        for pose, body in zip(result.poses("WB"), bodies, strict=True)
+    ]
+    numbers = range(1, SENSORS + 1)
+    read = np.stack([columns[f"range_{k}"] for k in numbers], axis=1)
+    echo = np.stack([columns[f"echo_{k}"] for k in numbers], axis=1) > 0.5
+    return np.any(echo & (np.abs(read - ranges) <= SAME_M), axis=1)
