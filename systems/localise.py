@@ -185,12 +185,11 @@ class Localiser:
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
-        if self._halved:
-            frame = halve_rate(frame)
-        else:
-            frame = frame.astype(np.float32, copy=False)
+        heard: NDArray[np.float32] = (
+            halve_rate(frame) if self._halved else frame.astype(np.float32, copy=False)
+        )
         seen = look(
-            frame,
+            heard,
             self.plan,
             self.parameters.method,
             find_band=self.parameters.band == "found",
@@ -204,9 +203,9 @@ class Localiser:
         if not memory.heard and search.weakest > _SHARED_CHANCE:
             return None, after
         if not self.parameters.suppress_echoes:
-            return self._fix(frame, self._delays(frame, seen)), after
-        begins = not memory.heard and energy_spread(frame) < _WHOLE_FRAME
-        return self._locate(frame, seen, after, begins=begins)
+            return self._fix(heard, self._delays(heard, seen)), after
+        begins = not memory.heard and energy_spread(heard) < _WHOLE_FRAME
+        return self._locate(heard, seen, after, begins=begins)
 
     def _quietest(self, memory: HearingMemory) -> float:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""

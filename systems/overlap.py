@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 __all__ = ["EDGE_SAMPLES", "cut_rows", "cut_to_overlap"]
 
 #: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
-#: whole samples by one over the length and the squared bandwidth: 4e-3 samples of
-#: a 25 ms frame, as much as the noise at 30 dB. These leave a twentieth of it, and
-#: nothing where they follow the delays below the sample.
+#: whole samples by one over the length and the squared bandwidth: 2e-3 samples of
+#: a 25 ms frame at 50 kHz, as much as the noise at 30 dB. These leave a twentieth
+#: of it, and nothing where they follow the delays below the sample.
 EDGE_SAMPLES = 16
 
 

@@ -160,6 +160,11 @@ def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
     return pose, np.array([x, y, xx, xy, yy, x_P + dx, y_P + dy, nx, ny, ranged])
 
 
+def _of_scalars(memory: NDArray[Any], function: Any) -> Any:
+    """A compiled function as it serves the memory's scalars, floats or AutoDiffXd."""
+    return function.py_func if memory.dtype == object else function
+
+
 class TrackerModel:
     """The tracker's arithmetic for one robot and one kind of hearing.
 
@@ -204,13 +209,12 @@ class TrackerModel:
         poses = np.asarray(pose), track.pose_1, track.pose_2
         p_PS_B, covariance, ranged = estimate
         memory = track.memory.copy()
-        place, feed = _sighting, fold
-        if memory.dtype == object:
-            place, feed = _sighting.py_func, fold.py_func
         age = self._settings.measurement_age
         measured = p_PS_B, covariance, float(ranged)
-        then, sighting = place(*measured, poses, age, self._microphones)
-        believed = feed(memory, sighting, self._settings)
+        then, sighting = _of_scalars(memory, _sighting)(
+            *measured, poses, age, self._microphones
+        )
+        believed = _of_scalars(memory, fold)(memory, sighting, self._settings)
         heard = then if believed else track.pose_heard
         return track._replace(pose_heard=heard, memory=memory)
 
@@ -248,6 +252,5 @@ class TrackerModel:
 
     def _expected(self, track: Track) -> Any:
         """The chosen track as it is expected to be now."""
-        memory = track.memory
-        function = expected.py_func if memory.dtype == object else expected
-        return function(memory, self._settings.velocity_fade, self._settings.speed_std)
+        fade, speed_std = self._settings.velocity_fade, self._settings.speed_std
+        return _of_scalars(track.memory, expected)(track.memory, fade, speed_std)

@@ -20,6 +20,7 @@ def test_usage_counts_descendants():
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
     ) as process:
+        assert process.stdout is not None
         process.stdout.readline()
         during = tree_usage(os.getpid())
         process.communicate(b"\n")

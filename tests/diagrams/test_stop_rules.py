@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import gc
+import weakref
 from typing import Any
 
 import numpy as np
 import pytest
 
-from diagrams import RunResult, simulate
+from diagrams import RunResult, build_sound_follower, make_simulator, simulate
 from diagrams.scenario import Scenario, robot_rectangle
+from diagrams.stop_rules import watched
 from systems.geometry import rectangle_clearance
 
 BASE: dict[str, Any] = {
@@ -25,6 +28,20 @@ WAITING: dict[str, Any] = {"attraction": {"stiffness_n_m": 0.0}}
 
 def run(**data: Any) -> RunResult:
     return simulate(Scenario.model_validate(BASE | data))
+
+
+def test_a_run_leaves_no_simulator_behind():
+    """Its monitor keeps the context, which keeps the simulator, which keeps it."""
+    follower = build_sound_follower(Scenario.model_validate(BASE))
+    simulator = make_simulator(follower)
+    context = simulator.get_context()
+    with watched(simulator, follower):
+        simulator.Initialize()
+        simulator.AdvanceTo(0.1)
+    alive = weakref.ref(simulator)
+    del simulator, context
+    gc.collect()
+    assert alive() is None
 
 
 def test_reached():

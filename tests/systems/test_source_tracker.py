@@ -102,8 +102,8 @@ def test_an_estimate_belongs_to_the_pose_of_its_moment(bench):
     ("age", "x"), [(0.0, 4.0), (0.0125, 3.5), (0.025, 3.0), (0.0375, 2.0), (0.05, 1.0)]
 )
 def test_past_pose_lies_on_a_line_between_ticks(age, x):
-    poses = np.array([[4.0, 0.0, 0.4], [3.0, 0.0, 0.3], [1.0, 0.0, 0.1]])
-    pose = past_pose(*poses, age)
+    now, then, before = np.array([[4.0, 0.0, 0.4], [3.0, 0.0, 0.3], [1.0, 0.0, 0.1]])
+    pose = past_pose(now, then, before, age)
     assert pose == pytest.approx([x, 0.0, x / 10])
 
 
