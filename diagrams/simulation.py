@@ -19,7 +19,7 @@ from pydrake.systems.analysis import (
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import Collision, watched
+from diagrams.stop_rules import Collision, StopRules
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -138,15 +138,16 @@ def simulate(
             "simulate: follower must be built from the same scenario with log=True"
         )
     simulator = make_simulator(follower)
+    rules = StopRules(follower)
+    simulator.set_monitor(rules)
     start = perf_counter()
-    with watched(simulator, follower) as rules:
-        simulator.Initialize()
-        for second in range(1, math.ceil(scenario.duration_s) + 1):
-            simulator.AdvanceTo(min(second, scenario.duration_s))
-            if progress is not None:
-                progress(simulator.get_context().get_time())
-            if rules.cause:
-                break
+    simulator.Initialize()
+    for second in range(1, math.ceil(scenario.duration_s) + 1):
+        simulator.AdvanceTo(min(second, scenario.duration_s))
+        if progress is not None:
+            progress(simulator.get_context().get_time())
+        if rules.cause:
+            break
     wall_s = perf_counter() - start
     columns = _columns(follower, simulator.get_context())
     return RunResult(scenario, rules.final_cause(), rules.collision, columns, wall_s)

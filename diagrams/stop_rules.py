@@ -3,14 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
@@ -18,7 +15,7 @@ from diagrams.scenario import Body, robot_rectangle
 from systems.geometry import control_point, rectangle_clearance
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["SUCCESSFUL", "Collision", "StopRules", "watched"]
+__all__ = ["SUCCESSFUL", "Collision", "StopRules"]
 
 #: Causes of runs that did what they should.
 SUCCESSFUL = ("reached", "completed")
@@ -47,11 +44,7 @@ class Collision:
 
 @dataclass
 class StopRules:
-    """A monitor for Drake's simulator; remembers why it stopped the run.
-
-    It holds on to the simulator's context, and so to the simulator, which holds
-    its monitor: ``watched`` parts them after the run, or neither would be freed.
-    """
+    """A monitor for Drake's simulator; remembers why it stopped the run."""
 
     follower: SoundFollower
     cause: str = ""
@@ -184,14 +177,3 @@ class StopRules:
         return robot_rectangle(
             before + part * (now - before), self.follower.scenario.robot
         )
-
-
-@contextmanager
-def watched(simulator: Simulator, follower: SoundFollower) -> Iterator[StopRules]:
-    """Stops what the simulator does meanwhile when the run is over."""
-    rules = StopRules(follower)
-    simulator.set_monitor(rules)
-    try:
-        yield rules
-    finally:
-        simulator.clear_monitor()

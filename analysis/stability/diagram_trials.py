@@ -28,7 +28,7 @@ from diagrams import (
     make_simulator,
 )
 from diagrams.scenario import robot_rectangle
-from diagrams.stop_rules import Collision, watched
+from diagrams.stop_rules import Collision, StopRules
 from systems.geometry import control_point, rectangle_clearance, rotate
 from systems.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 
@@ -155,6 +155,8 @@ def _run(
     """Cause, and the mechanism of a collision."""
     scenario, robot = follower.scenario, follower.scenario.robot
     simulator = make_simulator(follower)
+    rules = StopRules(follower)
+    simulator.set_monitor(rules)
     contexts = {
         role: follower.blocks[role].GetMyMutableContextFromRoot(
             simulator.get_mutable_context()
@@ -167,9 +169,8 @@ def _run(
     contexts["plant"].SetContinuousState([*pose, 0.0, 0.0, *wheels])
     contexts["odometry"].SetDiscreteState([*pose, 0.0, 0.0])
     set_discrete_state(contexts["command"], [*velocity, *wheels])
-    with watched(simulator, follower) as rules:
-        simulator.Initialize()
-        simulator.AdvanceTo(scenario.duration_s)
+    simulator.Initialize()
+    simulator.AdvanceTo(scenario.duration_s)
     if rules.collision is None:
         return rules.final_cause(), ""
     end = contexts["plant"].get_continuous_state_vector().CopyToVector()[:3]
