@@ -23,7 +23,7 @@ _TOLERANCE = 1e-6
 _ROUNDING = 1.0 / 24.0
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True, fastmath=REORDER, forceinline=True)
 def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compiled)
     """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
 
@@ -45,7 +45,7 @@ def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compi
         imaginary[k] = x * sine[k] + y * cosine[k]
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True, fastmath=REORDER, forceinline=True)
 def _slope_and_curve(
     real, imaginary, weights, first, step
 ):  # pragma: no cover  (compiled)
@@ -58,7 +58,7 @@ def _slope_and_curve(
     return slope, curve
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True, fastmath=REORDER, forceinline=True)
 def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled)
     """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
     plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0

@@ -55,7 +55,7 @@ def halve_rate(frame):  # pragma: no cover  (compiled)
     return out
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True, fastmath=REORDER, forceinline=True)
 def _halve_row(samples, even, odd, out):  # pragma: no cover  (compiled)
     """Fills in one channel; odd (half,) is scratch, and even between its ends."""
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]

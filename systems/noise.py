@@ -124,7 +124,7 @@ _ROOT_HALF_BITS = np.float32(np.sqrt(0.5)).view(np.int32)
 _PAIRS = 625
 
 
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
+@njit(cache=True, fastmath=REORDER, forceinline=True, error_model="numpy")
 def _normal_pairs(state, uniform, angle, turn, out):  # pragma: no cover  (compiled)
     """Fills out (2 n,) from n words: the method of Box and Muller (1958).
 

@@ -176,7 +176,7 @@ def retarded_delays(
     return delays, rates
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True, fastmath=REORDER, forceinline=True)
 def _delayed(samples, first, u, kernel, out):  # pragma: no cover  (compiled)
     """Fills out (n,) with samples[first + i + 1/2 + u_i], interpolated."""
     begin, last = first - KERNEL_REACH + 1, 2 * KERNEL_REACH - 1
