@@ -42,7 +42,6 @@ LOGGED_PORTS = (
     ("hearing", "detected"),
     ("hearing", "range_valid"),
     ("tracker", "p_WS_estimated"),
-    ("tracker", "age"),
     ("tracker", "target_valid"),
     ("odometry", "pose_WB_estimated"),
     ("collision", "collision_vectors_B"),

@@ -35,7 +35,6 @@ COLUMNS = {
     ("hearing", "detected"): ("detected",),
     ("hearing", "range_valid"): ("range_valid",),
     ("tracker", "p_WS_estimated"): ("p_WS_estimated_x", "p_WS_estimated_y"),
-    ("tracker", "age"): ("target_age",),
     ("tracker", "target_valid"): ("target_valid",),
     ("odometry", "pose_WB_estimated"): (
         "p_WB_estimated_x",
