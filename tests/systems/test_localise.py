@@ -125,6 +125,19 @@ def test_a_found_band_leaves_out_what_holds_noise_alone():
     assert errors[1] < 0.5 * errors[0]
 
 
+@pytest.mark.parametrize(
+    ("fields", "rate_hz"),
+    [
+        ({}, FS / 2.0),
+        ({"method": "ml", "high_hz": 8_000.0}, FS / 2.0),
+        ({"high_hz": 20_000.0}, FS),  # half the rate would not hold it
+        ({"method": "amdf"}, FS),  # whole samples of the converter
+    ],
+)
+def test_frames_are_heard_at_half_their_rate_where_that_will_do(fields, rate_hz):
+    assert listener(**fields).plan.sample_rate_hz == rate_hz
+
+
 def after_noise(localiser):
     """Its memory after some frames of noise."""
     memory, generator = localiser.blank(), Generator(Philox(key=5))

@@ -80,9 +80,9 @@ def test_partners_of_a_pair_have_nothing_in_common():
 
 
 def test_frame_noise_is_what_box_and_muller_say():
-    """In double precision, from the words of splitmix64."""
+    """In double precision, from the words of splitmix64; two blocks of pairs."""
     state, step, mask = int(_tick_word(3, 8)), 0x9E3779B97F4A7C15, (1 << 64) - 1
-    places = [np.uint64((state + k * step) & mask) for k in range(625)]
+    places = [np.uint64((state + k * step) & mask) for k in range(1250)]
     words = np.array([_scrambled(place) for place in places], dtype=np.uint64)
     u = ((words >> 41) + 0.5) / 2.0**23
     turn = (words >> 16 & 0xFFFFFF).astype(np.int64)
@@ -91,6 +91,7 @@ def test_frame_noise_is_what_box_and_muller_say():
     cosine, sine = np.cos(angle), np.sin(angle)
     signs = 1.0 - 2.0 * np.array([words >> 1 & 1, words >> 2 & 1])
     parts = np.where(upright, [sine, cosine], [cosine, sine])
-    expected = signs * np.sqrt(-2.0 * np.log(u)) * parts
-    found = frame_noise((2, 625), 3, 8)
+    pairs = signs * np.sqrt(-2.0 * np.log(u)) * parts
+    expected = np.concatenate([pairs[:, :625].ravel(), pairs[:, 625:].ravel()])
+    found = frame_noise((2, 1250), 3, 8).ravel()
     np.testing.assert_allclose(found, expected, rtol=2e-6, atol=2e-6)
