@@ -11,7 +11,7 @@ import math
 import numpy as np
 from numba import njit
 
-from systems.propagation import REORDER
+from systems.compiling import REORDER
 
 __all__ = ["measure_peaks"]
 

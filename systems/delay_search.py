@@ -16,9 +16,9 @@ from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
+from systems.compiling import REORDER
 from systems.delay_peaks import whitening
 from systems.delay_plan import DelayPlan
-from systems.propagation import REORDER
 
 __all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
 

@@ -58,9 +58,9 @@ class PlantNumbers(NamedTuple):
     """The same of the right end, m/rad."""
     wheel_separation_m: float
     """Distance between the wheels, m."""
-    limit: float
+    top_wheel_speed: float
     """Commands saturate here, rad/s."""
-    lag: float
+    motor_lag_s: float
     """Time constant of the wheels' speeds, s."""
 
     @classmethod
@@ -78,7 +78,13 @@ class PlantNumbers(NamedTuple):
 
 @njit(cache=True)
 def plant_derivatives(
-    state, commanded, left_rim_m, right_rim_m, wheel_separation_m, limit, lag
+    state,
+    commanded,
+    left_rim_m,
+    right_rim_m,
+    wheel_separation_m,
+    top_wheel_speed,
+    motor_lag_s,
 ):
     """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
 
@@ -89,8 +95,8 @@ def plant_derivatives(
         left_rim_m: See ``PlantNumbers``, also for the others.
         right_rim_m: m/rad.
         wheel_separation_m: m.
-        limit: rad/s.
-        lag: s.
+        top_wheel_speed: rad/s.
+        motor_lag_s: s.
 
     Returns:
         (7,) derivatives in the order of the state.
@@ -100,8 +106,8 @@ def plant_derivatives(
     rates = np.empty_like(state)
     rates[0], rates[1], rates[2] = v * np.cos(theta), v * np.sin(theta), omega
     rates[3], rates[4] = left, right
-    rates[5] = (_saturate(commanded[0], limit) - left) / lag
-    rates[6] = (_saturate(commanded[1], limit) - right) / lag
+    rates[5] = (_saturate(commanded[0], top_wheel_speed) - left) / motor_lag_s
+    rates[6] = (_saturate(commanded[1], top_wheel_speed) - right) / motor_lag_s
     return rates
 
 

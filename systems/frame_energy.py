@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from systems.propagation import REORDER
+from systems.compiling import REORDER
 
 __all__ = ["BLOCK_SAMPLES", "frame_energy"]
 

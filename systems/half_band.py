@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from systems.propagation import REORDER
+from systems.compiling import REORDER
 
 __all__ = ["PASSED", "halve_rate"]
 

@@ -137,11 +137,12 @@ class Localiser:
     def __init__(self, parameters: TDOAParameters, shape: ArrayShape, c: float) -> None:
         whole = parameters.method == "amdf"
         self._halved = not whole and parameters.high_hz <= PASSED * SAMPLE_RATE_HZ
+        divisor = 2 if self._halved else 1
         plan = DelayPlan(
             shape=shape,
             c=parameters.sound_speed_m_s or c,
-            sample_rate_hz=SAMPLE_RATE_HZ / (1 + self._halved),
-            frame_samples=FRAME_SAMPLES // (1 + self._halved),
+            sample_rate_hz=SAMPLE_RATE_HZ / divisor,
+            frame_samples=FRAME_SAMPLES // divisor,
             low_hz=parameters.low_hz,
             high_hz=parameters.high_hz,
         )

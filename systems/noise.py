@@ -11,7 +11,7 @@ from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from systems.propagation import REORDER
+from systems.compiling import REORDER
 
 __all__ = ["BEFORE_THE_RUN", "frame_noise", "standard_normals", "tick_generator"]
 
@@ -187,7 +187,7 @@ def _fill_with_normals(seed, tick, out):  # pragma: no cover  (compiled)
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:
     """White Gaussian noise of unit variance that only the seed and the tick decide.
 
-    Ten times as fast as numpy's numbers; they end at 5.8 standard deviations. Their
+    Nine times as fast as numpy's numbers; they end at 5.8 standard deviations. Their
     words are those of splitmix64 from a place hashed from seed and tick.
     """
     out = np.empty(shape, dtype=np.float32)

@@ -14,13 +14,13 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from systems.compiling import REORDER
 from systems.signals import Emission
 
 __all__ = [
     "INTERPOLATION_KERNEL",
     "KERNEL_REACH",
     "MINIMUM_RANGE_M",
-    "REORDER",
     "check_reach",
     "microphone_paths",
     "propagate",
@@ -37,9 +37,6 @@ MINIMUM_RANGE_M = 0.01
 # at 100 kHz the nearest image starts at 82 kHz, so the transition is wide.
 _TAPS = 2 * KERNEL_REACH
 _BETA = 10.0
-
-#: Licence for compiled sums to reorder, so that they vectorise; NaN stays NaN.
-REORDER = {"reassoc", "contract", "nsz", "arcp"}
 
 
 def _interpolation_kernel() -> NDArray[np.float32]:

@@ -17,12 +17,12 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
+from systems.compiling import REORDER
 from systems.parameters import Parameters, Point, Positive
 from systems.propagation import (
     INTERPOLATION_KERNEL,
     KERNEL_REACH,
     MINIMUM_RANGE_M,
-    REORDER,
 )
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 

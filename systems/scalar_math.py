@@ -1,6 +1,7 @@
 """Elementary functions of floats, and of AutoDiffXd where there are derivatives.
 
-On floats they are those of ``math``, in a third of the time of ``pydrake.math``.
+They are those of ``pydrake.math``; for floats ``math`` has the same ones in a third
+of the time, but raises where they are infinite or not a number.
 """
 
 from __future__ import annotations
@@ -12,22 +13,33 @@ import pydrake.math
 
 __all__ = ["cos", "exp", "sin", "sqrt"]
 
+# From some way above this exponent on a float is infinite.
+_LARGEST_EXPONENT = 709.0
+
 
 def cos(x: Any) -> Any:
     """Cosine of x in rad."""
-    return math.cos(x) if type(x) is float else pydrake.math.cos(x)
+    if type(x) is float and math.isfinite(x):
+        return math.cos(x)
+    return pydrake.math.cos(x)
 
 
 def sin(x: Any) -> Any:
     """Sine of x in rad."""
-    return math.sin(x) if type(x) is float else pydrake.math.sin(x)
+    if type(x) is float and math.isfinite(x):
+        return math.sin(x)
+    return pydrake.math.sin(x)
 
 
 def exp(x: Any) -> Any:
     """e to the power of x."""
-    return math.exp(x) if type(x) is float else pydrake.math.exp(x)
+    if type(x) is float and x < _LARGEST_EXPONENT:
+        return math.exp(x)
+    return pydrake.math.exp(x)
 
 
 def sqrt(x: Any) -> Any:
-    """Square root of x, which is not negative."""
-    return math.sqrt(x) if type(x) is float else pydrake.math.sqrt(x)
+    """Square root of x."""
+    if type(x) is float and x >= 0.0:
+        return math.sqrt(x)
+    return pydrake.math.sqrt(x)
