@@ -8,6 +8,8 @@ that grow with distance; eq. 19 replaces them. See docs/errata.md.
 
 from __future__ import annotations
 
+import numpy as np
+
 from systems.cache import declare_cache
 from systems.collision_vector import SLOTS
 from systems.geometry import control_point, rotate, safe_norm
@@ -162,33 +164,38 @@ class ImpedanceLoop:
             self._attraction,
             self._robot.mass_kg,
         )
+        zero = self._scalar(0.0)
         vectors_W = [
-            (features[k], *rotate(pose[2], *vectors[2 * k : 2 * k + 2]))
+            (features[k], *rotate(pose[2], vectors[2 * k], vectors[2 * k + 1]))
             for k in range(SLOTS)
             if features[k] > 0.5
         ]
+        if not vectors_W:
+            return F_m, [zero] * 2, [zero] * SLOTS, vectors_W
         F_b, speeds = repulsion_force(
             vectors_W,
-            self._before(context) if vectors_W else {},
+            self._before(context),
             self._radial_force,
             self._repulsion.velocity_term,
             FRAME_PERIOD_S,
         )
-        speeds += [0.0] * (SLOTS - len(speeds))
-        zero = self._scalar(0.0)
-        return F_m, [zero + F for F in F_b], [zero + s for s in speeds], vectors_W
+        speeds = [zero + s for s in speeds] + [zero] * (SLOTS - len(speeds))
+        return F_m, F_b, speeds, vectors_W
 
     def _before(self, context):
         """{feature: C_W} of the last tick."""
         state = context.get_discrete_state(0).CopyToVector().tolist()
-        rows = (state[3 * k : 3 * k + 3] for k in range(SLOTS))
-        return {_key(row[0]): row[1:] for row in rows if row[0] > 0.5}
+        return {
+            _key(state[k]): (state[k + 1], state[k + 2])
+            for k in range(0, 3 * SLOTS, 3)
+            if state[k] > 0.5
+        }
 
     def _remember(self, context, discrete_state):
         *_, vectors_W = self._forces.Eval(context)
         rows = [value for row in vectors_W for value in row]
         rows += [self._scalar(0.0)] * (3 * SLOTS - len(rows))
-        discrete_state.set_value(rows)
+        discrete_state.set_value(np.array(rows))
 
     def _acceleration(self, context, output):
         F_m, F_b, *_ = self._forces.Eval(context)

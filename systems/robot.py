@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from itertools import combinations
 from typing import Annotated
 
@@ -57,7 +58,7 @@ class RobotParameters(Parameters):
                 )
         return self
 
-    @property
+    @cached_property
     def top_wheel_speed(self) -> float:
         """Largest wheel speed, rad/s."""
         return self.top_speed_m_s / self.wheel_radius_m

@@ -92,8 +92,8 @@ class TDOAEstimator(LeafSystem):
         )
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
-        self._memory = self.DeclareDiscreteState(5)
-        self._echoes = self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
+        self.DeclareDiscreteState(5)
+        self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
         )
@@ -113,9 +113,9 @@ class TDOAEstimator(LeafSystem):
         before, located = self._remembered(context)
         fix, after = self._localiser.localise(audio.counts, before)
         flags = after.echoes is not None, after.heard, fix is not None
-        discrete_state.set_value(self._memory, (*after[:2], *flags))
+        discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
         if after.echoes is not None and after.echoes is not before.echoes:
-            discrete_state.set_value(self._echoes, after.echoes.ravel())
+            discrete_state.set_value(_ECHOES, after.echoes.ravel())
         if fix is None and not located:
             return  # silence goes on, and the outputs are zero already
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
@@ -123,11 +123,11 @@ class TDOAEstimator(LeafSystem):
 
     def _remembered(self, context) -> tuple[HearingMemory, bool]:
         """What the last frame left, and whether it held a place."""
-        numbers = context.get_discrete_state(self._memory).value().tolist()
+        numbers = context.get_discrete_state(_MEMORY).value().tolist()
         energy, noise_energy, echoing, heard, located = numbers
         echoes = None
         if echoing:
-            held = context.get_discrete_state(self._echoes).value()
+            held = context.get_discrete_state(_ECHOES).value()
             echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
         return HearingMemory(energy, noise_energy, echoes, bool(heard)), bool(located)
 
@@ -141,6 +141,9 @@ _PORTS = (
     ("detected", 1),
     ("range_valid", 1),
 )
+
+# Groups of the discrete state after those of the ports.
+_MEMORY, _ECHOES = len(_PORTS), len(_PORTS) + 1
 
 #: Values of the output ports where nothing is heard.
 _NOTHING = tuple(np.zeros(size) for _, size in _PORTS)

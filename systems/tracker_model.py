@@ -162,7 +162,7 @@ def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
 
 def _of_scalars(memory: NDArray[Any], function: Any) -> Any:
     """A compiled function as it serves the memory's scalars, floats or AutoDiffXd."""
-    return function.py_func if memory.dtype == object else function
+    return function.py_func if memory.dtype.hasobject else function
 
 
 class TrackerModel:

@@ -240,9 +240,9 @@ class UltrasonicArray(LeafSystem):
 
     def _read(self, context) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(3,) ranges and (3,) echoes as they stand now."""
-        pose_WB, poses_WO, sizes, pose_WS = (
+        pose_WB, poses_WO, sizes, pose_WS = [
             port.Eval(context) for port in self._inputs
-        )
+        ]
         tick = round(context.get_time() / FRAME_PERIOD_S)
         numbers = standard_normals((2, SENSORS), self._seed, tick)
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from pydantic import Field
 from pydrake.systems.framework import LeafSystem_
 
@@ -151,7 +152,7 @@ def WheelOdometry_(T):
         def _update(self, context, discrete_state):
             pose = self._pose.Eval(context).tolist()
             now = [*pose, *self._encoder_angles(context)]
-            discrete_state.set_value(now)
+            discrete_state.set_value(np.array(now))
 
         def _velocity(self, context, output):
             now, held = self._pose.Eval(context), self._held(context)
