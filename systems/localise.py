@@ -152,7 +152,10 @@ class Localiser:
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
         channels = plan.shape.count
+        self._frame_shape = (channels, FRAME_SAMPLES)
         self._scatter = _QUIET * math.sqrt(2.0 / (channels * FRAME_SAMPLES))
+        # Both sides of the spectrum, all channels, all samples.
+        self._frame_share = 2.0 * channels * FRAME_SAMPLES / plan.frame_samples
         # A band that is found may be as narrow as it likes.
         self._weakest = 0.0
         if parameters.band == "set":
@@ -210,10 +213,8 @@ class Localiser:
 
     def _quietest(self, memory: HearingMemory) -> float:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""
-        # Both sides of the spectrum, all channels, all samples; and what of it is no
-        # rumble.
-        in_band = 2.0 * self.plan.shape.count * memory.noise_energy
-        in_band *= FRAME_SAMPLES / self.plan.frame_samples
+        in_band = self._frame_share * memory.noise_energy
+        # What of it is no rumble.
         rise = self._weakest * min(in_band, memory.energy)
         return (1.0 - self._scatter) * memory.energy + rise
 
@@ -253,11 +254,11 @@ class Localiser:
         return self._fix(frame, delays, errors), memory
 
     def _checked_energy(self, frame: NDArray[np.float32 | np.int16]) -> float:
-        expected = (self.plan.shape.count, FRAME_SAMPLES)
-        if frame.shape != expected:
+        if frame.shape != self._frame_shape:
+            channels, samples = self._frame_shape
             raise ValueError(
                 f"audio: a frame of shape {frame.shape}; give a channel for each of "
-                f"the {expected[0]} microphones, of {expected[1]} samples"
+                f"the {channels} microphones, of {samples} samples"
             )
         energy = frame_energy(frame)
         if not math.isfinite(energy) and not np.isfinite(frame).all():

@@ -82,8 +82,7 @@ def make_emission(
         p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
         v_WS: (k, 2) its velocity, m/s.
     """
-    ages = _tick_ages(len(p_WS))
-    count = round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
+    ages, count = _history(len(p_WS))
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
     emitted = _silence(count) if samples is None else samples
@@ -102,8 +101,10 @@ def make_emission(
 
 
 @cache
-def _tick_ages(count: int) -> NDArray[np.float64]:
-    return FRAME_PERIOD_S * np.arange(count - 1.0, -1.0, -1.0)
+def _history(ticks: int) -> tuple[NDArray[np.float64], int]:
+    """Ages of the last ticks, s, and the number of samples of an emission."""
+    ages = FRAME_PERIOD_S * np.arange(ticks - 1.0, -1.0, -1.0)
+    return ages, round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
 
 
 @cache
