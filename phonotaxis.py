@@ -314,12 +314,10 @@ def _simulate(options: argparse.Namespace) -> None:
 
 def _run(scenario: Any, follower: Any) -> Any:
     """Simulates; what stops the run midway becomes one line."""
-    from diagrams import make_simulator, simulate
+    from diagrams import simulate
 
     try:
         with _Progress(scenario.duration_s, "s simulated") as progress:
-            # Compiled functions load, or at first compile, before the clock starts.
-            make_simulator(follower).AdvanceTo(0.1)
             return simulate(scenario, follower=follower, progress=progress)
     except ValueError as error:
         raise RunError(str(error)) from error

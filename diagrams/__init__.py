@@ -8,7 +8,12 @@ from diagrams.loading import (
     load_scenario,
 )
 from diagrams.scenario import Scenario
-from diagrams.simulation import RunResult, make_simulator, simulate
+from diagrams.simulation import (
+    RunResult,
+    load_compiled_code,
+    make_simulator,
+    simulate,
+)
 
 __all__ = [
     "RunResult",
@@ -18,6 +23,7 @@ __all__ = [
     "build_sound_follower",
     "dump_scenario",
     "library_scenarios",
+    "load_compiled_code",
     "load_scenario",
     "make_simulator",
     "simulate",

@@ -24,7 +24,7 @@ from diagrams.stop_rules import Collision, StopRules
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["RunResult", "make_simulator", "simulate"]
+__all__ = ["RunResult", "load_compiled_code", "make_simulator", "simulate"]
 
 #: Columns of the trajectory table, by logged port.
 COLUMNS = {
@@ -142,7 +142,7 @@ def simulate(
         raise ValueError(
             "simulate: follower must be built from the same scenario with log=True"
         )
-    _load_compiled_code(follower)
+    load_compiled_code(follower)
     simulator = make_simulator(follower)
     rules = StopRules(follower)
     simulator.set_monitor(rules)
@@ -179,11 +179,15 @@ def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
     return views
 
 
-def _load_compiled_code(follower: SoundFollower) -> None:
-    """Runs some ticks aside where a kind of build is run for the first time.
+def load_compiled_code(follower: SoundFollower) -> None:
+    """Runs some ticks aside where a process runs a kind of build for the first time.
 
     numba compiles then, or loads what it compiled in an earlier process: a tenth of
     a run of 40 s, or many times a run, which is none of the simulation's own time.
+    ``simulate`` does it by itself; a process that forks does it beforehand.
+
+    Raises:
+        ValueError: As ``simulate``.
     """
     scenario = follower.scenario
     kind = (

@@ -20,7 +20,7 @@ __all__ = [
 
 # Groups of the discrete state; numbers and arrays pass to Drake faster
 # than its own indices and lists.
-_GROUPS = _V_WP, _WHEEL_SPEEDS = range(2)
+_V_WP, _WHEEL_SPEEDS = range(2)
 
 
 def integrate_velocity(v_WP, acceleration_W, period, top_speed):
@@ -101,7 +101,8 @@ def WheelSpeedCommand_(T):
                 name="acceleration_W", size=2
             )
             self._pose = self.DeclareVectorInputPort(name="pose_WB_estimated", size=3)
-            v_WP, wheel_speeds = (self.DeclareDiscreteState(2) for _ in _GROUPS)
+            v_WP = self.DeclareDiscreteState(2)
+            wheel_speeds = self.DeclareDiscreteState(2)
             self.DeclareStateOutputPort("wheel_speeds", wheel_speeds)
             self.DeclareStateOutputPort("v_WP", v_WP)
             self.DeclarePeriodicDiscreteUpdateEvent(

@@ -15,13 +15,12 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from analysis.sweeps.sweep_run import Task, run_task
-from diagrams import Scenario, build_sound_follower, make_simulator
+from diagrams import Scenario, build_sound_follower, load_compiled_code
 
 __all__ = ["READY", "main"]
 
 READY = "ready"
 RUNS_PER_CHILD = 50
-_WARM_S = 0.1
 
 
 def main(file_descriptor: int) -> None:
@@ -63,7 +62,7 @@ def _survives(work: Callable[[], None]) -> bool:
 def _warm(scenario: Scenario) -> None:
     """Loads compiled functions. An error here comes again with the run itself."""
     with contextlib.suppress(Exception, SystemExit):
-        make_simulator(build_sound_follower(scenario, log=True)).AdvanceTo(_WARM_S)
+        load_compiled_code(build_sound_follower(scenario, log=True))
 
 
 def _serve(connection: Connection) -> None:

@@ -207,6 +207,8 @@ def test_acceleration_is_the_sum_over_the_mass(bench):
 
 
 def test_unseen_slots_push_nothing(bench):
+    """And leave the pull: 2 N/m times 3.625 m, as above."""
     at = make_bench(bench)
-    np.testing.assert_array_equal(at.output("forces_W")[2:], [0.0, 0.0])
+    np.testing.assert_allclose(at.output("forces_W"), [7.25, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(at.output("acceleration_W"), [7.25 / 3.94, 0.0])
     np.testing.assert_array_equal(at.output("obstacle_speeds"), np.zeros(3))
