@@ -13,7 +13,7 @@ FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-fast browser-test lint typecheck bench clean
+.PHONY: help demo test test-fast browser-test lint typecheck bench attack mutate clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
@@ -40,6 +40,13 @@ typecheck: .venv/.installed-dev ## check types
 bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks
 	@echo "More: $(PY) -m benchmarks.hearing, .free_field, .peers (minutes each)"
+
+attack: .venv/.installed ## give the command line thousands of bad inputs
+	@$(PY) -m benchmarks.attack
+
+mutate: .venv/.installed ## make small faults in the code and count those that tests notice
+	@$(PIP_INSTALL) -e '.[mutate]'
+	@$(PY) -m benchmarks.mutants
 
 clean: ## remove the environment, caches and builds; keep results/
 	@rm -rf .venv .venv-newest build dist phonotaxis.egg-info

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import signal
 import sys
+import traceback
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -14,33 +16,16 @@ from typing import Any, NoReturn
 __all__ = ["main"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-_LAWS = "none, conventional, active, active2017"
+_LAWS = "none, conventional, active, conventional2017, active2017"
 
 
-class InputError(ValueError):
-    """Bad input: which field, what is wrong with it, and how to mend it."""
-
-    def __init__(self, field: str, message: str) -> None:
-        super().__init__(f"{field}: {message}" if field else message)
-        self.field = field
-        self.message = message
-
-    @classmethod
-    def from_error(cls, error: ValueError) -> InputError:
-        """From an error whose text is 'field: message'."""
-        if hasattr(error, "field") and hasattr(error, "message"):
-            return cls(error.field, error.message)
-        field, colon, message = str(error).partition(": ")
-        return cls(field, message) if colon else cls("", str(error))
-
-
-class RunError(Exception):
-    """A run that began and could not go on, in one line."""
+class _UsageError(Exception):
+    """Words of the command line that make no command."""
 
 
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
-        raise InputError("command line", f"{message}; see {self.prog} --help")
+        raise _UsageError(f"{message}; see {self.prog} --help")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -53,16 +38,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         Exit status: 0 done, 2 bad input, 1 anything else.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    _prepare_process()
     try:
         options = _parser().parse_args(words)
-        options.run(options)
-    except InputError as error:
-        _complain(error.field, error.message, as_json="--json" in words)
-        return BAD_INPUT
-    except RunError as error:
-        _complain("", str(error), as_json="--json" in words)
-        return FAILED
+        _run_command(options)
     except KeyboardInterrupt:
         print("phonotaxis: interrupted; nothing was written", file=sys.stderr)
         return FAILED
@@ -70,15 +49,69 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # The reader of our output has left; Python must not complain at exit.
         sys.stdout = None
         return FAILED
+    except Exception as error:  # noqa: BLE001  # bad input, a failed run, or a bug
+        return _report(error, words)
     return DONE
 
 
+def _prepare_process() -> None:
+    """Makes a process fit for a command, however it was started.
+
+    SIGTERM counts as Ctrl-C. Standard streams that are closed lead nowhere: a
+    result file must not get their numbers. Characters that a terminal cannot
+    show are escaped. Pictures go to files, whatever a notebook has chosen.
+    """
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(descriptor)
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            setattr(sys, name, Path(os.devnull).open("w"))  # noqa: SIM115
+        if hasattr(getattr(sys, name), "reconfigure"):
+            getattr(sys, name).reconfigure(errors="backslashreplace")
+    os.environ["MPLBACKEND"] = "agg"
+
+
+def _run_command(options: argparse.Namespace) -> None:
+    from analysis.run_error import no_exit
+
+    with no_exit():
+        options.run(options)
+    sys.stdout.flush()
+
+
+def _report(error: Exception, words: Sequence[str]) -> int:
+    """Says on one line what an exception means; returns the exit status."""
+    if "--debug" in words:
+        traceback.print_exception(error)
+    if isinstance(error, _UsageError):
+        field, message, status = "command line", str(error), BAD_INPUT
+    elif isinstance(error, ImportError):
+        text = f"{error}; the installation is not whole, install it again"
+        field, message, status = "", text, FAILED
+    else:
+        from analysis.run_error import failure_text
+        from systems.input_error import InputError
+
+        if isinstance(error, InputError):
+            field, message, status = error.field, error.message, BAD_INPUT
+        else:
+            field, message, status = "", failure_text(error), FAILED
+    _complain(field, message, as_json="--json" in words)
+    return status
+
+
 def _complain(field: str, message: str, *, as_json: bool) -> None:
+    if len(message) > 250 or not message.isprintable():
+        from systems.input_error import LONGEST_MESSAGE, shortened
+
+        message = shortened(message, LONGEST_MESSAGE - len(field) - 2)
     if as_json:
         print(json.dumps({"error": {"field": field, "message": message}}))
         return
     text = f"{field}: {message}" if field else message
-    print(f"phonotaxis: {' '.join(text.split())}", file=sys.stderr)
+    print(f"phonotaxis: {text}", file=sys.stderr)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -95,6 +128,10 @@ def _parser() -> argparse.ArgumentParser:
         _add_design,
     ):
         add(commands)
+    for command in commands.choices.values():
+        command.add_argument(
+            "--debug", action="store_true", help="print the traceback of an error"
+        )
     return parser
 
 
@@ -281,32 +318,27 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.runs.result_directory import whole_directory
     from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import build_sound_follower, load_scenario
 
     with ExitStack() as stack:
-        try:
-            out = choose_directory(options.out)
-            overrides = _overrides(options)
-            if options.sound is not None:
-                overrides += [
-                    "sound.kind=wav",
-                    f"sound.file={json.dumps(options.sound)}",
-                ]
-            if options.law is not None:
-                overrides.append(f"law={options.law}")
-            scenario = load_scenario(options.scenario, overrides)
-            follower = build_sound_follower(scenario, log=True)
-            # Made before the run: one that cannot be made must not cost a run.
-            directory = stack.enter_context(whole_directory(out))
-        except ValueError as error:
-            raise InputError.from_error(error) from None
+        out, directory = stack.enter_context(whole_directory(options.out))
+        overrides = _overrides(options)
+        if options.sound is not None:
+            overrides += [
+                "sound.kind=wav",
+                f"sound.file={json.dumps(options.sound)}",
+            ]
+        if options.law is not None:
+            overrides.append(f"law={options.law}")
+        scenario = load_scenario(options.scenario, overrides)
+        follower = build_sound_follower(scenario, log=True)
         result = _run(scenario, follower)
         summary = run_summary(result, out)
         write_run(result, summary, directory)
     if options.json:
-        print(json.dumps(summary))
+        print(json.dumps(summary, allow_nan=False))
     else:
         print(summary_text(result, summary))
         print(f"{'results':<21} {out}")
@@ -314,15 +346,15 @@ def _simulate(options: argparse.Namespace) -> None:
 
 def _run(scenario: Any, follower: Any) -> Any:
     """Simulates; what stops the run midway becomes one line."""
+    from analysis.run_error import RunError
     from diagrams import simulate
+    from systems.input_error import InputError
 
-    try:
-        with _Progress(scenario.duration_s, "s simulated") as progress:
+    with _Progress(scenario.duration_s, "s simulated") as progress:
+        try:
             return simulate(scenario, follower=follower, progress=progress)
-    except ValueError as error:
-        raise RunError(str(error)) from error
-    except SystemExit as error:
-        raise RunError("Drake ended the run; its message is above") from error
+        except InputError as error:  # found after the input had been accepted
+            raise RunError(str(error)) from error
 
 
 class _Progress:
@@ -387,19 +419,13 @@ def _scenarios(options: argparse.Namespace) -> None:
 def _locate(options: argparse.Namespace) -> None:
     from analysis.hearing.locate import load_geometry, locate
     from analysis.hearing.locate_text import locate_text
-    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.runs.result_directory import whole_directory
 
     with ExitStack() as stack:
-        try:
-            geometry = (
-                load_geometry(Path(options.geometry)) if options.geometry else None
-            )
-            if options.out is not None:
-                out = choose_directory(options.out)
-                directory = stack.enter_context(whole_directory(out))
-            result = locate(Path(options.recording), geometry)
-        except ValueError as error:
-            raise InputError.from_error(error) from None
+        geometry = load_geometry(Path(options.geometry)) if options.geometry else None
+        if options.out is not None:
+            out, directory = stack.enter_context(whole_directory(options.out))
+        result = locate(Path(options.recording), geometry)
         document = result.to_dict()
         if options.out is not None:
             from analysis.hearing.locate_plots import write_locate
@@ -423,35 +449,29 @@ def _localization(options: argparse.Namespace) -> None:
         localization_text,
         write_localization,
     )
-    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.runs.result_directory import whole_directory
 
     with ExitStack() as stack:
-        try:
-            out = choose_directory(options.out)
-            experiment = prepare_localization(
-                [] if options.seed is None else [f"seed={options.seed}"],
-                trials=options.trials,
-                tolerances=options.tolerances,
-            )
-            directory = stack.enter_context(whole_directory(out))
-        except ValueError as error:
-            raise InputError.from_error(error) from None
-        try:
-            with _Progress(experiment.measurements, "measurements") as progress:
-                cells = experiment.run(progress)
-            summary = localization_summary(experiment, cells, out)
-        except ValueError as error:
-            raise RunError(str(error)) from error
+        out, directory = stack.enter_context(whole_directory(options.out))
+        experiment = prepare_localization(
+            [] if options.seed is None else [f"seed={options.seed}"],
+            trials=options.trials,
+            tolerances=options.tolerances,
+        )
+        with _Progress(experiment.measurements, "measurements") as progress:
+            cells = experiment.run(progress)
+        summary = localization_summary(experiment, cells, out)
         write_localization(experiment, cells, summary, directory)
     if options.json:
-        print(json.dumps(summary))
+        print(json.dumps(summary, allow_nan=False))
     else:
         print(localization_text(summary))
         print(f"\nresults in {out}")
 
 
 def _stability(options: argparse.Namespace) -> None:
-    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.run_error import RunError
+    from analysis.runs.result_directory import whole_directory
     from analysis.stability.stability import analyse_law, chosen_laws
     from analysis.stability.stability_parts import parts
     from analysis.stability.stability_report import (
@@ -462,21 +482,13 @@ def _stability(options: argparse.Namespace) -> None:
     from diagrams import load_scenario
 
     with ExitStack() as stack:
-        try:
-            out = choose_directory(options.out)
-            scenario = load_scenario(options.scenario, _overrides(options))
-            scenarios = chosen_laws(scenario, options.law or [])
-            directory = stack.enter_context(whole_directory(out))
-            work = parts(full=options.full)
-            total = len(work) * len(scenarios) + 1
-            progress = stack.enter_context(_Progress(total, "parts"))
-            analyses = [
-                analyse_law(each, work, step=progress.step) for each in scenarios
-            ]
-        except ValueError as error:
-            raise InputError.from_error(error) from None
-        except SystemExit as error:
-            raise RunError("Drake ended the analysis; its message is above") from error
+        out, directory = stack.enter_context(whole_directory(options.out))
+        scenario = load_scenario(options.scenario, _overrides(options))
+        scenarios = chosen_laws(scenario, options.law or [])
+        work = parts(full=options.full)
+        total = len(work) * len(scenarios) + 1
+        progress = stack.enter_context(_Progress(total, "parts"))
+        analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]
         progress.step("writing the report")
         document = stability_document(analyses, out)
         write_stability(analyses, document, directory)
@@ -485,38 +497,43 @@ def _stability(options: argparse.Namespace) -> None:
     else:
         print(stability_text(document))
         print(f"\nreport in {out / 'report.html'}")
+    failures = [each for analysis in analyses for each in analysis.failures.items()]
+    if failures:
+        names = ", ".join(key for key, _ in failures)
+        raise RunError(
+            f"parts of the report failed: {names}; {out / 'report.html'} says how "
+            "(--debug prints the traceback)"
+        ) from failures[0][1]
 
 
 def _sweep(options: argparse.Namespace) -> None:
+    from analysis.run_error import RunError
     from analysis.sweeps.sweep import prepare_sweep
     from analysis.sweeps.sweep_page import write_sweep
     from analysis.sweeps.sweep_plan import load_sweep
+    from analysis.sweeps.sweep_run import require_runs
     from analysis.sweeps.sweep_summary import sweep_summary, sweep_text
 
-    try:
-        plan = load_sweep(options.sweep)
-        sweep = prepare_sweep(
-            plan,
-            options.out,
-            workers=options.workers,
-            scheduler=options.scheduler,
-            resume=options.resume,
-        )
-    except ValueError as error:
-        raise InputError.from_error(error) from None
+    plan = load_sweep(options.sweep)
+    sweep = prepare_sweep(
+        plan,
+        options.out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        resume=options.resume,
+    )
     total, done, out = len(sweep.points), sweep.store.done, sweep.store.out
     try:
         with _Progress(total, "runs", len(done)) as progress:
             results = sweep.run(progress)
         summary = sweep_summary(plan, sweep.points, results, out)
         write_sweep(plan, sweep.points, results, summary)
+        require_runs([results], out)
     except KeyboardInterrupt:
         raise RunError(
             f"interrupted; {len(done)} of {total} runs are kept: go on with --out "
             f"{out} --resume"
         ) from None
-    except (RuntimeError, OSError) as error:
-        raise RunError(str(error)) from error
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:
@@ -525,6 +542,7 @@ def _sweep(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
+    from analysis.run_error import RunError
     from analysis.sweeps.compare import prepare_comparison
     from analysis.sweeps.compare_options import comparison_plans
     from analysis.sweeps.compare_report import (
@@ -533,21 +551,18 @@ def _compare(options: argparse.Namespace) -> None:
         write_comparison,
     )
 
-    try:
-        plans = comparison_plans(
-            options.scenario,
-            laws=options.laws,
-            velocity_terms=options.velocity_term,
-            runs=options.runs,
-            seed=options.seed,
-            settings=options.set,
-            grid=options.grid,
-        )
-        prepared = prepare_comparison(
-            plans, options.out, workers=options.workers, resume=options.resume
-        )
-    except ValueError as error:
-        raise InputError.from_error(error) from None
+    plans = comparison_plans(
+        options.scenario,
+        laws=options.laws,
+        velocity_terms=options.velocity_term,
+        runs=options.runs,
+        seed=options.seed,
+        settings=options.set,
+        grid=options.grid,
+    )
+    prepared = prepare_comparison(
+        plans, options.out, workers=options.workers, resume=options.resume
+    )
     try:
         with _Progress(prepared.runs, "runs", prepared.done) as progress:
             comparisons, pooled = prepared.run(progress)
@@ -558,8 +573,6 @@ def _compare(options: argparse.Namespace) -> None:
             f"interrupted; {prepared.done} of {prepared.runs} runs are kept: go on "
             f"with --out {prepared.out} --resume"
         ) from None
-    except (RuntimeError, OSError) as error:
-        raise RunError(str(error)) from error
     if options.json:
         print(json.dumps(summary, allow_nan=False))
     else:
@@ -570,20 +583,14 @@ def _compare(options: argparse.Namespace) -> None:
 def _design(options: argparse.Namespace) -> None:
     from analysis.gains.design_study import STUDY_RUNS, study_design
     from analysis.gains.design_text import design_summary, design_text, write_design
-    from analysis.runs.result_directory import choose_directory, whole_directory
+    from analysis.runs.result_directory import whole_directory
     from diagrams import load_scenario
 
     with ExitStack() as stack:
-        try:
-            out = choose_directory(options.out)
-            scenario = load_scenario(options.scenario, _overrides(options))
-            directory = stack.enter_context(whole_directory(out))
-            with _Progress(STUDY_RUNS, "runs") as progress:
-                study = study_design(scenario, progress=progress)
-        except ValueError as error:
-            raise InputError.from_error(error) from None
-        except SystemExit as error:
-            raise RunError("Drake ended the design; its message is above") from error
+        out, directory = stack.enter_context(whole_directory(options.out))
+        scenario = load_scenario(options.scenario, _overrides(options))
+        with _Progress(STUDY_RUNS, "runs") as progress:
+            study = study_design(scenario, progress=progress)
         summary = design_summary(study, out)
         write_design(study, summary, directory)
     if options.json:

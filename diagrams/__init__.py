@@ -2,7 +2,6 @@
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.loading import (
-    ScenarioError,
     dump_scenario,
     library_scenarios,
     load_scenario,
@@ -14,11 +13,12 @@ from diagrams.simulation import (
     make_simulator,
     simulate,
 )
+from systems.input_error import InputError
 
 __all__ = [
+    "InputError",
     "RunResult",
     "Scenario",
-    "ScenarioError",
     "SoundFollower",
     "build_sound_follower",
     "dump_scenario",

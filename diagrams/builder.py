@@ -28,6 +28,7 @@ from systems import (
     WheelOdometry,
     WheelSpeedCommand,
 )
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 from systems.waveforms import SoundParameters
 
@@ -53,6 +54,8 @@ LOGGED_PORTS = (
     ("ultrasonic", "ranges"),
     ("ultrasonic", "echo"),
 )
+#: Those that it records besides where ``plant.friction`` is set.
+LOGGED_WITH_FRICTION = (("plant", "slip_velocities"),)
 
 
 @dataclass(frozen=True)
@@ -93,11 +96,12 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
 
     Args:
         scenario: What to build.
-        log: Whether to add a log of every port in ``LOGGED_PORTS``.
+        log: Whether to add a log of every port in ``LOGGED_PORTS``, and of
+            those in ``LOGGED_WITH_FRICTION`` where there is friction.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The sound file cannot be played.
+        InputError: The law is not known.
+        InputError: The sound file cannot be played.
     """
     builder = DiagramBuilder()
     blocks = {
@@ -122,17 +126,20 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     for block in blocks.values():
         builder.AddNamedSystem(block.get_name(), block)
     _connect_by_name(builder, list(blocks.values()))
-    sink, logged = _add_log(builder, blocks) if log else (None, ())
+    friction = scenario.plant.friction is not None
+    sink, logged = _add_log(builder, blocks, friction=friction) if log else (None, ())
     diagram = builder.Build()
     diagram.set_name("sound_follower")
     return SoundFollower(diagram, scenario, blocks, sink, logged)
 
 
 def _add_log(
-    builder: DiagramBuilder, blocks: dict[str, Any]
+    builder: DiagramBuilder, blocks: dict[str, Any], *, friction: bool
 ) -> tuple[VectorLogSink, tuple[tuple[str, str], ...]]:
     """One sink behind a multiplexer: a third cheaper than a sink a port."""
     logged = tuple(key for key in LOGGED_PORTS if key[0] in blocks)
+    if friction:
+        logged += LOGGED_WITH_FRICTION
     ports = [blocks[role].GetOutputPort(name) for role, name in logged]
     multiplexer = builder.AddNamedSystem(
         "log_multiplexer", Multiplexer([port.size() for port in ports])
@@ -171,8 +178,9 @@ def _hearing(scenario: Scenario) -> dict[str, Any]:
         emitters[f"source{suffix}"] = robot
         try:
             emitter = _emitter(scenario, interferer.sound, microphones, suffix)
-        except ValueError as error:
-            raise ValueError(f"interferers.{k}.{error}") from None
+        except InputError as error:
+            field = f"interferers.{k}.{error.field}"
+            raise InputError(field, error.message) from None
         emitters[f"emitter{suffix}"] = emitter
     return {
         **emitters,
@@ -232,7 +240,10 @@ def _obstacle_sensing(scenario: Scenario) -> dict[str, Any]:
             **bodies,
         ),
         "collision": CollisionVector(
-            parameters=scenario.collision_vector, sensors=scenario.ultrasonic
+            parameters=scenario.collision_vector,
+            sensors=scenario.ultrasonic,
+            robot=scenario.robot,
+            initial_pose=scenario.start.pose,
         ),
     }
 
@@ -254,9 +265,10 @@ def _connect_by_name(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
             port = block.get_input_port(index)
             sources = outputs.get(port.get_name(), [])
             if len(sources) != 1:
-                raise ValueError(
-                    f"{block.get_name()}: {len(sources)} blocks publish "
+                raise InputError(
+                    f"{block.get_name()}",
+                    f"{len(sources)} blocks publish "
                     f"{port.get_name()!r}, which it needs; give one block an output "
-                    "port of that name"
+                    "port of that name",
                 )
             builder.Connect(sources[0], port)

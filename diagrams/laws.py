@@ -2,74 +2,97 @@
 
 from __future__ import annotations
 
-import importlib
 import inspect
-import sys
-from pathlib import Path
 from typing import Any
 
-from diagrams.loading import ScenarioError
+from pydrake.systems.framework import LeafSystem
+
+from diagrams.own_laws import checked_law, import_law, law_files, try_law
 from diagrams.scenario import Scenario
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,
+    ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
     RadialLawController,
 )
+from systems.input_error import InputError
 
-__all__ = ["LAWS", "make_controller"]
+__all__ = ["LAWS", "law_files", "make_controller"]
 
 _CONTROLLERS = {
     "none": RadialLawController,
     "conventional": ConventionalImpedanceController,
     "active": ActiveImpedanceController,
+    "conventional2017": ConventionalImpedance2017Controller,
     "active2017": ActiveImpedance2017Controller,
 }
 #: The laws that come with the package.
 LAWS = tuple(_CONTROLLERS)
+#: Output ports that the diagram or its log needs, with their sizes.
+_OUTPUTS = {"acceleration_W": 2, "forces_W": 4, "obstacle_speeds": 3}
 
 
 def make_controller(scenario: Scenario) -> Any:
     """Builds the controller that ``scenario.law`` names.
 
-    ``package.module:Name`` is a function ``law(c, s, repulsion)`` that returns
-    the force away from an obstacle in N, or a LeafSystem class with the ports
-    of ``RadialLawController`` that takes ``robot``, ``attraction`` and
-    ``repulsion``. It is looked up in the working directory, too.
+    ``package.module:Name`` or ``path/to/file.py:Name`` is a function
+    ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
+    a LeafSystem class with the ports of ``RadialLawController`` that takes
+    ``robot``, ``attraction`` and ``repulsion``. It is looked up in the working
+    directory, too. A function is tried at a few distances and speeds.
 
     Raises:
-        ScenarioError: There is no such law.
+        InputError: There is no such law, or it does not do what a law does.
     """
     parts = {
         "robot": scenario.robot,
         "attraction": scenario.attraction,
         "repulsion": scenario.repulsion,
     }
-    if scenario.law in _CONTROLLERS:
-        return _CONTROLLERS[scenario.law](**parts)
-    law = _import_law(scenario.law)
-    if inspect.isfunction(law):
-        return RadialLawController(**parts, law=law)
-    return law(**parts)
-
-
-def _import_law(name: str) -> Any:
-    module_name, colon, attribute = name.partition(":")
-    if not colon or not module_name or not attribute:
-        raise ScenarioError(
+    sensors = scenario.ultrasonic
+    if scenario.obstacle_sensing == "ideal":
+        sensors = sensors.model_copy(update={"firing": "simultaneous"})
+    name = scenario.law
+    if name in _CONTROLLERS:
+        return _CONTROLLERS[name](**parts, sensors=sensors)
+    if ":" not in name:
+        raise InputError(
             "law",
-            f"{name!r} is not known; use {', '.join(LAWS)}, or package.module:Name",
+            f"{name!r} is not known; use {', '.join(LAWS)}, package.module:Name, or "
+            "path/to/file.py:Name",
         )
-    here = str(Path.cwd())
-    if here not in sys.path:
-        sys.path.append(here)
+    law = import_law(name)
+    if inspect.isclass(law):
+        return _own_block(name, law, parts)
+    function = checked_law(name, law)
+    reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
+    try_law(function, scenario.repulsion, reach, top_speed)
+    return RadialLawController(**parts, sensors=sensors, law=function)
+
+
+def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
+    if not issubclass(law, LeafSystem):
+        raise InputError(
+            "law",
+            f"{name!r} is a class, but no LeafSystem; write a function "
+            "law(c, s, repulsion), or derive it from a controller of ours",
+        )
     try:
-        module = importlib.import_module(module_name)
-    except ImportError as error:
-        raise ScenarioError("law", f"{name!r} cannot be imported: {error}") from None
-    law = getattr(module, attribute, None)
-    if not callable(law):
-        raise ScenarioError(
-            "law", f"{module_name} has no function or class {attribute!r}; check it"
-        )
-    return law
+        block = law(**parts)
+    except (Exception, SystemExit) as error:  # whatever it raises
+        raise InputError(
+            "law",
+            f"{name!r} cannot be built with robot, attraction and repulsion "
+            f"({type(error).__name__}: {error}); mend it",
+        ) from error
+    sizes = {
+        port.get_name(): port.size()
+        for port in map(block.get_output_port, range(block.num_output_ports()))
+    }
+    for port, size in _OUTPUTS.items():
+        if sizes.get(port) != size:
+            raise InputError(
+                "law", f"{name!r} needs an output port {port} of size {size}; add it"
+            )
+    return block

@@ -10,12 +10,12 @@ from typing import Any
 
 from pydantic import BaseModel, ValidationError
 from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
 from diagrams.scenario import Scenario
+from diagrams.yaml_text import LARGEST_BYTES, parse_yaml
+from systems.input_error import InputError, shortened
 
 __all__ = [
-    "ScenarioError",
     "dump_scenario",
     "explain",
     "library_scenarios",
@@ -28,15 +28,6 @@ __all__ = [
 ]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
-
-
-class ScenarioError(ValueError):
-    """A scenario that cannot be run: which field, and how to mend it."""
-
-    def __init__(self, field: str, message: str) -> None:
-        super().__init__(f"{field}: {message}" if field else message)
-        self.field = field
-        self.message = message
 
 
 def library_scenarios() -> dict[str, Path]:
@@ -58,7 +49,7 @@ def load_scenario(
         ``Scenario``.
 
     Raises:
-        ScenarioError: Unknown name, unreadable file, or a field that is
+        InputError: Unknown name, unreadable file, or a field that is
             unknown, of the wrong type or out of range; names the field by
             its whole path.
     """
@@ -97,12 +88,12 @@ def _find(source: str | Path) -> Path:
     if path.suffix in (".yaml", ".yml"):
         if path.is_file():
             return path
-        raise ScenarioError(
+        raise InputError(
             "scenario",
             f"there is no file {source}; check the path, or use one of "
             f"the library: {', '.join(library)}",
         )
-    raise ScenarioError(
+    raise InputError(
         "scenario",
         f"{str(source)!r} is not known; use one of {', '.join(library)}, or the path "
         "of a .yaml file",
@@ -113,19 +104,18 @@ def read_mapping(path: Path) -> dict[str, Any]:
     """The mapping of fields that a YAML file holds; empty where it is empty.
 
     Raises:
-        ScenarioError: It cannot be read, or holds something else.
+        InputError: It cannot be read, or holds something else.
     """
     try:
-        data = YAML(typ="safe").load(path)
-    except YAMLError as error:
-        text = " ".join(str(error).split())
-        raise ScenarioError(str(path), f"is not valid YAML: {text}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ScenarioError(str(path), f"cannot be read: {error}") from None
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})") from None
+    data = parse_yaml(content, str(path))
     if data is None:
         return {}
     if not isinstance(data, dict):
-        raise ScenarioError(
+        raise InputError(
             str(path), "must hold a mapping of fields, as 'duration_s: 40'"
         )
     return data
@@ -148,16 +138,12 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """Key and value of ``key=value``; the value is YAML.
 
     Raises:
-        ScenarioError: It is not of that form.
+        InputError: It is not of that form.
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
-        raise ScenarioError(text or "--set", "is not of the form key=value, as seed=2")
-    try:
-        value = YAML(typ="safe").load(value_text)
-    except YAMLError:
-        raise ScenarioError(key, f"{value_text!r} is not a YAML value") from None
-    return key, value
+        raise InputError(text or "--set", "is not of the form key=value, as seed=2")
+    return key, parse_yaml(value_text, key)
 
 
 def set_field(data: dict[str, Any], key: str, value: Any) -> None:
@@ -169,7 +155,7 @@ def set_field(data: dict[str, Any], key: str, value: Any) -> None:
         value: Plain value.
 
     Raises:
-        ScenarioError: The path leads into a plain value, or past a list's end.
+        InputError: The path leads into a plain value, or past a list's end.
     """
     *parents, last = key.split(".")
     node: Any = data
@@ -180,7 +166,7 @@ def set_field(data: dict[str, Any], key: str, value: Any) -> None:
     elif isinstance(node, dict):
         node[last] = value
     else:
-        raise ScenarioError(key, "leads into a plain value; shorten the key")
+        raise InputError(key, "leads into a plain value; shorten the key")
 
 
 def _descend(node: Any, part: str, key: str) -> Any:
@@ -190,18 +176,18 @@ def _descend(node: Any, part: str, key: str) -> Any:
         if node.get(part) is None:  # also where a whole group is unset, as room
             node[part] = {}
         return node[part]
-    raise ScenarioError(key, "leads into a plain value; shorten the key")
+    raise InputError(key, "leads into a plain value; shorten the key")
 
 
 def _index(node: list[Any], part: str, key: str) -> int:
     if part.isdigit() and int(part) < len(node):
         return int(part)
-    raise ScenarioError(
+    raise InputError(
         key, f"{part!r} is not an index of a list of {len(node)}; count from 0"
     )
 
 
-def explain(error: ValidationError, model: type[BaseModel], what: str) -> ScenarioError:
+def explain(error: ValidationError, model: type[BaseModel], what: str) -> InputError:
     """The first complaint, as field, value and remedy on one line.
 
     Args:
@@ -214,20 +200,18 @@ def explain(error: ValidationError, model: type[BaseModel], what: str) -> Scenar
     kind, message = first["type"], first["msg"]
     if kind == "extra_forbidden":
         message = f"is not a field of {what}; remove it"
-        return ScenarioError(field, message + _near(field, model))
+        return InputError(field, message + _near(field, model))
     if kind == "value_error":
-        # A validator of several fields names the one to mend: "name: message".
-        message = message.removeprefix("Value error, ")
-        named = re.match(r"([a-z_0-9.]+)(?: \(.*?\))?: (.*)", message, re.DOTALL)
-        if named:
-            field = f"{field}.{named[1]}" if field else named[1]
-            message = message[named.start(2) :]
-        return ScenarioError(field, message)
+        # A validator of several fields names the one to mend.
+        inner = first["ctx"]["error"]
+        named = [field, getattr(inner, "field", "")]
+        text = inner.message if isinstance(inner, InputError) else str(inner)
+        return InputError(".".join(filter(None, named)), text)
     # Words of YAML for words of Python.
     message = re.sub(r"dictionary or instance of \w+", "mapping", message)
     message = message.replace("valid tuple", "valid list")
-    value = first["input"]
-    return ScenarioError(field, f"is {value!r}; {message[0].lower()}{message[1:]}")
+    value = shortened(repr(first["input"]), 80)
+    return InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
 
 
 def _near(field: str, model: Any) -> str:

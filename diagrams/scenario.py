@@ -15,15 +15,27 @@ from pydantic import Field, Strict, model_validator
 
 from systems.acoustics import AcousticParameters
 from systems.adc import MicArrayParameters, channel_skew
+from systems.carrier import DrivenPath
 from systems.collision_vector import CollisionVectorParameters
 from systems.diff_drive_plant import PlantParameters
 from systems.geometry import rectangle_clearance, rotate
 from systems.ideal_source_sensor import IdealHearingParameters
 from systems.impedance import AttractionParameters
+from systems.input_error import InputError
 from systems.interferers import InterfererParameters
 from systems.mic_array import microphones_B
 from systems.obstacles import ObstacleParameters
-from systems.parameters import NonNegative, Parameters, Point, Positive
+from systems.parameters import (
+    Angle,
+    Duration,
+    Fraction,
+    Length,
+    NonNegative,
+    Parameters,
+    Point,
+    Size,
+    Speed,
+)
 from systems.paths import WaypointPath
 from systems.repulsion import RepulsionParameters
 from systems.robot import RobotParameters
@@ -43,7 +55,7 @@ class StartParameters(Parameters):
 
     position_m: Point = (0.0, 0.0)
     """Origin of B in W, m."""
-    heading_deg: float = 0.0
+    heading_deg: Angle = 0.0
     """Heading, deg CCW from the x axis of W."""
 
     @property
@@ -55,17 +67,23 @@ class StartParameters(Parameters):
 class StopParameters(Parameters):
     """When a run ends, and what counts as following."""
 
-    goal_margin_m: Positive = 0.3
-    """A resting source is reached within the follow distance plus this, m."""
-    following_band_m: Positive = 0.8
+    goal_margin_m: Length = 0.3
+    """Goal of a resting source: P within the follow distance plus this, m."""
+    rest_speed_m_s: Speed = 0.05
+    """At rest: P is slower than this, m/s."""
+    rest_time_s: Duration = 1.0
+    """Reached: P is in the goal and at rest for so long without a break, s."""
+    following_band_m: Length = 0.8
     """Following: P is this near to the follow distance, m."""
-    stuck_after_s: Positive = 10.0
-    """Stuck: P stays within ``stuck_radius_m`` for so long, away from its goal."""
-    stuck_radius_m: Positive = 0.1
+    following_share: Fraction = 0.5
+    """Completed: P follows in this share of the time since the first detection."""
+    stuck_after_s: Duration = 10.0
+    """Stuck: P stays within ``stuck_radius_m`` for so long, outside of its goal."""
+    stuck_radius_m: Length = 0.1
     """See ``stuck_after_s``, m."""
-    lost_after_s: Positive = 20.0
+    lost_after_s: Duration = 20.0
     """Lost: no valid target for so long, s."""
-    diverged_range_m: Positive = 20.0
+    diverged_range_m: Length = 20.0
     """Diverged: the source is farther away than this, m."""
 
 
@@ -75,14 +93,14 @@ class IntegratorParameters(Parameters):
     scheme: Literal["runge_kutta2", "runge_kutta3", "runge_kutta5"] = "runge_kutta3"
     """Nothing changes between ticks but the motor lag's decay: one third-order
     step a tick stays within 20 um of the true path over 20 s."""
-    step_s: float = Field(default=0.025, gt=0.0, le=0.025)
+    step_s: float = Field(default=0.025, ge=1e-5, le=0.025)
     """Largest step, s."""
 
 
 class Body(NamedTuple):
     """A rectangle that moves along a path."""
 
-    path: WaypointPath
+    path: WaypointPath | DrivenPath
     """Pose of its centre over time."""
     size: tuple[float, float]
     """Length and width, m."""
@@ -106,13 +124,13 @@ class Scenario(Parameters):
     """One line for ``phonotaxis scenarios``."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""
-    duration_s: Positive = 40.0
-    """Longest simulated time, s."""
-    arena_m: Annotated[tuple[Positive, Positive], Strict(False)] = (7.0, 7.0)
+    duration_s: float = Field(default=40.0, ge=1e-9, le=3_600.0)
+    """Longest simulated time, s; an hour at most."""
+    arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; it has no walls."""
     law: str = Field(default="active", min_length=1)
-    """``none``, ``conventional``, ``active`` (2019), ``active2017``, or
-    ``package.module:Name``."""
+    """``none``, ``conventional``, ``active`` (2019), ``conventional2017``,
+    ``active2017``, or ``package.module:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """Sound waves and microphones, or exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
@@ -120,13 +138,17 @@ class Scenario(Parameters):
 
     start: StartParameters = StartParameters()
     source: SourceRobotParameters = SourceRobotParameters()
-    obstacles: Annotated[tuple[ObstacleParameters, ...], Strict(False)] = ()
+    obstacles: Annotated[
+        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
+    ] = ()
     stop: StopParameters = StopParameters()
 
     acoustics: AcousticParameters = AcousticParameters()
     sound: SoundParameters = SoundParameters()
     room: RoomParameters | None = None
-    interferers: Annotated[tuple[InterfererParameters, ...], Strict(False)] = ()
+    interferers: Annotated[
+        tuple[InterfererParameters, ...], Strict(False), Field(max_length=16)
+    ] = ()
     microphones: MicArrayParameters = MicArrayParameters()
     tdoa: TDOAParameters = TDOAParameters()
     ideal_hearing: IdealHearingParameters = IdealHearingParameters()
@@ -153,8 +175,13 @@ class Scenario(Parameters):
 
     @property
     def goal_radius_m(self) -> NonNegative:
-        """A resting source is reached within this distance of P, m."""
-        return self.attraction.follow_distance_m + self.stop.goal_margin_m
+        """P is in the goal within this distance of the source, m.
+
+        Of a moving source the goal is as wide as the following band.
+        """
+        moves = self.source.path().moves
+        margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
+        return self.attraction.follow_distance_m + margin
 
     @model_validator(mode="after")
     def _check_step(self) -> Scenario:
@@ -162,9 +189,10 @@ class Scenario(Parameters):
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         lag, step = self.plant.motor_lag_s, self.integrator.step_s
         if lag < step / limits[self.integrator.scheme]:
-            raise ValueError(
-                f"plant.motor_lag_s: {lag} s is too short for steps of {step} s, which "
-                f"would be unstable; set integrator.step_s to {lag:g} or less"
+            raise InputError(
+                "plant.motor_lag_s",
+                f"{lag} s is too short for steps of {step} s, which "
+                f"would be unstable; set integrator.step_s to {lag:g} or less",
             )
         return self
 
@@ -178,9 +206,10 @@ class Scenario(Parameters):
         names = [obstacle.name for obstacle in self.obstacles]
         for name in names:
             if names.count(name) > 1 or name == "source":
-                raise ValueError(
-                    f"obstacles: the name {name!r} is taken; give each obstacle a "
-                    "name of its own, other than 'source'"
+                raise InputError(
+                    "obstacles",
+                    f"the name {name!r} is taken; give each obstacle a "
+                    "name of its own, other than 'source'",
                 )
         return self
 
@@ -189,9 +218,10 @@ class Scenario(Parameters):
         names = [interferer.name for interferer in self.interferers]
         for name in names:
             if names.count(name) > 1:
-                raise ValueError(
-                    f"interferers: the name {name!r} is taken; give each interferer a "
-                    "name of its own"
+                raise InputError(
+                    "interferers",
+                    f"the name {name!r} is taken; give each interferer a "
+                    "name of its own",
                 )
         return self
 
@@ -204,31 +234,34 @@ class Scenario(Parameters):
         dx, dy = rotate(theta, *microphones_B(self.robot).T)
         places = {
             "source.waypoints_m": self.source.waypoints_m,
-            "start.position_m (the microphones)": np.column_stack([x + dx, y + dy]),
+            "start.position_m": np.column_stack([x + dx, y + dy]),
         }
         for k, interferer in enumerate(self.interferers):
             places[f"interferers.{k}.waypoints_m"] = interferer.waypoints_m
         for field, points in places.items():
+            what = ", a microphone," if field == "start.position_m" else ""
             for point in points:
                 if not self.room.contains(point):
-                    raise ValueError(
-                        f"{field}: ({point[0]:g}, {point[1]:g}) is outside the room, "
+                    raise InputError(
+                        field,
+                        f"({point[0]:g}, {point[1]:g}){what} is outside the room, "
                         f"which begins at {tuple(self.room.corner.tolist())} and is "
-                        f"{self.room.size_m} m; set room.corner_m or room.size_m"
+                        f"{self.room.size_m} m; set room.corner_m or room.size_m",
                     )
         return self
 
     @model_validator(mode="after")
     def _check_start(self) -> Scenario:
         footprint = robot_rectangle(self.start.pose, self.robot)
-        fields = [f"obstacles.{k} ({o.name!r})" for k, o in enumerate(self.obstacles)]
-        for field, body in zip(
-            [*fields, "source"], self.bodies().values(), strict=True
+        fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
+        for field, (name, body) in zip(
+            [*fields, "source"], self.bodies().items(), strict=True
         ):
             if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
-                raise ValueError(
-                    f"{field}: stands on the robot's start at {self.start.position_m}; "
-                    "move its first waypoint or start.position_m"
+                raise InputError(
+                    field,
+                    f"{name!r} stands on the robot's start at {self.start.position_m}; "
+                    "move its first waypoint or start.position_m",
                 )
         return self
 

@@ -20,6 +20,7 @@ from pydrake.systems.analysis import (
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import Collision, StopRules
+from systems.input_error import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -58,6 +59,7 @@ COLUMNS = {
     ("command", "v_WP"): ("v_WP_x", "v_WP_y"),
     ("ultrasonic", "ranges"): ("range_1", "range_2", "range_3"),
     ("ultrasonic", "echo"): ("echo_1", "echo_2", "echo_3"),
+    ("plant", "slip_velocities"): ("slip_left", "slip_right", "slip_sideways"),
 }
 
 # Until then a source that sounds from the first instant has been heard and followed.
@@ -72,7 +74,8 @@ class RunResult:
 
     scenario: Scenario
     cause: str
-    """One of reached, completed, collision, timeout, stuck, lost, diverged."""
+    """One of reached, completed, unsettled, timeout, astray, collision, stuck, lost,
+    diverged; docs/model.md says when."""
     collision: Collision | None
     """Set where the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
@@ -134,13 +137,13 @@ def simulate(
         ``RunResult``.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The sound file cannot be played, or a value became NaN.
+        InputError: The law is not known.
+        InputError: The sound file cannot be played, or a value became NaN.
     """
     follower = follower or build_sound_follower(scenario, log=True)
     if follower.scenario != scenario or follower.log is None:
-        raise ValueError(
-            "simulate: follower must be built from the same scenario with log=True"
+        raise InputError(
+            "simulate", "follower must be built from the same scenario with log=True"
         )
     load_compiled_code(follower)
     simulator = make_simulator(follower)
@@ -187,7 +190,7 @@ def load_compiled_code(follower: SoundFollower) -> None:
     ``simulate`` does it by itself; a process that forks does it beforehand.
 
     Raises:
-        ValueError: As ``simulate``.
+        InputError: As ``simulate``.
     """
     scenario = follower.scenario
     kind = (
@@ -196,6 +199,7 @@ def load_compiled_code(follower: SoundFollower) -> None:
         scenario.law,
         scenario.tdoa.method,
         scenario.room is None,
+        scenario.plant.friction is None,
     )
     if kind not in _LOADED:
         simulator = make_simulator(follower)

@@ -12,14 +12,20 @@ from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
 from diagrams.scenario import Body, robot_rectangle
-from systems.geometry import control_point, rectangle_clearance
+from systems.geometry import (
+    control_point,
+    control_point_velocity,
+    rectangle_clearance,
+)
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["SUCCESSFUL", "Collision", "StopRules"]
+__all__ = ["ROUNDING_S", "SUCCESSFUL", "Collision", "StopRules"]
 
 #: Causes of runs that did what they should.
 SUCCESSFUL = ("reached", "completed")
 
+#: A rest of exactly ``stop.rest_time_s`` counts: instants of ticks are rounded, s.
+ROUNDING_S = 1e-9
 #: Contacts are looked for between ticks when the last clearance was below this:
 #: more than robot and obstacle cover in a tick.
 NEAR_M = 0.1
@@ -53,7 +59,12 @@ class StopRules:
     _contexts: tuple[Any, Any] = (None, None)
     _pose: list[float] | None = None
     _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
+    _valid: bool = False
     _valid_time: float = 0.0
+    _rest_since: float = math.inf
+    _was_in_goal: bool = False
+    _ticks_since_heard: int = 0
+    _following_ticks: int = 0
     _time: float = 0.0
 
     def __post_init__(self) -> None:
@@ -63,10 +74,10 @@ class StopRules:
         self._plant = self.follower.blocks["plant"]
         self._tracker = self.follower.blocks["tracker"]
         self._pose_port = self.follower.port("plant", "pose_WB")
+        self._velocity_port = self.follower.port("plant", "velocity_WB")
         self._valid_port = self.follower.port("tracker", "target_valid")
-        self._here = (
-            scenario.attraction.follow_distance_m + scenario.stop.following_band_m
-        )
+        self._goal_radius = scenario.goal_radius_m
+        self._follow_distance = scenario.attraction.follow_distance_m
         self._offset = scenario.robot.control_point_m
         robot = (scenario.robot.length_m, scenario.robot.width_m)
         # Farther than this from the robot's centre, a body does not touch it.
@@ -88,8 +99,8 @@ class StopRules:
             )
         plant, tracker = self._contexts
         pose = self._pose_port.Eval(plant).tolist()
-        valid = self._valid_port.Eval(tracker)[0] > 0.5
-        self.cause = self._judge(time, pose, valid=valid)
+        self._valid = self._valid_port.Eval(tracker)[0] > 0.5
+        self.cause = self._judge(time, pose)
         self._pose, self._time = pose, time
         if self.cause:
             return EventStatus.ReachedTermination(self.follower.diagram, self.cause)
@@ -99,9 +110,20 @@ class StopRules:
         """Cause of the run, once the simulator has returned."""
         if self.cause:
             return self.cause
-        return "timeout" if self._source_rests else "completed"
+        if not self._source_rests and self._has_followed():
+            return "completed"
+        if not self._valid:
+            return "lost"
+        if not self._source_rests:
+            return "astray"
+        return "unsettled" if self._was_in_goal else "timeout"
 
-    def _judge(self, time: float, pose: list[float], *, valid: bool) -> str:
+    def _has_followed(self) -> bool:
+        share = self.follower.scenario.stop.following_share
+        ticks = self._ticks_since_heard
+        return ticks > 0 and self._following_ticks >= share * ticks
+
+    def _judge(self, time: float, pose: list[float]) -> str:
         stop = self.follower.scenario.stop
         places = {name: body.path.pose(time) for name, body, _ in self._reach}
         self.collision = self._find_collision(time, pose, places)
@@ -112,17 +134,39 @@ class StopRules:
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
-        if self._source_rests and distance <= self.follower.scenario.goal_radius_m:
+        in_goal = distance <= self._goal_radius
+        self._count(distance, in_goal=in_goal)
+        there = self._source_rests and in_goal and self._valid
+        if self._has_rested(time, pose[2], there=there):
             return "reached"
-        if valid:
+        if self._valid:
             self._valid_time = time
         elif time - self._valid_time > stop.lost_after_s:
             return "lost"
-        away = distance > self._here and valid
+        away = self._valid and not in_goal
         return self._find_stuck(time, x_P, y_P, away=away)
 
+    def _has_rested(self, time: float, heading: float, *, there: bool) -> bool:
+        """Whether P has been slow in the goal for long enough."""
+        stop = self.follower.scenario.stop
+        if there:
+            velocity = self._velocity_port.Eval(self._contexts[0]).tolist()
+            v_WP = control_point_velocity(heading, velocity, self._offset)
+            there = math.hypot(*v_WP) < stop.rest_speed_m_s
+        self._rest_since = min(self._rest_since, time) if there else math.inf
+        return time - self._rest_since >= stop.rest_time_s - ROUNDING_S
+
+    def _count(self, distance: float, *, in_goal: bool) -> None:
+        """What the end of the time is judged by."""
+        self._was_in_goal |= in_goal
+        if self._valid or self._ticks_since_heard:
+            error = abs(distance - self._follow_distance)
+            following = error <= self.follower.scenario.stop.following_band_m
+            self._ticks_since_heard += 1
+            self._following_ticks += following
+
     def _find_stuck(self, time: float, x_P: float, y_P: float, *, away: bool) -> str:
-        """Stuck: at rest though there is a target, and it is away."""
+        """Stuck: P goes nowhere though there is a target, and the goal is elsewhere."""
         stop = self.follower.scenario.stop
         then, x, y = self._anchor
         if not away or math.hypot(x_P - x, y_P - y) > stop.stuck_radius_m:

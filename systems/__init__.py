@@ -4,6 +4,7 @@ Templated blocks (float, AutoDiffXd) also have a name that ends in an
 underscore, as in Drake: ``DiffDrivePlant`` is ``DiffDrivePlant_[float]``.
 """
 
+import systems.compiling  # noqa: F401  # before anything is compiled
 from systems.active_impedance_2017_controller import (
     ActiveImpedance2017Controller,
     ActiveImpedance2017Controller_,
@@ -13,6 +14,10 @@ from systems.active_impedance_controller import (
     ActiveImpedanceController_,
 )
 from systems.collision_vector import CollisionVector, CollisionVector_
+from systems.conventional_impedance_2017_controller import (
+    ConventionalImpedance2017Controller,
+    ConventionalImpedance2017Controller_,
+)
 from systems.conventional_impedance_controller import (
     ConventionalImpedanceController,
     ConventionalImpedanceController_,
@@ -38,6 +43,8 @@ __all__ = [
     "ActiveImpedanceController_",
     "CollisionVector",
     "CollisionVector_",
+    "ConventionalImpedance2017Controller",
+    "ConventionalImpedance2017Controller_",
     "ConventionalImpedanceController",
     "ConventionalImpedanceController_",
     "DiffDrivePlant",

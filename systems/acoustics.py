@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pydantic import Field
 
-from systems.parameters import Parameters, Positive
+from systems.parameters import Parameters, SoundSpeed
 
 __all__ = ["AcousticParameters", "sound_speed"]
 
@@ -17,7 +17,7 @@ def sound_speed(temperature_c: float) -> float:
 class AcousticParameters(Parameters):
     """The air."""
 
-    sound_speed_m_s: Positive = 340.0
+    sound_speed_m_s: SoundSpeed = 340.0
     """Speed of sound where no temperature is set, m/s (Han 2019, 2.1)."""
     temperature_c: float | None = Field(default=None, ge=-50.0, le=60.0)
     """Temperature, deg C; when set, the speed of sound follows from it."""

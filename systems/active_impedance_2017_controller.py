@@ -58,32 +58,25 @@ def ActiveImpedance2017Controller_(T):
             - forces_W [N, attraction then repulsion, x and y each]
             - obstacle_speeds [m/s, s of each slot]
 
-        Discrete state, 25 ms: the last collision vectors, for s. The outputs
-        are functions of state and present input: no latency.
+        Discrete state, 25 ms: the collision vectors of the last round of the
+        sensors, for s. The outputs are functions of state and present input:
+        no latency.
 
         Args:
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
             repulsion: ``RepulsionParameters``; uses ``active2017``.
+            sensors: ``UltrasonicParameters``: order of firing.
 
         Reference: Kim 2017, eq. 19 (F_m), 21 and figure 6 in words.
         """
 
-        def _construct(
-            self, *, robot=None, attraction=None, repulsion=None, converter=None
-        ):
+        def _construct(self, *, converter=None, **options):
             super().__init__(converter=converter)
-            name = "active_impedance_2017_controller"
-            self._declare_loop(T, name, robot, attraction, repulsion)
+            self._declare_loop(T, "active_impedance_2017_controller", **options)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                robot=other._robot,
-                attraction=other._attraction,
-                repulsion=other._repulsion,
-                converter=converter,
-            )
+            Impl._construct(self, converter=converter, **other._options)
 
         def _radial_force(self, c, s):
             return active_2017_force(c, s, self._repulsion.active2017)

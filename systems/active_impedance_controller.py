@@ -57,32 +57,25 @@ def ActiveImpedanceController_(T):
             - forces_W [N, attraction then repulsion, x and y each]
             - obstacle_speeds [m/s, s of each slot]
 
-        Discrete state, 25 ms: the last collision vectors, for s. The outputs
-        are functions of state and present input: no latency.
+        Discrete state, 25 ms: the collision vectors of the last round of the
+        sensors, for s. The outputs are functions of state and present input:
+        no latency.
 
         Args:
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
             repulsion: ``RepulsionParameters``; uses ``active``.
+            sensors: ``UltrasonicParameters``: order of firing.
 
         Reference: Han 2019, eq. 18 (F_m), 20-22 and table 4.
         """
 
-        def _construct(
-            self, *, robot=None, attraction=None, repulsion=None, converter=None
-        ):
+        def _construct(self, *, converter=None, **options):
             super().__init__(converter=converter)
-            name = "active_impedance_controller"
-            self._declare_loop(T, name, robot, attraction, repulsion)
+            self._declare_loop(T, "active_impedance_controller", **options)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                robot=other._robot,
-                attraction=other._attraction,
-                repulsion=other._repulsion,
-                converter=converter,
-            )
+            Impl._construct(self, converter=converter, **other._options)
 
         def _radial_force(self, c, s):
             return active_force(c, s, self._repulsion.active)

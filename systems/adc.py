@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.parameters import Fraction, Parameters, Positive
+from systems.finite import check_finite, total
+from systems.input_error import InputError
+from systems.parameters import Fraction, Parameters, Positive, Time
 from systems.signals import SAMPLE_RATE_HZ
 
 __all__ = ["MicArrayParameters", "channel_skew", "convert"]
@@ -33,7 +36,7 @@ class MicArrayParameters(Parameters):
     """Voltage at which the converter clips, V, of either sign."""
     adc_bits: int = Field(default=10, ge=2, le=16)
     """Resolution of the converter, bits."""
-    channel_skew_s: Annotated[tuple[float, ...], Strict(False)] = ()
+    channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
     """Time by which each channel is sampled later, s; below one sample.
 
     One time for each microphone, or none where all are sampled at once.
@@ -61,9 +64,10 @@ class MicArrayParameters(Parameters):
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
         if not all(0.0 <= skew < 1.0 / SAMPLE_RATE_HZ for skew in self.channel_skew_s):
-            raise ValueError(
-                f"channel_skew_s: {self.channel_skew_s} must lie in [0, "
-                f"{1.0 / SAMPLE_RATE_HZ:g}) s, one sample"
+            raise InputError(
+                "channel_skew_s",
+                f"{self.channel_skew_s} must lie in [0, "
+                f"{1.0 / SAMPLE_RATE_HZ:g}) s, one sample",
             )
         return self
 
@@ -83,13 +87,14 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
     """(count,) s by which each channel is sampled later.
 
     Raises:
-        ValueError: The skew is given for another number of channels.
+        InputError: The skew is given for another number of channels.
     """
     skew = parameters.channel_skew_s
     if len(skew) not in (0, count):
-        raise ValueError(
-            f"microphones.channel_skew_s: {skew} has {len(skew)} times for {count} "
-            "microphones; give one for each, or []"
+        raise InputError(
+            "microphones.channel_skew_s",
+            f"{skew} has {len(skew)} times for {count} "
+            "microphones; give one for each, or []",
         )
     return np.array(skew) if skew else np.zeros(count)
 
@@ -134,9 +139,13 @@ def convert(
 
     Returns:
         (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
+
+    Raises:
+        ValueError: Pressure, noise or a gain is not finite; a count would not tell.
     """
     if gains is None:
         gains = np.ones(len(noise))
+    _check_parts(pressure=pressure, noise=noise, gains=gains)
     gain = parameters.counts_per_pa
     sigma = gain * noise_pa
     full_scale = np.float32(parameters.full_scale)
@@ -146,3 +155,10 @@ def convert(
     else:
         _counts(pressure, noise, gains, gain, sigma, full_scale, out)
     return out
+
+
+def _check_parts(**parts: Any) -> None:
+    """Refuses parts of a frame that are not finite."""
+    for name, values in parts.items():
+        if values is not None and not math.isfinite(total(values.ravel())):
+            check_finite(f"MicArray: {name}", values)

@@ -9,6 +9,8 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.input_error import InputError
+
 __all__ = ["ArrayShape", "EqualRow"]
 
 # Nearer than this, two microphones are one, m.
@@ -61,13 +63,13 @@ class ArrayShape:
                 counts as one, m. None: 1 % of the aperture.
 
         Raises:
-            ValueError: Too few, coincident or unreadable positions.
+            InputError: Too few, coincident or unreadable positions.
         """
         p = np.array(positions, dtype=np.float64)
         if p.ndim != 2 or p.shape[1] not in (2, 3):
-            raise ValueError(
-                f"microphones: positions have the shape {p.shape}; give (x, y) or "
-                "(x, y, z) of each"
+            raise InputError(
+                "microphones",
+                f"positions have the shape {p.shape}; give (x, y) or (x, y, z) of each",
             )
         _check(p)
         p -= p.mean(axis=0)
@@ -167,21 +169,23 @@ class ArrayShape:
 
 def _check(p: NDArray[np.float64]) -> None:
     if len(p) < 3:
-        raise ValueError(f"microphones: {len(p)} given; a source takes at least 3")
+        raise InputError("microphones", f"{len(p)} given; a source takes at least 3")
     wrong = np.flatnonzero(~np.isfinite(p).all(axis=1))
     if wrong.size:
-        raise ValueError(
-            f"microphones: the position {p[wrong[0]].tolist()} of number "
-            f"{wrong[0] + 1} is not finite; give numbers in m"
+        raise InputError(
+            "microphones",
+            f"the position {p[wrong[0]].tolist()} of number "
+            f"{wrong[0] + 1} is not finite; give numbers in m",
         )
     first, second = np.triu_indices(len(p), 1)
     distances = _distances(p)[first, second]
     k = int(distances.argmin())
     if distances[k] < _LEAST_DISTANCE_M:
-        raise ValueError(
-            f"microphones: numbers {first[k] + 1} and {second[k] + 1} are "
+        raise InputError(
+            "microphones",
+            f"numbers {first[k] + 1} and {second[k] + 1} are "
             f"{distances[k] * 1e3:.3g} mm apart; they must be at least "
-            f"{_LEAST_DISTANCE_M * 1e3:g} mm (positions are in m)"
+            f"{_LEAST_DISTANCE_M * 1e3:g} mm (positions are in m)",
         )
 
 

@@ -1,21 +1,24 @@
 """Faults of a recording's channels, named before they become wrong places.
 
 A channel is first looked at alone (NaN, constant, clipped), then beside the
-others: its level, the height and the sign of its correlation with them, and
-whether the delays of all belong to a place (``systems.channel_order``).
+others: whether it copies one (``systems.copied_channels``), its level, the height
+and the sign of its correlation with them, and whether the delays of all are of the
+array's size (``systems.delay_scale``) and belong to a place
+(``systems.channel_order``).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.array_shape import ArrayShape
-from systems.channel_order import exchanged_channels, misfit
+from systems.channel_order import agreeing_differences, exchanged_channels, misfit
+from systems.copied_channels import copied_pairs
+from systems.delay_scale import REACHES_M, DelayScale, delay_scale
 from systems.pair_correlations import PairCorrelations, correlate_pairs
 
 __all__ = ["ChannelFault", "find_channel_faults"]
@@ -35,6 +38,15 @@ _PILE = 4.0
 # other nothing is.
 _COHERENT, _INCOHERENT = 5.0, 2.5
 
+# Fewer frames than this may agree by chance; in a few long ones little is heard.
+_LEAST_FRAMES = 16
+
+# Delays so many times too long are not of wrong channels, but of wrong units.
+_OTHER_UNITS = 3.5
+
+# A source that would be farther off than this, straight above, is none, m.
+_FARTHEST_M = 20.0
+
 # Least lead of one sign of a correlation over the other, as a share of both.
 _LEAD = 0.1
 
@@ -44,8 +56,9 @@ class ChannelFault:
     """What is wrong with some channels."""
 
     kind: Literal[
-        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry"
-    ]
+        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
+        "units", "size", "late"
+    ]  # fmt: skip
     channels: tuple[int, ...]
     """Their numbers, from 0; empty where all are concerned."""
     message: str
@@ -78,15 +91,12 @@ def find_channel_faults(
     found = [fault for fault in faults if fault is not None]
     use = np.array([k for k, fault in enumerate(faults) if fault is None], dtype=int)
     found += [fault for k in use if (fault := _clipped(int(k), samples[k])) is not None]
-    found += _copied(samples, use)
     if use.size < 2:
         return found
-    measured = correlate_pairs(
-        samples if use.size == len(samples) else samples[use],
-        shape.max_delay(c),
-        sample_rate_hz,
-        band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz)),
-    )
+    readable = samples if use.size == len(samples) else samples[use]
+    found += _copied(readable, use, sample_rate_hz)
+    band_hz = band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz))
+    measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
         return found
     beside = _levels(measured, use) + _strangers(measured, use)
@@ -98,7 +108,18 @@ def find_channel_faults(
         return found
     signs = np.ones(shape.count)
     signs[[k for fault in inverted for k in fault.channels]] = -1.0
-    return found + _order(measured, signs, shape, c / sample_rate_hz)
+    metres_per_sample = c / sample_rate_hz
+    lags = _lags(measured, signs)
+    order = _order(measured, lags, shape, metres_per_sample)
+    if any(fault.kind == "swapped" for fault in order):
+        return found + order
+    scale = delay_scale(lags, shape, metres_per_sample)
+    if not _fits(lags, measured, shape, metres_per_sample):
+        for reach_m in REACHES_M:
+            seen = correlate_pairs(readable, reach_m / c, sample_rate_hz, band_hz)
+            if seen is not None and scale is None:
+                scale = delay_scale(_lags(seen, signs), shape, metres_per_sample)
+    return found + (order if scale is None else [_scale_fault(scale, shape)])
 
 
 def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
@@ -120,17 +141,17 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     return None
 
 
-def _copied(samples: NDArray[np.float64], use: NDArray[np.int64]) -> list[ChannelFault]:
-    """Channels that hold what another one does: no two microphones hear alike."""
+def _copied(
+    samples: NDArray[np.float64], use: NDArray[np.int64], sample_rate_hz: float
+) -> list[ChannelFault]:
     return [
         ChannelFault(
             "copied",
-            (i, j),
-            f"channels {i + 1} and {j + 1}: the same samples in both; record every "
-            "microphone on a channel of its own",
+            (int(use[i]), int(use[j])),
+            f"channels {use[i] + 1} and {use[j] + 1}: the same samples in both, but "
+            "for gain and delay; record every microphone on a channel of its own",
         )
-        for i, j in combinations(use.tolist(), 2)
-        if np.array_equal(samples[i], samples[j])
+        for i, j in copied_pairs(samples, sample_rate_hz)
     ]
 
 
@@ -239,17 +260,63 @@ def _inverted(
     ]
 
 
+def _lags(
+    measured: PairCorrelations, signs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(f, p) delays, samples, of channels some of which are inverted."""
+    i, j = measured.pairs.T
+    upright = signs[i] * signs[j] > 0.0
+    return np.where(upright, measured.lag_of_highest, measured.lag_of_lowest)
+
+
+def _fits(
+    lags: NDArray[np.float64],
+    measured: PairCorrelations,
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> bool:
+    """Whether at least half of the frames agree on their delays, and some do."""
+    agreed, _ = agreeing_differences(lags, measured.levels, shape, metres_per_sample)
+    return len(agreed) >= max(_LEAST_FRAMES, len(lags) / 2)
+
+
+def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
+    """Delays that are not of the array's size."""
+    size = f"an array of {shape.aperture_m:.3g} m"
+    if scale.kind == "beyond":
+        remedy = "check the positions (in m) and the order of the channels"
+        if scale.share > _OTHER_UNITS:
+            remedy = "give positions in m (multiply them by 10, 100 or 1000?)"
+        return ChannelFault(
+            "units",
+            (),
+            f"microphones: {size} cannot have delays {scale.share:.1f} times as long "
+            f"as sound takes along it; {remedy}",
+        )
+    said = f"microphones: delays are below {100 * scale.share:.1g} % of what {size}"
+    if shape.kind == "space" or scale.least_range_m > _FARTHEST_M:
+        return ChannelFault(
+            "units",
+            (),
+            f"{said} can have; give positions in m (divide those in cm by 100, in mm "
+            "by 1000)",
+        )
+    where = "ahead of" if shape.kind == "row" else "above or below"
+    return ChannelFault(
+        "size",
+        (),
+        f"{said} can have: the source is straight {where} it, or the positions are "
+        "not in m; check them",
+    )
+
+
 def _order(
     measured: PairCorrelations,
-    signs: NDArray[np.float64],
+    lags: NDArray[np.float64],
     shape: ArrayShape,
     metres_per_sample: float,
 ) -> list[ChannelFault]:
     """Exchanged channels, or a geometry that no exchange mends."""
-    i, j = measured.pairs.T
-    lags = np.where(
-        signs[i] * signs[j] > 0.0, measured.lag_of_highest, measured.lag_of_lowest
-    )
     exchanges = exchanged_channels(lags, measured.levels, shape, metres_per_sample)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)

@@ -20,7 +20,7 @@ from systems.coherent import arrival_delays
 from systems.multilateration import locate_source
 from systems.source_levels import levels_contradict
 
-__all__ = ["exchanged_channels", "misfit"]
+__all__ = ["agreeing_differences", "exchanged_channels", "misfit"]
 
 # Delays fit where they are right to this part of a sample, or to this share of
 # what sound needs across the array.
@@ -29,6 +29,9 @@ _FIT_SHARE = 0.05
 
 # Fewer frames whose pairs agree prove nothing.
 _LEAST_FRAMES = 5
+
+# Exchanges times frames that are tried, at most.
+_MOST_TRIALS = 20_000
 
 # Shares of such frames that fit a wrong geometry at most, and a right one at
 # least; shares nearer to each other than this are alike; and one that is hopeless.
@@ -53,11 +56,14 @@ def exchanged_channels(
         Pairs of numbers from 0. Empty where the delays fit as they are, or where
         no exchange helps.
     """
-    d, levels = _agreeing(lags, levels, shape, metres_per_sample)
+    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
     tolerance = _tolerance(shape, metres_per_sample)
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance)[0] > _WRONG:
         return []
     exchanges = list(combinations(range(shape.count), 2))
+    trials = len(d) * len(exchanges)
+    every = max(1, min(trials // _MOST_TRIALS, len(d) // _LEAST_FRAMES))
+    d, levels = d[::every], levels[::every]
     found = [
         _fitting(
             d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
@@ -90,7 +96,7 @@ def misfit(
         shape: The n microphones.
         metres_per_sample: Speed of sound over the sample rate.
     """
-    d, levels = _agreeing(lags, levels, shape, metres_per_sample)
+    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
     if len(d) < 2 * _LEAST_FRAMES:
         return None
     share, _ = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
@@ -107,13 +113,23 @@ def _tolerance(shape: ArrayShape, metres_per_sample: float) -> float:
     return max(_FIT_SAMPLES * metres_per_sample, _FIT_SHARE * shape.aperture_m)
 
 
-def _agreeing(
+def agreeing_differences(
     lags: NDArray[np.float64],
     levels: NDArray[np.float64],
     shape: ArrayShape,
     metres_per_sample: float,
+    tolerance_m: float = np.inf,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(f, n - 1) differences of range, m, and levels where all pairs agree."""
+    """(f, n - 1) differences of range, m, and levels where all pairs agree.
+
+    Args:
+        lags: As for ``exchanged_channels``.
+        levels: As there, or any numbers of the frames.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+        tolerance_m: How well they agree, where that is less than what serves to
+            find a place.
+    """
     to_pairs = np.zeros((len(shape.pairs), shape.count))
     rows = np.arange(len(shape.pairs))
     to_pairs[rows, shape.pairs[:, 1]] = 1.0
@@ -122,7 +138,7 @@ def _agreeing(
     d = lags * metres_per_sample
     differences = d @ np.linalg.pinv(to_pairs).T
     errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
-    agree = errors < _tolerance(shape, metres_per_sample)
+    agree = errors < min(_tolerance(shape, metres_per_sample), tolerance_m)
     return differences[agree], levels[agree]
 
 

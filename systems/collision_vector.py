@@ -5,11 +5,17 @@ from __future__ import annotations
 import math
 from typing import Literal
 
+import numpy as np
 from pydrake.systems.framework import LeafSystem_
 
 from systems.cache import declare_cache
-from systems.parameters import NonNegative, Parameters
+from systems.finite import read_lists
+from systems.geometry import control_point, rotate
+from systems.parameters import NonNegativeLength, Parameters
+from systems.robot import RobotParameters
+from systems.scalar_math import float_of
 from systems.scalar_types import define_for_scalars
+from systems.signals import FRAME_PERIOD_S
 from systems.ultrasonic_array import SENSORS, UltrasonicParameters
 
 __all__ = [
@@ -17,6 +23,7 @@ __all__ = [
     "CollisionVector",
     "CollisionVectorParameters",
     "CollisionVector_",
+    "carried_point",
     "collision_vectors",
     "echo_point",
     "echo_points",
@@ -36,7 +43,7 @@ class CollisionVectorParameters(Parameters):
     """``paper``: nearest echo, joined with its nearer neighbour where close
     enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
     own vector, whose forces add."""
-    pair_separation_m: NonNegative = 0.5
+    pair_separation_m: NonNegativeLength = 0.5
     """Echoes farther apart than this are taken as two obstacles, m."""
 
 
@@ -66,6 +73,26 @@ def echo_points(ranges, echo, sensors: UltrasonicParameters):
             ranges, echo, sensors.axes, sensors.positions_m, strict=True
         )
     ]
+
+
+def carried_point(point, pose_then, pose_now, control_point_m):
+    """Where a point that was seen from another pose lies now, if it rests.
+
+    Args:
+        point: (x, y) from P in B axes as seen then, m; floats or AutoDiffXd.
+        pose_then: (x, y, theta) of the robot then, m and rad.
+        pose_now: The same now.
+        control_point_m: Distance of P ahead of the axle, m.
+
+    Returns:
+        (x, y) from P in B axes now, m.
+    """
+    p_then, p_now = (
+        control_point(pose, control_point_m) for pose in (pose_then, pose_now)
+    )
+    x, y = rotate(pose_then[2], *point)
+    dx, dy = p_then[0] - p_now[0] + x, p_then[1] - p_now[1] + y
+    return rotate(-pose_now[2], dx, dy)
 
 
 def foot_on_segment(a, b):
@@ -198,28 +225,61 @@ def CollisionVector_(T):
             input_ports:
             - ranges [m]
             - echo [0 or 1]
+            - range_ages [s]
+            - pose_WB_estimated [m, m, rad]
             output_ports:
             - collision_vectors_B [m, three slots of x and y]
             - mask [0 or 1 a slot]
             - features [number of the sensor or pair, 0 none]
 
-        A function of the present input: no state, no latency. Slots are
-        filled from the first; only ``aggregation: sum`` fills more than one.
+        Slots are filled from the first; only ``aggregation: sum`` fills more
+        than one. With ``firing: simultaneous`` a function of the present
+        ranges: no state, no latency; the ports of age and pose are not read.
+        With ``firing: sequential`` a range that is held stands for a point
+        that rests in W: it is carried on to the present pose. An obstacle's
+        own motion since that sensor fired, 50 ms at most, remains an error.
 
-        Parameters: ``CollisionVectorParameters``; the sensors' places are
-        those of ``UltrasonicParameters``.
+        Discrete state, 25 ms, with ``firing: sequential``: the last two poses.
+
+        Args:
+            parameters: ``CollisionVectorParameters``.
+            sensors: Places and order of firing, ``UltrasonicParameters``.
+            robot: Place of P.
+            initial_pose: (x, y, theta) before time zero, m and rad.
 
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
 
-        def _construct(self, *, parameters=None, sensors=None, converter=None):
+        def _construct(
+            self,
+            *,
+            parameters=None,
+            sensors=None,
+            robot=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
             super().__init__(converter=converter)
             self._parameters = parameters or CollisionVectorParameters()
             self._sensors = sensors or UltrasonicParameters()
+            self._robot = robot or RobotParameters()
+            self._initial_pose = tuple(initial_pose)
             self.set_name("collision_vector")
-            self._ranges = self.DeclareVectorInputPort(name="ranges", size=SENSORS)
-            self._echo = self.DeclareVectorInputPort(name="echo", size=SENSORS)
-            sources = {self._ranges.ticket(), self._echo.ticket()}
+            inputs = [
+                self.DeclareVectorInputPort(name=name, size=3)
+                for name in ("ranges", "echo", "range_ages", "pose_WB_estimated")
+            ]
+            self._echoes, self._motion = inputs[:2], inputs[2:]
+            sources = {port.ticket() for port in self._echoes}
+            self._past_poses = self._sensors.round_ticks - 1
+            if self._past_poses:
+                past = [T(v) for v in self._initial_pose] * self._past_poses
+                self.DeclareDiscreteState(past)
+                self.DeclarePeriodicDiscreteUpdateEvent(
+                    period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+                )
+                sources |= {port.ticket() for port in self._motion}
+                sources.add(self.xd_ticket())
             slots = declare_cache(self, "slots", self._slots, sources)
             declare_collision_ports(self, slots)
 
@@ -228,14 +288,40 @@ def CollisionVector_(T):
                 self,
                 parameters=other._parameters,
                 sensors=other._sensors,
+                robot=other._robot,
+                initial_pose=other._initial_pose,
                 converter=converter,
             )
 
         def _slots(self, context):
-            ranges = self._ranges.Eval(context).tolist()
-            echo = self._echo.Eval(context).tolist()
+            ranges, echo = read_lists(context, self._echoes)
             points = echo_points(ranges, echo, self._sensors)
+            if self._past_poses:
+                points = self._carried(context, points)
             return fill_slots(collision_vectors(points, self._parameters), T)
+
+        def _carried(self, context, points):
+            """The points as they lie from the present pose."""
+            ages, now = read_lists(context, self._motion)
+            poses = self._poses(context, now)
+            ticks = [round(float_of(age) / FRAME_PERIOD_S) for age in ages]
+            return [
+                carried_point(point, poses[k], poses[0], self._robot.control_point_m)
+                if point is not None and k
+                else point
+                for point, k in zip(points, ticks, strict=True)
+            ]
+
+        def _poses(self, context, now):
+            """The pose now, a tick ago, two ticks ago."""
+            past = context.get_discrete_state(0).CopyToVector().tolist()
+            starts = range(0, len(past), 3)
+            return [now, *(past[k : k + 3] for k in starts)]
+
+        def _remember(self, context, discrete_state):
+            _, now = read_lists(context, self._motion)
+            poses = self._poses(context, now)[:-1]
+            discrete_state.set_value(np.array(poses).ravel())
 
     return Impl
 

@@ -1,4 +1,4 @@
-"""How compiled functions may round.
+"""How compiled functions may round, and where they are kept.
 
 numba links a compiled helper into its caller as it stands where both are compiled
 in one process, and as a copy that was optimised with the caller where the caller is
@@ -9,7 +9,53 @@ such helpers take ``forceinline=True``, so that there is no second way
 
 from __future__ import annotations
 
-__all__ = ["REORDER"]
+import atexit
+import os
+import shutil
+import sys
+import tempfile
+from collections.abc import Iterable
+from pathlib import Path
+
+__all__ = ["REORDER", "provide_cache"]
 
 #: Licence for compiled sums to reorder, so that they vectorise; NaN stays NaN.
 REORDER = {"reassoc", "contract", "nsz", "arcp"}
+
+
+def provide_cache(folders: Iterable[Path]) -> Path | None:
+    """Gives numba a folder for compiled code where it would find none.
+
+    It lasts as long as the process, and serves the processes that this one starts.
+    Without any folder numba refuses to compile.
+
+    Args:
+        folders: Where numba would keep code, best first.
+
+    Returns:
+        A new folder; none where one of those can be written.
+    """
+    if os.environ.get("NUMBA_CACHE_DIR") or any(map(_can_be_written, folders)):
+        return None
+    made = Path(tempfile.mkdtemp(prefix="phonotaxis-numba-"))
+    atexit.register(shutil.rmtree, made, ignore_errors=True)
+    os.environ["NUMBA_CACHE_DIR"] = str(made)
+    if "numba" in sys.modules:
+        sys.modules["numba"].config.CACHE_DIR = str(made)
+    return made
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Whether files can be made there, or the folder itself."""
+    while not folder.exists():
+        folder = folder.parent
+    return os.access(folder, os.W_OK | os.X_OK)
+
+
+# Every import of a block comes by here, before numba compiles anything.
+provide_cache(
+    [
+        Path(__file__).with_name("__pycache__"),
+        Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")),  # noqa: PTH111
+    ]
+)

@@ -12,6 +12,7 @@ from scipy import fft
 
 from systems.array_shape import ArrayShape
 from systems.delay_peaks import PairTables
+from systems.input_error import InputError
 
 __all__ = ["DelayPlan"]
 
@@ -30,7 +31,7 @@ class DelayPlan:
     """What can be worked out before the first frame.
 
     Raises:
-        ValueError: Band, frame and array do not fit the sample rate.
+        InputError: Band, frame and array do not fit the sample rate.
     """
 
     shape: ArrayShape
@@ -48,16 +49,18 @@ class DelayPlan:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.low_hz < self.high_hz <= self.sample_rate_hz / 2:
-            raise ValueError(
-                f"band: {self.low_hz:g} ... {self.high_hz:g} Hz must rise and end at "
+            raise InputError(
+                "band",
+                f"{self.low_hz:g} ... {self.high_hz:g} Hz must rise and end at "
                 f"or below half the sample rate of {self.sample_rate_hz:g} Hz; lower "
-                "the band or record at a higher rate"
+                "the band or record at a higher rate",
             )
         if self.max_lag > (1.0 - _LEAST_OVERLAP) * self.frame_samples:
-            raise ValueError(
-                f"microphones: sound takes {self.shape.max_delay(self.c) * 1e3:.2f} ms "
+            raise InputError(
+                "microphones",
+                f"sound takes {self.shape.max_delay(self.c) * 1e3:.2f} ms "
                 f"across them, too long for frames of {self.frame_samples} samples; "
-                "use longer frames"
+                "use longer frames",
             )
 
     @property

@@ -7,6 +7,7 @@ import soxr
 from numpy.typing import ArrayLike, NDArray
 
 from systems.adc import MicArrayParameters
+from systems.input_error import InputError
 from systems.noise import BEFORE_THE_RUN, tick_generator
 from systems.robot import RobotParameters
 from systems.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
@@ -47,7 +48,7 @@ class EgoNoise:
         seed: Seed of the places where the channels begin.
 
     Raises:
-        ValueError: The file cannot be used; names it and the remedy.
+        InputError: The file cannot be used; names it and the remedy.
     """
 
     def __init__(self, parameters: MicArrayParameters, count: int, seed: int) -> None:
@@ -82,23 +83,26 @@ def _read_loops(file: str, count: int) -> NDArray[np.float32]:
     field = "microphones.ego_noise_file"
     channels, rate = read_sound(file, field)
     if len(channels) not in (1, count):
-        raise ValueError(
-            f"{field}: {file} has {len(channels)} channels for {count} microphones; "
-            "give one for each, or mix it down to one"
+        raise InputError(
+            field,
+            f"{file} has {len(channels)} channels for {count} microphones; "
+            "give one for each, or mix it down to one",
         )
     if channels.shape[1] < LEAST_SECONDS * rate:
-        raise ValueError(
-            f"{field}: {file} lasts {channels.shape[1] / rate:.3f} s; give at least "
-            f"{LEAST_SECONDS} s"
+        raise InputError(
+            field,
+            f"{file} lasts {channels.shape[1] / rate:.3f} s; give at least "
+            f"{LEAST_SECONDS} s",
         )
     centred = channels - channels.mean(axis=1, keepdims=True)
     resampled = soxr.resample(centred.T, rate, SAMPLE_RATE_HZ, quality="VHQ").T
     heard = np.array([band_limited(row, *MICROPHONE_BAND_HZ) for row in resampled])
     if np.std(heard) <= 1e-6 * np.abs(channels).max():
         low, high = MICROPHONE_BAND_HZ
-        raise ValueError(
-            f"{field}: {file} has nothing between {low:g} and {high:g} Hz, which the "
-            "microphones pass; choose another"
+        raise InputError(
+            field,
+            f"{file} has nothing between {low:g} and {high:g} Hz, which the "
+            "microphones pass; choose another",
         )
     fade = round(FADE_S * SAMPLE_RATE_HZ)
     angle = np.pi / 2.0 * (np.arange(fade) + 0.5) / fade

@@ -18,6 +18,7 @@ __all__ = [
     "cone_range",
     "contact_time",
     "control_point",
+    "control_point_velocity",
     "fan_ranges",
     "nearest_point_on_rectangle",
     "rectangle_clearance",
@@ -58,6 +59,19 @@ def control_point(pose, offset):
     """
     x, y, theta = pose
     return x + offset * cos(theta), y + offset * sin(theta)
+
+
+def control_point_velocity(theta, velocity, offset):
+    """Velocity v_WP of the control point of a body, m/s.
+
+    Args:
+        theta: Heading of the body frame in W, rad; a number or an array.
+        velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each as theta.
+        offset: Distance epsilon of P ahead of the origin, m.
+    """
+    vx, vy, omega = velocity
+    turning = omega * offset
+    return vx - turning * np.sin(theta), vy + turning * np.cos(theta)
 
 
 def nearest_point_on_rectangle(point, rectangle):

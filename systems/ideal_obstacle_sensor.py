@@ -6,9 +6,11 @@ from pydrake.systems.framework import LeafSystem_
 
 from systems.cache import declare_cache
 from systems.collision_vector import SLOTS, declare_collision_ports, fill_slots
+from systems.finite import check_finite, read_lists
 from systems.geometry import control_point, nearest_point_on_rectangle, rotate
 from systems.parameters import Positive, Size
 from systems.robot import RobotParameters
+from systems.scalar_math import float_of
 from systems.scalar_types import define_for_scalars
 
 __all__ = ["IdealObstacleSensor", "IdealObstacleSensor_", "nearest_vectors"]
@@ -39,11 +41,6 @@ def nearest_vectors(pose_WB, rectangles, control_point_m, maximum_range, slots):
     return [
         (1.0 + index, *rotate(-pose_WB[2], dx, dy)) for _, index, dx, dy in seen[:slots]
     ]
-
-
-def float_of(value) -> float:
-    """Value of a float or an AutoDiffXd."""
-    return value if isinstance(value, float) else value.value()
 
 
 @define_for_scalars("IdealObstacleSensor_", __name__)
@@ -95,6 +92,8 @@ def IdealObstacleSensor_(T):
                 "source_size": source_size,
                 "obstacle_count": obstacle_count,
             }
+            for name in ("maximum_range_m", "source_size"):
+                check_finite(f"IdealObstacleSensor: {name}", self._config[name])
             self.set_name("ideal_obstacle_sensor")
             self._inputs = [
                 self.DeclareVectorInputPort(name=name, size=size)
@@ -113,9 +112,7 @@ def IdealObstacleSensor_(T):
             Impl._construct(self, **other._config, converter=converter)
 
         def _slots(self, context):
-            pose_WB, poses, sizes, pose_WS = (
-                port.Eval(context).tolist() for port in self._inputs
-            )
+            pose_WB, poses, sizes, pose_WS = read_lists(context, self._inputs)
             bodies = [
                 (*poses[3 * k : 3 * k + 3], *sizes[2 * k : 2 * k + 2])
                 for k in range(self._config["obstacle_count"])

@@ -7,9 +7,11 @@ import math
 from pydrake.math import atan2
 from pydrake.systems.framework import LeafSystem_
 
+from systems.finite import read_lists
 from systems.geometry import control_point, rotate, safe_norm
+from systems.input_error import InputError
 from systems.noise import tick_generator
-from systems.parameters import NonNegative, Parameters, Positive
+from systems.parameters import Length, NonNegative, Parameters
 from systems.robot import RobotParameters
 from systems.scalar_math import cos, sin
 from systems.scalar_types import define_for_scalars
@@ -33,7 +35,7 @@ class IdealHearingParameters(Parameters):
     """Standard deviation of a bearing, deg."""
     range_noise_fraction: NonNegative = 0.0
     """Standard deviation of a range over the range."""
-    maximum_range_m: Positive = 30.0
+    maximum_range_m: Length = 30.0
     """A source beyond it is not heard, m."""
 
 
@@ -74,7 +76,7 @@ def IdealSourceSensor_(T):
             seed: Seed of the noise.
 
         Raises:
-            ValueError: Noise is set in an AutoDiffXd system.
+            InputError: Noise is set in an AutoDiffXd system.
         """
 
         def _construct(
@@ -99,13 +101,16 @@ def IdealSourceSensor_(T):
                 or self._hearing.range_noise_fraction > 0.0
             )
             if self._noisy and T is not float:
-                raise ValueError(
-                    "IdealSourceSensor: noise is set, and noise has no derivative; "
-                    "set bearing_noise_deg and range_noise_fraction to 0"
+                raise InputError(
+                    "IdealSourceSensor",
+                    "noise is set, and noise has no derivative; "
+                    "set bearing_noise_deg and range_noise_fraction to 0",
                 )
             self.set_name("ideal_source_sensor")
-            self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
-            self._pose_WS = self.DeclareVectorInputPort(name="pose_WS", size=3)
+            self._poses = [
+                self.DeclareVectorInputPort(name=name, size=3)
+                for name in ("pose_WB", "pose_WS")
+            ]
             self._position = self.DeclareDiscreteState(2)
             self._detected = self.DeclareDiscreteState(1)
             self.DeclarePeriodicDiscreteUpdateEvent(
@@ -114,19 +119,24 @@ def IdealSourceSensor_(T):
             self._declare("source_bearing", 1, self._bearing)
             self._declare("source_range", 1, self._range)
             self.DeclareStateOutputPort("p_PS_B", self._position)
-            self._declare("covariance", 4, self._covariance)
+            self._declare(
+                "covariance",
+                4,
+                self._covariance,
+                self.xd_ticket(),
+            )
             self.DeclareStateOutputPort("detected", self._detected)
             self.DeclareStateOutputPort("range_valid", self._detected)
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, **other._config, converter=converter)
 
-        def _declare(self, name, size, calc):
+        def _declare(self, name, size, calc, ticket=None):
             self.DeclareVectorOutputPort(
                 name=name,
                 size=size,
                 calc=calc,
-                prerequisites_of_calc={self.xd_ticket()},
+                prerequisites_of_calc={ticket or self.xd_ticket()},
             )
 
         def _state(self, context):
@@ -137,8 +147,7 @@ def IdealSourceSensor_(T):
 
         def _measure(self, context, discrete_state):
             x, y = relative_position(
-                self._pose_WB.Eval(context).tolist(),
-                self._pose_WS.Eval(context).tolist(),
+                *read_lists(context, self._poses),
                 self._config["robot"].control_point_m,
             )
             time = context.get_time()

@@ -12,11 +12,20 @@ import numpy as np
 
 from systems.cache import declare_cache
 from systems.collision_vector import SLOTS
+from systems.finite import read_lists
 from systems.geometry import control_point, rotate, safe_norm
-from systems.parameters import NonNegative, Parameters, Positive
+from systems.parameters import (
+    Duration,
+    NonNegativeDamping,
+    NonNegativeLength,
+    NonNegativeStiffness,
+    Parameters,
+)
 from systems.repulsion import RepulsionParameters, VelocityTerm
 from systems.robot import RobotParameters
+from systems.scalar_math import float_of
 from systems.signals import FRAME_PERIOD_S
+from systems.ultrasonic_array import UltrasonicParameters
 
 __all__ = [
     "AttractionParameters",
@@ -26,18 +35,21 @@ __all__ = [
     "repulsion_force",
 ]
 
+#: Numbers that are remembered a tick: feature, C_x and C_y of each slot.
+_ROW = 3 * SLOTS
+
 
 class AttractionParameters(Parameters):
     """The spring and damper to the target (Han 2019, eq. 18 and section 5)."""
 
-    stiffness_n_m: NonNegative = 2.0
+    stiffness_n_m: NonNegativeStiffness = 2.0
     """K_r, N/m; printed without unit."""
-    damping_n_s_m: NonNegative = 1.0
+    damping_n_s_m: NonNegativeDamping = 1.0
     """D_r, N s/m; printed without unit. Damping ratio 0.18 with K_r = 2."""
-    follow_distance_m: NonNegative = 1.2
+    follow_distance_m: NonNegativeLength = 1.2
     """Distance d_f from the source at which the attraction rests, m; ours.
     0 is as printed: P is pulled onto the source itself."""
-    brake_time_s: Positive = 0.5
+    brake_time_s: Duration = 0.5
     """Time constant of the stop when there is no target, s; ours."""
 
 
@@ -71,7 +83,7 @@ def obstacle_speed(C_now, C_before, velocity_term: VelocityTerm, period):
 
     Args:
         C_now: (x, y) in W, m; floats or AutoDiffXd.
-        C_before: The same feature one period ago, or None: 0 then.
+        C_before: The same feature a period ago, or None: 0 then.
         velocity_term: ``printed`` |dC/dt|, or ``closing`` max(0, -d|C|/dt).
         period: s.
     """
@@ -88,7 +100,7 @@ def repulsion_force(vectors, before, law, velocity_term: VelocityTerm, period):
 
     Args:
         vectors: [(feature, C_x, C_y)] in W, m; floats or AutoDiffXd.
-        before: {feature: (C_x, C_y)} one period ago.
+        before: {feature: (C_x, C_y)} a period ago.
         law: ``law(c, s)``, N.
         velocity_term: See ``obstacle_speed``.
         period: s.
@@ -111,15 +123,39 @@ class ImpedanceLoop:
     """Ports, state and sum of forces of every impedance controller.
 
     A mix-in beside ``LeafSystem_[T]``: the controller's file adds its law as
-    ``_radial_force(c, s)`` in N. Each collision vector's s is the change over
-    one 25 ms period of the same feature; 0 where the feature is new.
+    ``_radial_force(c, s)`` in N. Each collision vector's s is the change of the
+    same feature over one round of the sensors, over the time of that round; 0
+    where the feature was not there a round ago. A round is a tick of 25 ms, and
+    three where the sensors fire one after the other: every sensor has then
+    fired once since, and a held range is held in both vectors. At constant
+    velocities s is exact, at every tick, of a pair of sensors as of one; else
+    it is the mean over the round, which is up to 50 ms old itself.
     """
 
-    def _declare_loop(self, scalar, name, robot, attraction, repulsion):
+    def _declare_loop(
+        self,
+        scalar,
+        name,
+        *,
+        robot=None,
+        attraction=None,
+        repulsion=None,
+        sensors=None,
+    ):
         self._scalar = scalar
         self._robot = robot or RobotParameters()
         self._attraction = attraction or AttractionParameters()
         self._repulsion = repulsion or RepulsionParameters()
+        sensors = sensors or UltrasonicParameters()
+        self._round_ticks = sensors.round_ticks
+        self._least_range_m = sensors.minimum_range_m
+        # What a copy for another scalar type is made with.
+        self._options = {
+            "robot": self._robot,
+            "attraction": self._attraction,
+            "repulsion": self._repulsion,
+            "sensors": sensors,
+        }
         self.set_name(name)
         self._inputs = [
             self.DeclareVectorInputPort(name=port_name, size=size)
@@ -132,7 +168,7 @@ class ImpedanceLoop:
                 ("v_WP", 2),
             )
         ]
-        self.DeclareDiscreteState([scalar(0.0)] * (3 * SLOTS))
+        self.DeclareDiscreteState([scalar(0.0)] * (_ROW * self._round_ticks))
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
@@ -153,9 +189,8 @@ class ImpedanceLoop:
 
     def _sum_forces(self, context):
         """(F_m, F_b, s of each slot, [(feature, C_x, C_y)] in W)."""
-        target, valid, vectors, features, pose, v_WP = [
-            port.Eval(context).tolist() for port in self._inputs
-        ]
+        values = read_lists(context, self._inputs)
+        target, valid, vectors, features, pose, v_WP = values
         F_m = attraction_force(
             control_point(pose, self._robot.control_point_m),
             v_WP,
@@ -177,24 +212,27 @@ class ImpedanceLoop:
             self._before(context),
             self._radial_force,
             self._repulsion.velocity_term,
-            FRAME_PERIOD_S,
+            self._round_ticks * FRAME_PERIOD_S,
         )
         speeds = [zero + s for s in speeds] + [zero] * (SLOTS - len(speeds))
         return F_m, F_b, speeds, vectors_W
 
     def _before(self, context):
-        """{feature: C_W} of the last tick."""
+        """{feature: C_W} of a round ago."""
         state = context.get_discrete_state(0).CopyToVector().tolist()
+        oldest = state[-_ROW:]
         return {
-            _key(state[k]): (state[k + 1], state[k + 2])
-            for k in range(0, 3 * SLOTS, 3)
-            if state[k] > 0.5
+            _key(oldest[k]): (oldest[k + 1], oldest[k + 2])
+            for k in range(0, _ROW, 3)
+            if oldest[k] > 0.5
         }
 
     def _remember(self, context, discrete_state):
         *_, vectors_W = self._forces.Eval(context)
         rows = [value for row in vectors_W for value in row]
-        rows += [self._scalar(0.0)] * (3 * SLOTS - len(rows))
+        rows += [self._scalar(0.0)] * (_ROW - len(rows))
+        if self._round_ticks > 1:
+            rows += context.get_discrete_state(0).CopyToVector().tolist()[:-_ROW]
         discrete_state.set_value(np.array(rows))
 
     def _acceleration(self, context, output):
@@ -212,4 +250,4 @@ class ImpedanceLoop:
 
 def _key(feature) -> int:
     """Number of a feature, whatever its scalar type."""
-    return round(feature if isinstance(feature, float) else feature.value())
+    return round(float_of(feature))

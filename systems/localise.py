@@ -11,14 +11,23 @@ from pydantic import Field, model_validator
 
 from systems.array_shape import ArrayShape
 from systems.coherent import arrival_delays, refine_source
+from systems.copied_channels import frame_repeats
 from systems.delay_plan import DelayPlan
 from systems.delay_search import DelaySearch, weakest_sound
 from systems.delays import DelayEstimate, estimate_delays, look
 from systems.echo_errors import echo_errors, energy_spread
 from systems.frame_energy import frame_energy
 from systems.half_band import PASSED, halve_rate
+from systems.input_error import InputError
 from systems.multilateration import locate_source
-from systems.parameters import Fraction, Parameters, Positive
+from systems.parameters import (
+    Duration,
+    Fraction,
+    Frequency,
+    Parameters,
+    Positive,
+    SoundSpeed,
+)
 from systems.precedence import EchoMemory, keep_first_wave_front
 from systems.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
 from systems.source_fix import SourceFix
@@ -55,6 +64,9 @@ _SHARED_CHANCE = 1e-3
 # than expected by this many standard deviations: 1 %.
 _QUIET = 2.33
 
+# Microphones whose distances from the centroid differ by less are an even pair, m.
+_ALIKE_M = 1e-3
+
 # A sound begins within a frame whose energy is spread over less than this share
 # of it.
 _WHOLE_FRAME = 0.8
@@ -66,19 +78,19 @@ class TDOAParameters(Parameters):
     method: Literal["gcc", "gcc_phat", "ml", "amdf"] = "gcc"
     """Cross-correlation, the same with whitened spectrum, maximum likelihood
     that starts from it, or the papers' AMDF."""
-    low_hz: Positive = 300.0
+    low_hz: Frequency = 300.0
     """Lower end of the band, Hz."""
-    high_hz: float = Field(default=15_000.0, gt=0.0, le=SAMPLE_RATE_HZ / 2)
+    high_hz: float = Field(default=15_000.0, ge=1.0, le=SAMPLE_RATE_HZ / 2)
     """Upper end of the band, Hz."""
     band: Literal["set", "found"] = "set"
     """Use the band as it is set, or what of it each frame's sound occupies."""
-    sound_speed_m_s: Positive | None = None
+    sound_speed_m_s: SoundSpeed | None = None
     """Speed of sound that the estimator believes in, m/s; unset: the true one."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
     """Share of frames of steady noise in which a sound is heard, at most."""
     suppress_echoes: bool = True
     """Weigh frames with echoes by the precedence of the first wave front."""
-    maximum_closure_s: Positive = 5e-6
+    maximum_closure_s: Duration = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
     maximum_misfit: Fraction = 0.05
     """Largest disagreement of a delay with that of the place beyond
@@ -94,8 +106,8 @@ class TDOAParameters(Parameters):
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:
         if self.low_hz >= self.high_hz:
-            raise ValueError(
-                f"low_hz: {self.low_hz:g} must be below high_hz = {self.high_hz:g}"
+            raise InputError(
+                "low_hz", f"{self.low_hz:g} must be below high_hz = {self.high_hz:g}"
             )
         return self
 
@@ -131,7 +143,7 @@ class Localiser:
         c: True speed of sound, m/s.
 
     Raises:
-        ValueError: The array cannot serve at this rate and band.
+        InputError: The array cannot serve at this rate and band.
     """
 
     def __init__(self, parameters: TDOAParameters, shape: ArrayShape, c: float) -> None:
@@ -154,6 +166,11 @@ class Localiser:
         channels = plan.shape.count
         self._frame_shape = (channels, FRAME_SAMPLES)
         self._scatter = _QUIET * math.sqrt(2.0 / (channels * FRAME_SAMPLES))
+        # Pairs that no source ahead of the centroid is as far from.
+        i, j = plan.shape.pairs.T
+        from_centre = np.linalg.norm(plan.shape.p_AM, axis=1)
+        self._uneven = np.abs(from_centre[i] - from_centre[j]) > _ALIKE_M
+        self._all = np.ones(len(i), dtype=bool)
         # Both sides of the spectrum, all channels, all samples.
         self._frame_share = 2.0 * channels * FRAME_SAMPLES / plan.frame_samples
         # A band that is found may be as narrow as it likes.
@@ -184,11 +201,23 @@ class Localiser:
             is heard, and the new memory.
 
         Raises:
-            ValueError: The frame is no frame of this array, or not finite.
+            InputError: The frame is no frame of this array, or not finite.
         """
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
+        fix, after = self._heard(frame, memory, energy)
+        if fix is not None and self._is_copied(frame, fix, memory):
+            return None, after
+        return fix, after
+
+    def _heard(
+        self,
+        frame: NDArray[np.float32 | np.int16],
+        memory: HearingMemory,
+        energy: float,
+    ) -> tuple[SourceFix | None, HearingMemory]:
+        """As ``localise``, for a frame that may hold a sound."""
         heard: NDArray[np.float32] = (
             halve_rate(frame) if self._halved else frame.astype(np.float32, copy=False)
         )
@@ -256,16 +285,18 @@ class Localiser:
     def _checked_energy(self, frame: NDArray[np.float32 | np.int16]) -> float:
         if frame.shape != self._frame_shape:
             channels, samples = self._frame_shape
-            raise ValueError(
-                f"audio: a frame of shape {frame.shape}; give a channel for each of "
-                f"the {channels} microphones, of {samples} samples"
+            raise InputError(
+                "audio",
+                f"a frame of shape {frame.shape}; give a channel for each of "
+                f"the {channels} microphones, of {samples} samples",
             )
         energy = frame_energy(frame)
         if not math.isfinite(energy) and not np.isfinite(frame).all():
             channel, sample = np.argwhere(~np.isfinite(frame))[0]
-            raise ValueError(
-                f"audio: channel {channel + 1}: sample {sample} is "
-                f"{frame[channel, sample]}; give numbers"
+            raise InputError(
+                "audio",
+                f"channel {channel + 1}: sample {sample} is "
+                f"{frame[channel, sample]}; give numbers",
             )
         return energy
 
@@ -279,6 +310,23 @@ class Localiser:
         limit = self.parameters.maximum_closure_s
         limit += self.parameters.maximum_misfit * shape.max_delay(c)
         return bool(np.abs(arrival_delays(fix, shape, c) - tau).max() <= limit)
+
+    def _is_copied(
+        self,
+        frame: NDArray[np.float32 | np.int16],
+        fix: SourceFix,
+        memory: HearingMemory,
+    ) -> bool:
+        """Whether channels of a located frame repeat each other.
+
+        Without any noise, two microphones that are as far from the source do.
+        """
+        shape = self.plan.shape
+        # A direction alone may belong to delays that are not its own: none counts too.
+        later = SAMPLE_RATE_HZ * arrival_delays(fix, shape, self.plan.c)
+        noisy = memory.energy > 0.0
+        at_once = self._all if noisy else self._uneven
+        return frame_repeats(frame, shape.pairs, later, at_once, noisy=noisy)
 
     def _delays(self, frame, seen=None) -> DelayEstimate | None:
         return estimate_delays(

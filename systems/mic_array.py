@@ -20,6 +20,7 @@ from systems.array_tolerances import (
 )
 from systems.cache import declare_cache
 from systems.ego_noise import EgoNoise, driving_share
+from systems.finite import check_finite, check_record, read_arrays
 from systems.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.propagation import check_reach, microphone_paths, propagate
 from systems.reverberation import Reverberation
@@ -211,8 +212,10 @@ class MicArray(LeafSystem):
             self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
             for name in ("emission", *(f"emission_{name}" for name in interferers))
         ]
-        self._pose_WB = self.DeclareVectorInputPort(name="pose_WB", size=3)
-        self._velocity_WB = self.DeclareVectorInputPort(name="velocity_WB", size=3)
+        self._motion = [
+            self.DeclareVectorInputPort(name=name, size=3)
+            for name in ("pose_WB", "velocity_WB")
+        ]
         self.DeclareDiscreteState(np.r_[-np.inf, np.zeros(6)])
         if room:
             self._update_ticks = round(room.update_period_s / FRAME_PERIOD_S)
@@ -230,9 +233,7 @@ class MicArray(LeafSystem):
                 self.time_ticket(),
                 self.xd_ticket(),
                 self._array.ticket(),
-                *(source.ticket() for source in self._sources),
-                self._pose_WB.ticket(),
-                self._velocity_WB.ticket(),
+                *(port.ticket() for port in (*self._sources, *self._motion)),
             },
         )
 
@@ -268,10 +269,14 @@ class MicArray(LeafSystem):
         )
 
     def _build_array(self, context) -> RealArray:
-        positions, delays, gains, (c,) = (
+        groups = [
             context.get_numeric_parameter(index).CopyToVector()
             for index in range(context.num_numeric_parameter_groups())
-        )
+        ]
+        names = "POSITION_ERRORS", "CHANNEL_DELAYS", "GAINS", "SOUND_SPEED"
+        for name, values in zip(names, groups, strict=True):
+            check_finite(f"MicArray: {name}", values)
+        positions, delays, gains, (c,) = groups
         tolerances = Tolerances(positions.reshape(-1, 2), delays, gains)
         p_BM = microphones_B(self._robot)
         return real_array(p_BM, self._parameters, tolerances, float(c))
@@ -279,12 +284,11 @@ class MicArray(LeafSystem):
     def _remember(self, context, discrete_state):
         state = np.empty(7)
         state[0] = context.get_time()
-        state[1:4] = self._pose_WB.Eval(context)
-        state[4:] = self._velocity_WB.Eval(context)
+        state[1:4], state[4:] = read_arrays(context, self._motion)
         discrete_state.set_value(0, state)
         if self._reverberation and self._updates(state[0]):
-            held = np.r_[state[0], self._places(context, self._emissions(context))]
-            discrete_state.set_value(1, held)
+            places = self._places(state[1:4], self._emissions(context))
+            discrete_state.set_value(1, np.r_[state[0], places])
 
     def _updates(self, time: float) -> bool:
         """Whether reflections take new places at a tick."""
@@ -299,18 +303,27 @@ class MicArray(LeafSystem):
                     f"MicArray: port {port.get_name()} carries a "
                     f"{type(emission).__name__}; connect the emission of a SoundEmitter"
                 )
+            check_record(context, port, emission)
             emissions.append(emission)
         return emissions
 
-    def _places(self, context, emissions: list[Emission]) -> NDArray[np.float64]:
+    def _places(
+        self, pose: NDArray[np.float64], emissions: list[Emission]
+    ) -> NDArray[np.float64]:
         """Pose of the robot and places of the sources, one after the other."""
         now = [emission.p_WS[-1] for emission in emissions]
-        return np.concatenate([self._pose_WB.Eval(context), *now])
+        return np.concatenate([pose, *now])
 
-    def _reflections(self, context, emissions: list[Emission], array: RealArray):
+    def _reflections(
+        self,
+        context,
+        pose: NDArray[np.float64],
+        emissions: list[Emission],
+        array: RealArray,
+    ):
         if self._reverberation is None:
             return ()
-        present = self._places(context, emissions)
+        present = self._places(pose, emissions)
         held = context.get_discrete_state(1).value()
         old = held[1:] if np.isfinite(held[0]) else present
         time = context.get_time()
@@ -320,8 +333,7 @@ class MicArray(LeafSystem):
     def _record(self, context, output) -> None:
         emissions = self._emissions(context)
         time = context.get_time()
-        pose = np.asarray(self._pose_WB.Eval(context))
-        velocity = np.asarray(self._velocity_WB.Eval(context))
+        pose, velocity = read_arrays(context, self._motion)
         ego_noise = None
         if self._ego_noise is not None:
             share = driving_share(velocity, self._robot)
@@ -341,7 +353,7 @@ class MicArray(LeafSystem):
                 parameters=self._parameters,
                 seed=self._seed,
                 rise=self._rise,
-                reflections=self._reflections(context, emissions, array),
+                reflections=self._reflections(context, pose, emissions, array),
                 ego_noise=ego_noise,
             )
         )

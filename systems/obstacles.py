@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, model_validator
 from pydrake.systems.framework import LeafSystem_
 
-from systems.parameters import NonNegative, Parameters, Point, Size
-from systems.paths import WaypointPath, seconds
+from systems.parameters import (
+    Acceleration,
+    Angle,
+    Length,
+    NonNegativeSpeed,
+    Parameters,
+    Size,
+    Time,
+    Waypoints,
+)
+from systems.paths import ACCELERATION_M_S2, AtEnd, WaypointPath, seconds
 from systems.scalar_types import define_for_scalars
 
 __all__ = ["ObstacleParameters", "Obstacles", "Obstacles_"]
@@ -23,17 +31,19 @@ class ObstacleParameters(Parameters):
     """Name in results and pictures."""
     size_m: Size = (0.1, 0.05)
     """Extents along its own x axis (its direction of travel) and y axis, m."""
-    waypoints_m: Annotated[tuple[Point, ...], Strict(False)] = ((2.0, 1.0),)
+    waypoints_m: Waypoints = ((2.0, 1.0),)
     """Waypoints of its centre in W, m; one point is an obstacle at rest."""
-    heading_deg: float = 0.0
+    heading_deg: Angle = 0.0
     """Heading of an obstacle at rest, deg CCW from the x axis of W."""
-    speed_m_s: NonNegative = 0.3
+    speed_m_s: NonNegativeSpeed = 0.3
     """Speed along the waypoints, m/s."""
-    start_time_s: NonNegative = 0.0
+    acceleration_m_s2: Acceleration = ACCELERATION_M_S2
+    """Of that speed where it starts and brakes, m/s^2."""
+    start_time_s: Time = 0.0
     """It rests at its first waypoint until then, s."""
-    at_end: Literal["stop", "shuttle"] = "stop"
+    at_end: AtEnd = "stop"
     """At the last waypoint: rest, or go back and forth."""
-    corner_radius_m: NonNegative = 0.05
+    corner_radius_m: Length = 0.05
     """Largest radius of the rounded corners, m."""
 
     @model_validator(mode="after")
@@ -46,6 +56,7 @@ class ObstacleParameters(Parameters):
         return WaypointPath(
             self.waypoints_m,
             speed=self.speed_m_s,
+            acceleration=self.acceleration_m_s2,
             corner_radius=self.corner_radius_m,
             start_time=self.start_time_s,
             at_end=self.at_end,

@@ -13,21 +13,63 @@ from typing import Annotated, Any, Self
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
 __all__ = [
+    "Acceleration",
+    "Angle",
+    "Coordinate",
+    "Damping",
+    "Duration",
     "Fraction",
+    "Frequency",
+    "Length",
+    "Mass",
     "NonNegative",
+    "NonNegativeDamping",
+    "NonNegativeLength",
+    "NonNegativeSpeed",
+    "NonNegativeStiffness",
     "Parameters",
     "Point",
     "Positive",
     "Size",
+    "SoundSpeed",
+    "Speed",
+    "Stiffness",
+    "Time",
+    "Waypoints",
 ]
 
-Positive = Annotated[float, Field(gt=0.0)]
-NonNegative = Annotated[float, Field(ge=0.0)]
+# Every quantity has a range that a robot on a floor can have, with decades to spare:
+# what lies outside is a slip of the pen, and would overflow or never end. Where a
+# field needs a narrower range, it says so itself.
+_LARGEST_M = 1_000.0
+_DAY_S = 86_400.0
+_LARGEST = 1e6
+
+Positive = Annotated[float, Field(ge=1e-9, le=_LARGEST)]
+NonNegative = Annotated[float, Field(ge=0.0, le=_LARGEST)]
 Fraction = Annotated[float, Field(ge=0.0, le=1.0)]
 
+Length = Annotated[float, Field(ge=1e-9, le=_LARGEST_M)]
+NonNegativeLength = Annotated[float, Field(ge=0.0, le=_LARGEST_M)]
+Coordinate = Annotated[float, Field(ge=-_LARGEST_M, le=_LARGEST_M)]
+Angle = Annotated[float, Field(ge=-3_600.0, le=3_600.0)]
+Duration = Annotated[float, Field(ge=1e-9, le=_DAY_S)]
+Time = Annotated[float, Field(ge=0.0, le=_DAY_S)]
+Speed = Annotated[float, Field(ge=1e-3, le=100.0)]
+NonNegativeSpeed = Annotated[float, Field(ge=0.0, le=100.0)]
+Acceleration = Annotated[float, Field(ge=1e-3, le=_LARGEST)]
+SoundSpeed = Annotated[float, Field(ge=50.0, le=10_000.0)]
+Frequency = Annotated[float, Field(ge=1.0, le=1e6)]
+Mass = Annotated[float, Field(ge=1e-3, le=10_000.0)]
+Stiffness = Annotated[float, Field(ge=1e-9, le=_LARGEST)]
+NonNegativeStiffness = Annotated[float, Field(ge=0.0, le=_LARGEST)]
+Damping = Annotated[float, Field(ge=1e-9, le=_LARGEST)]
+NonNegativeDamping = Annotated[float, Field(ge=0.0, le=_LARGEST)]
+
 # YAML knows lists only, hence the one exception to strict types.
-Point = Annotated[tuple[float, float], Strict(False)]
-Size = Annotated[tuple[Positive, Positive], Strict(False)]
+Point = Annotated[tuple[Coordinate, Coordinate], Strict(False)]
+Waypoints = Annotated[tuple[Point, ...], Strict(False), Field(max_length=1_000)]
+Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Parameters(BaseModel):

@@ -1,7 +1,9 @@
-"""Path of a body that drives through waypoints at constant speed.
+"""Path of a body that is drawn through waypoints.
 
-Corners are rounded by circular arcs, so that position and velocity are
-continuous and the speed along the path is exact.
+Corners are rounded by circular arcs and the speed ramps up and down with a limited
+acceleration, so that position and velocity are continuous, both in closed form.
+The yaw rate steps at the ends of an arc: such a body is drawn, not driven
+(``systems/carrier.py`` is).
 """
 
 from __future__ import annotations
@@ -9,20 +11,28 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["WaypointPath", "seconds"]
+from systems.input_error import InputError
+
+__all__ = ["ACCELERATION_M_S2", "AtEnd", "WaypointPath", "seconds"]
 
 AtEnd = Literal["stop", "shuttle"]
 
+#: How obstacles and master robot start and brake unless told otherwise, m/s^2. Not
+#: printed, ours: a tenth of what wheels hold on a floor, and enough to be at 0.3 m/s
+#: after 45 mm, so that they run 0.15 s behind bodies that step to their speed.
+ACCELERATION_M_S2 = 1.0
 
-@dataclass(frozen=True)
-class _Segment:
+#: A body that is slower than this rests, m/s.
+_SLOWEST_M_S = 1e-9
+
+
+class _Segment(NamedTuple):
     """A line (curvature 0) or an arc, by its start pose and length."""
 
     x: float
@@ -32,37 +42,43 @@ class _Segment:
     length: float
 
     def pose(self, s: float) -> tuple[float, float, float]:
-        if self.curvature == 0.0:
-            return (
-                self.x + s * math.cos(self.theta),
-                self.y + s * math.sin(self.theta),
-                self.theta,
-            )
-        theta = self.theta + self.curvature * s
-        return (
-            self.x + (math.sin(theta) - math.sin(self.theta)) / self.curvature,
-            self.y - (math.cos(theta) - math.cos(self.theta)) / self.curvature,
-            theta,
-        )
+        return _along(self.x, self.y, self.theta, self.curvature, s)
+
+
+class _Piece(NamedTuple):
+    """A part of a segment with constant acceleration, by its first instant."""
+
+    begin: float
+    x: float
+    y: float
+    theta: float
+    curvature: float
+    speed: float
+    acceleration: float
 
 
 class WaypointPath:
     """Pose and velocity on a path through waypoints.
 
+    From rest to rest: the speed along the path rises and falls with the
+    acceleration and is constant in between; a short path sees a triangle.
+
     Args:
         waypoints: Points in W, m; one point is a body at rest.
         speed: Speed along the path, m/s, >= 0.
-        corner_radius: Largest radius of the rounded corners, m; a corner
+        acceleration: Of the speed along the path, m/s^2, > 0.
+        corner_radius: Largest radius of the rounded corners, m, > 0; a corner
             takes at most half of each leg beside it.
         start_time: The body rests at the first waypoint until then, s.
         at_end: ``stop`` rests at the last waypoint, ``shuttle`` goes back
-            and forth without turning round.
+            and forth without turning round, at rest for an instant at either end.
         heading: Heading where there is one waypoint, rad; else the path's
             tangent.
+        top_yaw_rate: Corners are taken as slowly as it asks, rad/s, > 0.
 
     Raises:
-        ValueError: There is no waypoint, two neighbours coincide, or the
-            path doubles back on itself.
+        InputError: There is no waypoint, two neighbours coincide, the path
+            doubles back on itself, or its corners are sharp.
     """
 
     def __init__(
@@ -70,77 +86,88 @@ class WaypointPath:
         waypoints: Sequence[tuple[float, float]],
         *,
         speed: float,
+        acceleration: float = ACCELERATION_M_S2,
         corner_radius: float = 0.3,
         start_time: float = 0.0,
         at_end: AtEnd = "stop",
         heading: float = 0.0,
+        top_yaw_rate: float = math.inf,
     ) -> None:
         if not waypoints:
-            raise ValueError("waypoints_m: none given; give at least one point")
-        self._speed = speed
+            raise InputError("waypoints_m", "none given; give at least one point")
+        if not corner_radius > 0.0:
+            raise InputError(
+                "corner_radius_m",
+                f"at {corner_radius} m the velocity would jump at each waypoint; give "
+                "a radius above 0",
+            )
+        segments = _segments(waypoints, corner_radius)
+        self._length = math.fsum(segment.length for segment in segments)
+        self._moves = bool(segments) and speed > _SLOWEST_M_S
         self._start_time = start_time
-        self._at_end = at_end
-        self._rest = (*waypoints[0], heading)
-        self._segments = _segments(waypoints, corner_radius)
-        ends: list[float] = []
-        for segment in self._segments:
-            ends.append(segment.length + (ends[-1] if ends else 0.0))
-        self._ends = ends
+        self._shuttles = self._moves and at_end == "shuttle"
+        limits = [
+            min(speed, top_yaw_rate / abs(segment.curvature))
+            if segment.curvature
+            else speed
+            for segment in segments
+        ]
+        pieces, self._duration = (
+            _pieces(segments, limits, acceleration) if self._moves else ([], 0.0)
+        )
+        first = segments[0].pose(0.0) if segments else (*waypoints[0], heading)
+        end = segments[-1].pose(segments[-1].length) if self._moves else first
+        self._pieces = [*pieces, _Piece(self._duration, *end, 0.0, 0.0, 0.0)]
+        self._begins = [piece.begin for piece in self._pieces]
 
     @property
     def length(self) -> float:
         """Length of the path with its rounded corners, m."""
-        return self._ends[-1] if self._ends else 0.0
+        return self._length
+
+    @property
+    def duration(self) -> float:
+        """Time from the first waypoint to the last, s; 0 for a body at rest."""
+        return self._duration
 
     @property
     def moves(self) -> bool:
         """Whether the body ever leaves its first waypoint."""
-        return bool(self._segments) and self._speed > 0.0
+        return self._moves
 
-    def _arc_length(self, time: float) -> tuple[float, float]:
-        """Distance along the path, m, and its rate, m/s."""
-        s = self._speed * (time - self._start_time)
-        if s < 0.0:
-            return 0.0, 0.0
-        if self._at_end == "stop":
-            return (s, self._speed) if s < self.length else (self.length, 0.0)
-        turns, s = divmod(s, self.length)
-        if turns % 2:
-            return self.length - s, -self._speed
-        return s, self._speed
-
-    def _find(self, s: float) -> tuple[_Segment, float]:
-        index = min(bisect_right(self._ends, s), len(self._ends) - 1)
-        start = self._ends[index - 1] if index else 0.0
-        return self._segments[index], s - start
+    def _find(self, time: float) -> tuple[_Piece, float, float]:
+        """Piece, distance from its start, m, and rate along the path, m/s."""
+        elapsed, direction = max(time - self._start_time, 0.0), 1.0
+        if self._shuttles:
+            laps, elapsed = divmod(elapsed, self._duration)
+            if laps % 2:
+                elapsed, direction = self._duration - elapsed, -1.0
+        piece = self._pieces[bisect_right(self._begins, elapsed) - 1]
+        since = elapsed - piece.begin
+        distance = (piece.speed + 0.5 * piece.acceleration * since) * since
+        return piece, distance, direction * (piece.speed + piece.acceleration * since)
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """(x, y, theta) in W at a time in s; m and rad."""
-        if not self._segments:
-            return self._rest
-        s, _ = self._arc_length(time)
-        segment, along = self._find(s)
-        return segment.pose(along)
+        piece, s, _ = self._find(time)
+        return _along(piece.x, piece.y, piece.theta, piece.curvature, s)
+
+    def velocity(self, time: float) -> tuple[float, float, float]:
+        """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
+        piece, s, rate = self._find(time)
+        theta = piece.theta + piece.curvature * s
+        return (
+            rate * math.cos(theta),
+            rate * math.sin(theta),
+            rate * piece.curvature,
+        )
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
         """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
-        times = np.asarray(times, dtype=float)
-        if not self.moves:
-            return np.tile(np.array(self.pose(0.0)), (len(times), 1))
-        s = np.maximum(self._speed * (times - self._start_time), 0.0)
-        if self._at_end == "stop":
-            s = np.minimum(s, self.length)
-        else:
-            s = self.length - np.abs(s % (2.0 * self.length) - self.length)
-        ends = np.array(self._ends)
-        index = np.minimum(np.searchsorted(ends, s, side="right"), len(ends) - 1)
-        x, y, theta, curvature, length = np.array(
-            [(g.x, g.y, g.theta, g.curvature, g.length) for g in self._segments]
-        )[index].T
-        along = s - (ends[index] - length)
-        # Chord of the arc: its length tends to ``along`` as the curvature vanishes.
-        half = 0.5 * curvature * along
-        chord = along * np.sinc(half / np.pi)
+        (x, y, theta, curvature), s, _ = self._find_all(times)
+        # Chord of the arc: its length tends to s as the curvature vanishes.
+        half = 0.5 * curvature * s
+        chord = s * np.sinc(half / np.pi)
         return np.stack(
             [
                 x + chord * np.cos(theta + half),
@@ -150,18 +177,83 @@ class WaypointPath:
             axis=1,
         )
 
-    def velocity(self, time: float) -> tuple[float, float, float]:
-        """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
-        if not self.moves:
-            return (0.0, 0.0, 0.0)
-        s, rate = self._arc_length(time)
-        segment, along = self._find(s)
-        theta = segment.pose(along)[2]
-        return (
-            rate * math.cos(theta),
-            rate * math.sin(theta),
-            rate * segment.curvature,
+    def twists(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 2) speeds ahead, negative where a shuttle goes back, and yaw rates.
+
+        In m/s and rad/s.
+        """
+        (_, _, _, curvature), _, rate = self._find_all(times)
+        return np.stack([rate, rate * curvature], axis=1)
+
+    def _find_all(self, times: ArrayLike) -> tuple[Any, Any, Any]:
+        """As ``_find``: starts and curvatures, distances and rates."""
+        elapsed = np.maximum(np.asarray(times, dtype=float) - self._start_time, 0.0)
+        direction = np.ones_like(elapsed)
+        if self._shuttles:
+            laps, elapsed = np.divmod(elapsed, self._duration)
+            back = laps % 2 == 1
+            elapsed = np.where(back, self._duration - elapsed, elapsed)
+            direction[back] = -1.0
+        index = np.searchsorted(self._begins, elapsed, side="right") - 1
+        begin, *start, speed, acceleration = np.array(self._pieces)[index].T
+        since = elapsed - begin
+        distance = (speed + 0.5 * acceleration * since) * since
+        return start, distance, direction * (speed + acceleration * since)
+
+
+def _along(
+    x: float, y: float, theta: float, curvature: float, s: float
+) -> tuple[float, float, float]:
+    """Pose at a distance s along a line or an arc that begins at a pose."""
+    if curvature == 0.0:
+        return x + s * math.cos(theta), y + s * math.sin(theta), theta
+    end = theta + curvature * s
+    return (
+        x + (math.sin(end) - math.sin(theta)) / curvature,
+        y - (math.cos(end) - math.cos(theta)) / curvature,
+        end,
+    )
+
+
+def _pieces(
+    segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
+) -> tuple[list[_Piece], float]:
+    """The fastest way along segments from rest to rest, and how long it takes.
+
+    Args:
+        segments: Lines and arcs end to end.
+        limits: Top speed on each, m/s.
+        acceleration: Of the speed along the path, m/s^2.
+    """
+    # Squares of speeds are linear in the distance.
+    tops = [limit * limit for limit in limits]
+    joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]
+    gains = [2.0 * acceleration * segment.length for segment in segments]
+    for k, gain in enumerate(gains):
+        joints[k + 1] = min(joints[k + 1], joints[k] + gain)
+    for k, gain in reversed(list(enumerate(gains))):
+        joints[k] = min(joints[k], joints[k + 1] + gain)
+    pieces: list[_Piece] = []
+    begin = 0.0
+    for segment, top, gain, (first, last) in zip(
+        segments, tops, gains, pairwise(joints), strict=True
+    ):
+        peak = min(top, 0.5 * (first + last + gain))
+        up = (peak - first) / (2.0 * acceleration)
+        down = (peak - last) / (2.0 * acceleration)
+        ways = (
+            (0.0, up, first, peak, acceleration),
+            (up, segment.length - up - down, peak, peak, 0.0),
+            (segment.length - down, down, peak, last, -acceleration),
         )
+        for start, way, before, after, rate in ways:
+            if way > 0.0:
+                speed = math.sqrt(before)
+                pose = segment.pose(start)
+                piece = _Piece(begin, *pose, segment.curvature, speed, rate)
+                pieces.append(piece)
+                begin += 2.0 * way / (speed + math.sqrt(after))
+    return pieces, begin
 
 
 def _segments(
@@ -172,8 +264,8 @@ def _segments(
     for (x0, y0), (x1, y1) in pairwise(waypoints):
         length = math.hypot(x1 - x0, y1 - y0)
         if length < 1e-9:
-            raise ValueError(
-                f"waypoints_m: ({x0}, {y0}) stands twice in a row; remove one"
+            raise InputError(
+                "waypoints_m", f"({x0}, {y0}) stands twice in a row; remove one"
             )
         legs.append((x0, y0, math.atan2(y1 - y0, x1 - x0), length))
 
@@ -186,9 +278,10 @@ def _segments(
             _, _, next_theta, next_length = legs[index + 1]
             turn = math.remainder(next_theta - theta, math.tau)
             if abs(abs(turn) - math.pi) < 1e-6:
-                raise ValueError(
-                    f"waypoints_m: the path doubles back at waypoint {index + 1}; "
-                    "move a waypoint aside, or use at_end: shuttle"
+                raise InputError(
+                    "waypoints_m",
+                    f"the path doubles back at waypoint {index + 1}; "
+                    "move a waypoint aside, or use at_end: shuttle",
                 )
             arc, cut = _corner(turn, corner_radius, min(length, next_length) / 2)
         line = length - trimmed - cut
@@ -222,7 +315,7 @@ def _corner(
     turn: float, radius: float, room: float
 ) -> tuple[tuple[float, float] | None, float]:
     """((curvature, arc length), length cut off each leg) of a corner."""
-    if abs(turn) < 1e-9 or radius == 0.0:
+    if abs(turn) < 1e-9:
         return None, 0.0
     half = math.tan(abs(turn) / 2.0)
     radius = min(radius, room / half)

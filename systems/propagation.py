@@ -15,6 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from systems.compiling import REORDER
+from systems.input_error import InputError
 from systems.signals import Emission
 
 __all__ = [
@@ -242,7 +243,7 @@ def check_reach(
         c: Speed of sound, m/s.
 
     Raises:
-        ValueError: What left before the emission begins may be heard.
+        InputError: What left before the emission begins may be heard.
     """
     distance = math.dist(p_WL.tolist(), emission.p_WS[0].tolist())
     reach = time - emission.start_time - KERNEL_REACH / emission.sample_rate_hz
@@ -250,10 +251,11 @@ def check_reach(
         raise _out_of_reach(distance)
 
 
-def _out_of_reach(distance: float) -> ValueError:
-    return ValueError(
-        f"MicArray: the source is {distance:.2f} m away, farther than the emission "
-        "reaches back; raise maximum_range_m of SoundEmitter"
+def _out_of_reach(distance: float) -> InputError:
+    return InputError(
+        "MicArray",
+        f"the source is {distance:.2f} m away, farther than the emission "
+        "reaches back; raise maximum_range_m of SoundEmitter",
     )
 
 
@@ -286,7 +288,7 @@ def propagate(
         (m, count) Pa. Nearer than 1 cm, the amplitude is that at 1 cm.
 
     Raises:
-        ValueError: A microphone hears what left before the emission begins.
+        InputError: A microphone hears what left before the emission begins.
     """
     delays, rates = retarded_delays(
         times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c, rise

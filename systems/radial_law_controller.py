@@ -36,41 +36,27 @@ def RadialLawController_(T):
             - forces_W [N, attraction then repulsion, x and y each]
             - obstacle_speeds [m/s, s of each slot]
 
-        Discrete state, 25 ms: the last collision vectors, for s. The outputs
-        are functions of state and present input: no latency.
+        Discrete state, 25 ms: the collision vectors of the last round of the
+        sensors, for s. The outputs are functions of state and present input:
+        no latency.
 
         Args:
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
             repulsion: ``RepulsionParameters``, handed to the law.
+            sensors: ``UltrasonicParameters``: order of firing.
             law: ``law(c, s, repulsion)``: force away from the obstacle in N at
                 distance c in m and speed s in m/s. Use pydrake.math, so that
                 it can be differentiated.
         """
 
-        def _construct(
-            self,
-            *,
-            robot=None,
-            attraction=None,
-            repulsion=None,
-            law=no_force,
-            converter=None,
-        ):
+        def _construct(self, *, law=no_force, converter=None, **options):
             super().__init__(converter=converter)
             self._law = law
-            name = "radial_law_controller"
-            self._declare_loop(T, name, robot, attraction, repulsion)
+            self._declare_loop(T, "radial_law_controller", **options)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                robot=other._robot,
-                attraction=other._attraction,
-                repulsion=other._repulsion,
-                law=other._law,
-                converter=converter,
-            )
+            Impl._construct(self, law=other._law, converter=converter, **other._options)
 
         def _radial_force(self, c, s):
             return self._law(c, s, self._repulsion)

@@ -11,6 +11,7 @@ from scipy import fft
 
 from systems.array_tolerances import RealArray
 from systems.geometry import rotate
+from systems.input_error import InputError
 from systems.room import RoomParameters, room_images, room_impulse_responses
 from systems.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, Emission
 
@@ -39,7 +40,7 @@ class Reverberation:
             worked out for, m/s.
 
     Raises:
-        ValueError: See ``RoomParameters.walls``.
+        InputError: See ``RoomParameters.walls``.
     """
 
     def __init__(self, room: RoomParameters, c: float) -> None:
@@ -78,7 +79,7 @@ class Reverberation:
             For each source (m, FRAME_SAMPLES) Pa, or None where it is silent.
 
         Raises:
-            ValueError: Somebody is outside the room, or an emission does not
+            InputError: Somebody is outside the room, or an emission does not
                 reach back.
         """
         return [
@@ -89,10 +90,11 @@ class Reverberation:
     def _frame(self, emission, time, old, new, array):
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ)
         if end < self._needed:
-            raise ValueError(
-                f"MicArray: reflections come by ways of {self.maximum_range_m:.0f} m, "
+            raise InputError(
+                "MicArray",
+                f"reflections come by ways of {self.maximum_range_m:.0f} m, "
                 "longer than the emission reaches back; raise maximum_range_m of "
-                "SoundEmitter"
+                "SoundEmitter",
             )
         if not emission.sounding:
             return None
@@ -124,9 +126,10 @@ class Reverberation:
         for who, where in (("a microphone", p_WM), ("a source", np.array([p_WS]))):
             if not self.room.contains(where):
                 at = ", ".join(f"({a:.2f}, {b:.2f})" for a, b in where)
-                raise ValueError(
-                    f"MicArray: {who} is outside the room, at {at} m; enlarge "
-                    "room.size_m or move room.corner_m"
+                raise InputError(
+                    "MicArray",
+                    f"{who} is outside the room, at {at} m; enlarge "
+                    "room.size_m or move room.corner_m",
                 )
         response = room_impulse_responses(
             self.room,

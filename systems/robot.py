@@ -9,7 +9,8 @@ from typing import Annotated
 
 from pydantic import Field, Strict, model_validator
 
-from systems.parameters import Parameters, Point, Positive
+from systems.input_error import InputError
+from systems.parameters import Length, Mass, Parameters, Point, Speed
 
 __all__ = ["LEAST_SPACING_M", "RobotParameters"]
 
@@ -24,11 +25,11 @@ class RobotParameters(Parameters):
     a microphone row of 800 mm, so that 820 mm can only be the lateral size.
     """
 
-    length_m: Positive = 0.35
+    length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
-    width_m: Positive = 0.82
+    width_m: Length = 0.82
     """Extent of the body along its y axis, the microphone bar included, m."""
-    control_point_m: Positive = 0.175
+    control_point_m: Length = 0.175
     """Distance epsilon of the control point P ahead of the axle, m."""
     microphones_m: Annotated[tuple[Point, ...], Strict(False), Field(min_length=3)] = (
         (0.0, 0.4),
@@ -39,22 +40,23 @@ class RobotParameters(Parameters):
 
     A row with 0.4 m between neighbours, from left to right (Han 2019, 2.3).
     """
-    wheel_radius_m: Positive = 0.06
+    wheel_radius_m: Length = 0.06
     """Radius of the driven wheels, m."""
-    wheel_separation_m: Positive = 0.41
+    wheel_separation_m: Length = 0.41
     """Distance L between the driven wheels, m."""
-    mass_kg: Positive = 3.94
+    mass_kg: Mass = 3.94
     """Virtual mass M at P, kg: the mass of the robot."""
-    top_speed_m_s: Positive = 0.72
+    top_speed_m_s: Speed = 0.72
     """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
 
     @model_validator(mode="after")
     def _check_microphones(self) -> RobotParameters:
         for (i, a), (j, b) in combinations(enumerate(self.microphones_m), 2):
             if math.dist(a, b) < LEAST_SPACING_M:
-                raise ValueError(
-                    f"microphones_m: microphones {i} and {j}, at {a} and {b}, are "
-                    f"less than {LEAST_SPACING_M:g} m apart; move one"
+                raise InputError(
+                    "microphones_m",
+                    f"microphones {i} and {j}, at {a} and {b}, are "
+                    f"less than {LEAST_SPACING_M:g} m apart; move one",
                 )
         return self
 

@@ -18,7 +18,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.compiling import REORDER
-from systems.parameters import Parameters, Point, Positive
+from systems.input_error import InputError
+from systems.parameters import Length, Parameters, Point
 from systems.propagation import (
     INTERPOLATION_KERNEL,
     KERNEL_REACH,
@@ -35,7 +36,7 @@ GREATEST_ORDER = 150
 class RoomParameters(Parameters):
     """A shoebox room round the floor of W."""
 
-    size_m: Annotated[tuple[Positive, Positive, Positive], Strict(False)] = (
+    size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
         7.0,
         7.0,
         3.0,
@@ -46,7 +47,7 @@ class RoomParameters(Parameters):
 
     Unset, the origin of W lies in the middle of the floor.
     """
-    reverberation_time_s: Positive = 0.4
+    reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
     Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m
@@ -63,26 +64,28 @@ class RoomParameters(Parameters):
 
     Unset, all count that arrive within the reverberation time.
     """
-    source_height_m: Positive = 0.3
+    source_height_m: Length = 0.3
     """Height of every loudspeaker above the floor, m."""
-    microphone_height_m: Positive = 0.3
+    microphone_height_m: Length = 0.3
     """Height of the microphones above the floor, m."""
-    update_period_s: float = Field(default=0.1, ge=FRAME_PERIOD_S)
+    update_period_s: float = Field(default=0.1, ge=FRAME_PERIOD_S, le=60.0)
     """Reflections are of the poses at multiples of this, s; a multiple of 25 ms."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:
         ticks = self.update_period_s / FRAME_PERIOD_S
         if abs(ticks - round(ticks)) > 1e-9:
-            raise ValueError(
-                f"update_period_s: {self.update_period_s} is not a multiple of "
-                f"{FRAME_PERIOD_S} s; use {round(ticks) * FRAME_PERIOD_S:g}"
+            raise InputError(
+                "update_period_s",
+                f"{self.update_period_s} is not a multiple of "
+                f"{FRAME_PERIOD_S} s; use {round(ticks) * FRAME_PERIOD_S:g}",
             )
         for name in ("source_height_m", "microphone_height_m"):
             if getattr(self, name) >= self.size_m[2]:
-                raise ValueError(
-                    f"{name}: {getattr(self, name)} is not below the ceiling at "
-                    f"{self.size_m[2]} m; lower it"
+                raise InputError(
+                    f"{name}",
+                    f"{getattr(self, name)} is not below the ceiling at "
+                    f"{self.size_m[2]} m; lower it",
                 )
         return self
 
@@ -110,7 +113,7 @@ class RoomParameters(Parameters):
             c: Speed of sound, m/s.
 
         Raises:
-            ValueError: No walls are so dull, or so many images are needed
+            InputError: No walls are so dull, or so many images are needed
                 that they cannot be handled.
         """
         size = np.array(self.size_m)
@@ -119,18 +122,20 @@ class RoomParameters(Parameters):
         if absorption is not None:
             time = sabine / absorption
         elif time <= sabine:
-            raise ValueError(
-                f"room.reverberation_time_s: {time} s is too short for a room of "
-                f"{self.size_m} m; {sabine:.2g} s would take walls that absorb all"
+            raise InputError(
+                "room.reverberation_time_s",
+                f"{time} s is too short for a room of "
+                f"{self.size_m} m; {sabine:.2g} s would take walls that absorb all",
             )
         # The farthest plane of images of one order, less a room on either side.
         order = math.ceil(c * time * math.sqrt(np.sum(size**-2.0))) + 2
         order = self.maximum_order or order
         if order > GREATEST_ORDER:
-            raise ValueError(
-                f"room.maximum_order: a reverberation time of {time:.2g} s takes "
+            raise InputError(
+                "room.maximum_order",
+                f"a reverberation time of {time:.2g} s takes "
                 f"reflections of order {order} in a room of {self.size_m} m; set it to "
-                f"{GREATEST_ORDER} or less"
+                f"{GREATEST_ORDER} or less",
             )
         return absorption or sabine / time, time, order
 
@@ -159,7 +164,7 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
         c: Speed of sound that absorption and length are worked out for, m/s.
 
     Raises:
-        ValueError: See ``RoomParameters.walls``.
+        InputError: See ``RoomParameters.walls``.
     """
     import pyroomacoustics
 
@@ -257,7 +262,7 @@ def room_impulse_responses(
         first sample.
 
     Raises:
-        ValueError: See ``RoomParameters.walls``.
+        InputError: See ``RoomParameters.walls``.
     """
     images = images or room_images(room, c)
     microphones = np.atleast_2d(np.asarray(p_WM, dtype=float)) - room.corner

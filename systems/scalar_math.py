@@ -11,10 +11,15 @@ from typing import Any
 
 import pydrake.math
 
-__all__ = ["cos", "exp", "sin", "sqrt"]
+__all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
 
 # From some way above this exponent on a float is infinite.
 _LARGEST_EXPONENT = 709.0
+
+
+def float_of(x: Any) -> float:
+    """Value of a float or an AutoDiffXd."""
+    return x if isinstance(x, float) else x.value()
 
 
 def cos(x: Any) -> Any:

@@ -11,6 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
+from systems.finite import check_finite, read_arrays
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission, read_only
 from systems.waveforms import SoundParameters, make_waveform
 
@@ -143,7 +144,7 @@ class SoundEmitter(LeafSystem):
             followed.
 
     Raises:
-        ValueError: The sound file cannot be played.
+        ValueError: The sound file cannot be played, or the range is not finite.
 
     Reference: Han 2019, section 4.1.
     """
@@ -160,11 +161,14 @@ class SoundEmitter(LeafSystem):
         super().__init__()
         self._sound = sound or SoundParameters()
         self._waveform = make_waveform(self._sound, seed)
+        check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
         c = (acoustics or AcousticParameters()).c
         self._ticks = history_ticks(maximum_range_m, c)
         self.set_name(f"sound_emitter{suffix}")
-        self._pose_WS = self.DeclareVectorInputPort(name=f"pose_WS{suffix}", size=3)
-        self._v_WS = self.DeclareVectorInputPort(name=f"v_WS{suffix}", size=3)
+        self._inputs = [
+            self.DeclareVectorInputPort(name=f"{name}{suffix}", size=3)
+            for name in ("pose_WS", "v_WS")
+        ]
         self.DeclareDiscreteState(4 * self._ticks)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
@@ -175,8 +179,7 @@ class SoundEmitter(LeafSystem):
             alloc=lambda: Value(object()),
             calc=self._emit,
             prerequisites_of_calc={
-                self._pose_WS.ticket(),
-                self._v_WS.ticket(),
+                *(port.ticket() for port in self._inputs),
                 self.xd_ticket(),
                 self.time_ticket(),
             },
@@ -184,7 +187,7 @@ class SoundEmitter(LeafSystem):
 
     def _start(self, context, discrete_state) -> None:
         path = np.zeros((2, self._ticks, 2))
-        path[0] = np.asarray(self._pose_WS.Eval(context))[:2]
+        path[0] = read_arrays(context, self._inputs)[0][:2]
         discrete_state.set_value(path.ravel())
 
     def _remember(self, context, discrete_state):
@@ -194,9 +197,8 @@ class SoundEmitter(LeafSystem):
 
     def _emit(self, context, output):
         held, split = context.get_discrete_state(0).value(), 2 * self._ticks
-        position = self._pose_WS.Eval(context)[:2]
-        velocity = self._v_WS.Eval(context)[:2]
-        p_WS = np.concatenate((held[:split], position)).reshape(-1, 2)
-        v_WS = np.concatenate((held[split:], velocity)).reshape(-1, 2)
+        pose_WS, velocity = read_arrays(context, self._inputs)
+        p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)
+        v_WS = np.concatenate((held[split:], velocity[:2])).reshape(-1, 2)
         time = context.get_time()
         output.set_value(make_emission(time, self._waveform, self._sound, p_WS, v_WS))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from pydrake.systems.framework import LeafSystem_
 
 from systems.cache import declare_cache
+from systems.finite import read_arrays
+from systems.input_error import InputError
 from systems.robot import RobotParameters
 from systems.scalar_types import define_for_scalars
 from systems.signals import FRAME_PERIOD_S
@@ -65,9 +67,10 @@ def SourceTracker_(T):
         ):
             super().__init__(converter=converter)
             if not 0.0 <= measurement_age_s <= 2.0 * FRAME_PERIOD_S:
-                raise ValueError(
-                    f"SourceTracker: measurement_age_s is {measurement_age_s}; it "
-                    f"must lie between 0 and {2.0 * FRAME_PERIOD_S}"
+                raise InputError(
+                    "SourceTracker",
+                    f"measurement_age_s is {measurement_age_s}; it "
+                    f"must lie between 0 and {2.0 * FRAME_PERIOD_S}",
                 )
             self._config = {
                 "robot": robot or RobotParameters(),
@@ -77,34 +80,25 @@ def SourceTracker_(T):
             self._model = TrackerModel(**self._config)
             self._maximum_age = self._config["tracker"].maximum_age_s
             self.set_name("source_tracker")
-            self._p_PS_B, self._covariance, self._detected, self._range_valid = (
+            self._inputs = [
                 self.DeclareVectorInputPort(name=name, size=size)
                 for name, size in (
                     ("p_PS_B", 2),
                     ("covariance", 4),
                     ("detected", 1),
                     ("range_valid", 1),
+                    ("pose_WB_estimated", 3),
                 )
-            )
-            self._pose = self.DeclareVectorInputPort(name="pose_WB_estimated", size=3)
+            ]
             blank = self._model.start([0.0] * 3)
             self.DeclareDiscreteState([T(value) for value in blank.pack()])
             self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
             )
-            sources = {
-                port.ticket()
-                for port in (
-                    self._p_PS_B,
-                    self._covariance,
-                    self._detected,
-                    self._range_valid,
-                    self._pose,
-                )
-            }
+            sources = {port.ticket() for port in self._inputs}
             sources.add(self.xd_ticket())
-            self._now = declare_cache(self, "track now", self._track, sources)
+            self._now = declare_cache(self, "track and pose", self._track, sources)
             for name, size, calc in (
                 ("p_WS_estimated", 2, self._target),
                 ("v_WS_estimated", 2, self._velocity),
@@ -116,50 +110,48 @@ def SourceTracker_(T):
                     name=name,
                     size=size,
                     calc=calc,
-                    prerequisites_of_calc={self._now.ticket(), self._pose.ticket()},
+                    prerequisites_of_calc={self._now.ticket()},
                 )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, **other._config, converter=converter)
 
         def _start(self, context, discrete_state):
-            track = self._model.start(self._pose.Eval(context))
+            track = self._model.start(*read_arrays(context, self._inputs[-1:]))
             discrete_state.set_value(track.pack())
 
         def _track(self, context):
-            """The track with the present estimate folded in."""
+            """The track with the present estimate folded in, and the robot's pose."""
+            values = read_arrays(context, self._inputs)
+            p_PS_B, covariance, detected, range_valid, pose = values
             track = Track.unpack(context.get_discrete_state(0).CopyToVector())
-            if self._detected.Eval(context)[0] > 0.5:
-                estimate = Estimate(
-                    self._p_PS_B.Eval(context),
-                    self._covariance.Eval(context),
-                    bool(self._range_valid.Eval(context)[0] > 0.5),
-                )
-                track = self._model.hear(track, estimate, self._pose.Eval(context))
-            return track
+            if detected[0] > 0.5:
+                ranged = bool(range_valid[0] > 0.5)
+                estimate = Estimate(p_PS_B, covariance, ranged)
+                track = self._model.hear(track, estimate, pose)
+            return track, pose
 
         def _update(self, context, discrete_state):
-            track, pose = self._now.Eval(context), self._pose.Eval(context)
-            track = self._model.older(track, pose)
+            track = self._model.older(*self._now.Eval(context))
             discrete_state.set_value(track.pack())
 
         def _target(self, context, output):
-            track, pose = self._now.Eval(context), self._pose.Eval(context)
-            output.SetFromVector(self._model.position(track, pose))
+            output.SetFromVector(self._model.position(*self._now.Eval(context)))
 
         def _velocity(self, context, output):
-            output.SetFromVector(self._model.velocity(self._now.Eval(context)))
+            track, _ = self._now.Eval(context)
+            output.SetFromVector(self._model.velocity(track))
 
         def _target_covariance(self, context, output):
-            track, pose = self._now.Eval(context), self._pose.Eval(context)
-            output.SetFromVector(self._model.covariance(track, pose))
+            output.SetFromVector(self._model.covariance(*self._now.Eval(context)))
 
         def _age(self, context, output):
-            output.SetFromVector([self._now.Eval(context).age])
+            track, _ = self._now.Eval(context)
+            output.SetFromVector([track.age])
 
         def _valid(self, context, output):
-            valid = self._now.Eval(context).age <= self._maximum_age
-            output.SetFromVector([T(float(valid))])
+            track, _ = self._now.Eval(context)
+            output.SetFromVector([T(float(track.age <= self._maximum_age))])
 
     return Impl
 

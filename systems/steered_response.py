@@ -32,8 +32,10 @@ __all__ = [
 _PATH_SHARE = 0.1
 _WIDEST_STEP_RAD = math.radians(4.0)
 
-# Places times pairs, at most: a few milliseconds a response.
+# Places times pairs, at most: a few milliseconds a response. Where many microphones
+# need more even with the widest steps, it may be so many times what those need.
 _LARGEST_GRID = 1_500_000
+_OVER_LEAST = 1.5
 _COARSER = 1.25
 
 # Sources are sought from this many apertures on by direction and inverse range.
@@ -87,7 +89,9 @@ class SearchGrid:
         """
         path = _PATH_SHARE * c / high_hz
         coarseness = 1.0
-        while _count(shape, coarseness * path) * len(shape.pairs) > _LARGEST_GRID:
+        least = _OVER_LEAST * _count(shape, math.inf)
+        most = max(_LARGEST_GRID / len(shape.pairs), least)
+        while _count(shape, coarseness * path) > most:
             coarseness *= _COARSER
         places, inverse = _places(shape, coarseness * path)
         first, second = shape.pairs.T

@@ -11,6 +11,8 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.acoustics import AcousticParameters
 from systems.array_shape import ArrayShape
+from systems.finite import check_record
+from systems.input_error import InputError
 from systems.localise import HearingMemory, Localiser, TDOAParameters
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
@@ -68,7 +70,7 @@ class TDOAEstimator(LeafSystem):
         acoustics: Speed of sound.
 
     Raises:
-        ValueError: The array cannot serve at this rate and band.
+        InputError: The array cannot serve at this rate and band.
 
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
@@ -105,10 +107,12 @@ class TDOAEstimator(LeafSystem):
                 f"TDOAEstimator: port audio carries a {type(audio).__name__}; connect "
                 "the audio of a MicArray"
             )
+        check_record(context, self._audio, audio)
         if audio.sample_rate_hz != SAMPLE_RATE_HZ:
-            raise ValueError(
-                f"TDOAEstimator: audio has a rate of {audio.sample_rate_hz:g} Hz; "
-                f"record at {SAMPLE_RATE_HZ} Hz"
+            raise InputError(
+                "TDOAEstimator",
+                f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
+                f"record at {SAMPLE_RATE_HZ} Hz",
             )
         before, located = self._remembered(context)
         fix, after = self._localiser.localise(audio.counts, before)

@@ -12,7 +12,13 @@ from pydantic import Field
 
 from systems.array_shape import ArrayShape
 from systems.geometry import rotate
-from systems.parameters import NonNegative, Parameters, Positive
+from systems.parameters import (
+    Duration,
+    Length,
+    NonNegativeLength,
+    Parameters,
+    Speed,
+)
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 from systems.target_filter import (
@@ -39,23 +45,23 @@ class TrackerParameters(Parameters):
     hold: Literal["world", "robot", "motion"] = "motion"
     """Between bursts the target rests in W, moves with the robot, or goes on
     with its own velocity, which fades."""
-    maximum_age_s: Positive = 6.0
+    maximum_age_s: Duration = 6.0
     """An older target is lost: three periods of the sound, s."""
-    assumed_range_m: Positive = 3.0
+    assumed_range_m: Length = 3.0
     """Range of the first target when only its bearing is known, m."""
     resolve_front_back: bool = True
     """Let the robot's motion tell the source from its mirror image behind a row
     of microphones; off: every source is in front."""
-    source_top_speed_m_s: Positive = 0.7
+    source_top_speed_m_s: Speed = 0.7
     """Speed of a fast source, m/s: two standard deviations of each component of
     a velocity that is not known."""
-    velocity_fade_s: Positive = 5.0
+    velocity_fade_s: Duration = 5.0
     """Time constant with which a source's velocity is forgotten, s."""
-    measurement_floor_m: NonNegative = 0.01
+    measurement_floor_m: NonNegativeLength = 0.01
     """Standard deviation of what the covariance of an estimate leaves out, m."""
-    gate_floor_m: Positive = 0.2
+    gate_floor_m: Length = 0.2
     """Standard deviation that the gate allows for besides the covariances, m."""
-    believed_outliers: int = Field(default=3, ge=1)
+    believed_outliers: int = Field(default=3, ge=1, le=1_000)
     """The outlier of this number in a row is believed, if they agree."""
 
 

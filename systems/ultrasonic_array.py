@@ -15,9 +15,20 @@ from scipy.special import ndtri
 
 from systems.acoustics import AcousticParameters
 from systems.cache import declare_cache
+from systems.finite import check_finite, read_arrays
 from systems.geometry import fan_ranges
+from systems.input_error import InputError
 from systems.noise import standard_normals
-from systems.parameters import Fraction, NonNegative, Parameters, Point, Positive, Size
+from systems.parameters import (
+    Angle,
+    Fraction,
+    Length,
+    NonNegativeLength,
+    Parameters,
+    Point,
+    Size,
+    SoundSpeed,
+)
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 
@@ -33,7 +44,7 @@ __all__ = [
 #: The model holds three sensors, numbered from left to right.
 SENSORS = 3
 
-_Triple = Annotated[tuple[float, float, float], Strict(False)]
+_Triple = Annotated[tuple[Angle, Angle, Angle], Strict(False)]
 _Places = Annotated[tuple[Point, Point, Point], Strict(False)]
 
 
@@ -46,29 +57,31 @@ class UltrasonicParameters(Parameters):
     """Places of the sensors from P, in B axes, m."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
     """Half of each cone's opening angle, deg."""
-    minimum_range_m: Positive = 0.03
+    minimum_range_m: Length = 0.03
     """Nearer surfaces read this range, m."""
-    maximum_range_m: Positive = 3.0
+    maximum_range_m: Length = 3.0
     """Farther surfaces give no echo, m."""
-    noise_m: NonNegative = 0.001
+    noise_m: NonNegativeLength = 0.001
     """Standard deviation of a range, m."""
     dropout_probability: Fraction = 0.0
     """Probability that an echo is missed."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
     """All sensors at every tick, or one after the other, a tick each."""
-    assumed_sound_speed_m_s: Positive | None = None
+    assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed by which the sensors turn time into range, m/s; none: the true one."""
 
     @model_validator(mode="after")
     def _check(self) -> UltrasonicParameters:
         if self.minimum_range_m >= self.maximum_range_m:
-            raise ValueError(
-                f"minimum_range_m: {self.minimum_range_m} must be below "
-                f"maximum_range_m {self.maximum_range_m}"
+            raise InputError(
+                "minimum_range_m",
+                f"{self.minimum_range_m} must be below "
+                f"maximum_range_m {self.maximum_range_m}",
             )
         if not self.axes_deg[0] > self.axes_deg[1] > self.axes_deg[2]:
-            raise ValueError(
-                f"axes_deg: {self.axes_deg} must fall from left to right, as 30, 0, -30"
+            raise InputError(
+                "axes_deg",
+                f"{self.axes_deg} must fall from left to right, as 30, 0, -30",
             )
         return self
 
@@ -82,6 +95,11 @@ class UltrasonicParameters(Parameters):
         """Axes (3,) in B, rad, places (3, 2) from P, m, and half angle, rad."""
         half_angle = math.radians(self.beam_half_angle_deg)
         return np.array(self.axes), np.array(self.positions_m), half_angle
+
+    @property
+    def round_ticks(self) -> int:
+        """Ticks from one reading of a sensor to its next."""
+        return SENSORS if self.firing == "sequential" else 1
 
     @cached_property
     def least_luck(self) -> float:
@@ -175,6 +193,7 @@ class UltrasonicArray(LeafSystem):
         output_ports:
         - ranges [m]
         - echo [0 or 1]
+        - range_ages [s, since each sensor fired]
 
     The master robot is a body like the obstacles. Surfaces beyond the maximum
     range give no echo; nearer than the minimum they read the minimum, for
@@ -184,7 +203,8 @@ class UltrasonicArray(LeafSystem):
     State: ranges and echoes of the last tick, for sequential firing.
     Rate and latency: a function of the present poses; no latency. Noise is
     drawn once a 25 ms tick. With ``firing: sequential`` one sensor fires a
-    tick and the others hold.
+    tick, from left to right, and the others hold: ranges are 0, 25 and 50 ms
+    old, and a sensor's next comes after a round of 75 ms.
 
     Args:
         parameters: The sensors.
@@ -211,6 +231,7 @@ class UltrasonicArray(LeafSystem):
         self._sound_speed = (acoustics or AcousticParameters()).c
         self._source_size = source_size
         self._seed = seed
+        check_finite("UltrasonicArray: source_size", source_size)
         self.set_name("ultrasonic_array")
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)
@@ -237,13 +258,17 @@ class UltrasonicArray(LeafSystem):
                 calc=calc,
                 prerequisites_of_calc={self._readings.ticket()},
             )
+        self.DeclareVectorOutputPort(
+            name="range_ages",
+            size=SENSORS,
+            calc=self._calc_ages,
+            prerequisites_of_calc={self.time_ticket()},
+        )
 
     def _read(self, context) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(3,) ranges and (3,) echoes as they stand now."""
-        pose_WB, poses_WO, sizes, pose_WS = [
-            port.Eval(context) for port in self._inputs
-        ]
-        tick = round(context.get_time() / FRAME_PERIOD_S)
+        pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
+        tick = _tick(context)
         numbers = standard_normals((2, SENSORS), self._seed, tick)
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
         true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
@@ -265,3 +290,12 @@ class UltrasonicArray(LeafSystem):
 
     def _calc_echo(self, context, output):
         output.SetFromVector(self._readings.Eval(context)[1])
+
+    def _calc_ages(self, context, output):
+        tick, round_ = _tick(context), self._parameters.round_ticks
+        ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in range(SENSORS)]
+        output.SetFromVector(ages)
+
+
+def _tick(context) -> int:
+    return round(context.get_time() / FRAME_PERIOD_S)

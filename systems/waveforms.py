@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import soxr
 from numpy.typing import NDArray
 from pydantic import Field, model_validator
 
-from systems.parameters import NonNegative, Parameters, Positive
+from systems.input_error import InputError
+from systems.parameters import (
+    Duration,
+    Frequency,
+    Parameters,
+    Positive,
+    Time,
+)
 from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.sound_file import read_sound
 
@@ -42,47 +49,49 @@ class SoundParameters(Parameters):
     """Waveform; ``wav`` plays ``file``."""
     file: str | None = None
     """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
-    low_hz: Positive = 500.0
+    low_hz: Frequency = 500.0
     """Lower end of chirp and band noise, Hz."""
-    high_hz: Positive = 8_000.0
+    high_hz: Frequency = 8_000.0
     """Upper end of chirp and band noise, Hz."""
-    tone_hz: Positive = 2_000.0
+    tone_hz: Frequency = 2_000.0
     """Frequency of the tone and fundamental of the horn, Hz."""
     level_pa: Positive = 0.05
     """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); less where the
     peaks would exceed four times this, the loudspeaker's limit."""
-    on_s: float = Field(default=0.5, ge=2 * EDGE_S)
+    on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
     """Length of a burst, s."""
-    period_s: Positive = 2.0
+    period_s: Duration = 2.0
     """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
-    start_s: NonNegative = 0.0
+    start_s: Time = 0.0
     """First burst, s."""
 
     @model_validator(mode="after")
     def _check(self) -> SoundParameters:
         if self.on_s > self.period_s:
-            raise ValueError(
-                f"on_s: {self.on_s} is longer than period_s {self.period_s}; shorten it"
+            raise InputError(
+                "on_s",
+                f"{self.on_s} is longer than period_s {self.period_s}; shorten it",
             )
         if self.low_hz >= self.high_hz:
-            raise ValueError(
-                f"low_hz: {self.low_hz} is not below high_hz {self.high_hz}; lower it"
+            raise InputError(
+                "low_hz", f"{self.low_hz} is not below high_hz {self.high_hz}; lower it"
             )
         top = MICROPHONE_BAND_HZ[1]
         for name in ("high_hz", "tone_hz"):
             if getattr(self, name) > top:
-                raise ValueError(
-                    f"{name}: {getattr(self, name)} is above the {top:g} Hz that "
-                    "the microphones pass; lower it"
+                raise InputError(
+                    f"{name}",
+                    f"{getattr(self, name)} is above the {top:g} Hz that "
+                    "the microphones pass; lower it",
                 )
         if self.kind == "wav" and self.file is None:
-            raise ValueError("file: kind is wav but no file is given; name one")
+            raise InputError("file", "kind is wav but no file is given; name one")
         return self
 
-    def sounds(self, time: float) -> bool:
-        """Whether the gate is open at a time in s."""
+    def sounds(self, time: Any) -> Any:
+        """Whether the gate is open at a time in s, or at each of an array of them."""
         phase = time - self.start_s
-        return phase >= 0.0 and phase % self.period_s < self.on_s
+        return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 
 
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
@@ -98,17 +107,19 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
         burst to burst, and begins again at its end.
 
     Raises:
-        ValueError: The file cannot be played; names it and the remedy.
+        InputError: The file cannot be played; names it and the remedy.
     """
     burst = round(sound.on_s * SAMPLE_RATE_HZ)
     raw = _SYNTHESES[sound.kind](sound, seed)
     endless = band_limited(raw, *MICROPHONE_BAND_HZ)
     if np.std(endless) <= 1e-6 * max(np.abs(raw).max(), 1e-3):
-        field = f"sound.file: {sound.file}" if sound.kind == "wav" else "sound.tone_hz"
+        field = "sound.file" if sound.kind == "wav" else "sound.tone_hz"
+        what = sound.file if sound.kind == "wav" else f"{sound.tone_hz:g} Hz"
         low, high = MICROPHONE_BAND_HZ
-        raise ValueError(
-            f"{field} has nothing between {low:g} and {high:g} Hz, which the "
-            "microphones pass; choose another"
+        raise InputError(
+            field,
+            f"{what} has nothing between {low:g} and {high:g} Hz, which the "
+            "microphones pass; choose another",
         )
     bursts = max(1, -(-len(endless) // burst))
     samples = np.resize(endless, bursts * burst)
@@ -162,13 +173,15 @@ def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     channels, rate = read_sound(sound.file or "", "sound.file")
     if len(channels) != 1:
-        raise ValueError(
-            f"sound.file: {sound.file} has {len(channels)} channels; mix it down to one"
+        raise InputError(
+            "sound.file",
+            f"{sound.file} has {len(channels)} channels; mix it down to one",
         )
     if rate < 2.0 * sound.low_hz:
-        raise ValueError(
-            f"sound.file: {sound.file} has a rate of {rate} Hz, below twice low_hz "
-            f"({sound.low_hz:g} Hz); use a recording of a higher rate"
+        raise InputError(
+            "sound.file",
+            f"{sound.file} has a rate of {rate} Hz, below twice low_hz "
+            f"({sound.low_hz:g} Hz); use a recording of a higher rate",
         )
     centred = channels[0] - channels[0].mean()
     mono = soxr.resample(centred, rate, SAMPLE_RATE_HZ, quality="VHQ")

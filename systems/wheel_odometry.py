@@ -9,6 +9,8 @@ from pydantic import Field
 from pydrake.systems.framework import LeafSystem_
 
 from systems.diff_drive_plant import body_twist
+from systems.finite import check_finite, read_list
+from systems.input_error import InputError
 from systems.parameters import Parameters
 from systems.robot import RobotParameters
 from systems.scalar_math import cos, sin
@@ -27,7 +29,7 @@ __all__ = [
 class OdometryParameters(Parameters):
     """Wheel encoders (Han 2019, 4.1)."""
 
-    pulses_per_revolution: int = Field(default=2600, gt=0)
+    pulses_per_revolution: int = Field(default=2600, gt=0, le=10_000_000)
     """Encoder pulses a wheel revolution."""
     rounding: bool = True
     """Angles in whole pulses; off: exact angles, as linearisation needs."""
@@ -85,7 +87,8 @@ def WheelOdometry_(T):
             initial_pose: (x, y, theta) at time zero, known.
 
         Raises:
-            ValueError: Rounding is on in an AutoDiffXd system.
+            InputError: Rounding is on in an AutoDiffXd system.
+            ValueError: The initial pose is not finite.
         """
 
         def _construct(
@@ -100,10 +103,12 @@ def WheelOdometry_(T):
             self._robot = robot or RobotParameters()
             self._odometry = odometry or OdometryParameters()
             self._initial_pose = tuple(initial_pose)
+            check_finite("WheelOdometry: initial_pose", self._initial_pose)
             if self._odometry.rounding and T is not float:
-                raise ValueError(
-                    "WheelOdometry: odometry.rounding is true, and a rounded angle "
-                    "has no derivative; set odometry.rounding to false"
+                raise InputError(
+                    "WheelOdometry",
+                    "odometry.rounding is true, and a rounded angle "
+                    "has no derivative; set odometry.rounding to false",
                 )
             self.set_name("wheel_odometry")
             self._angles = self.DeclareVectorInputPort(name="wheel_angles", size=2)
@@ -134,7 +139,7 @@ def WheelOdometry_(T):
             )
 
         def _encoder_angles(self, context):
-            angles = self._angles.Eval(context).tolist()
+            angles = read_list(context, self._angles)
             if self._odometry.rounding:
                 pulses = self._odometry.pulses_per_revolution
                 return [encoder_angle(angle, pulses) for angle in angles]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.systems.framework import LeafSystem_
 
+from systems.finite import read_lists
 from systems.geometry import rotate, safe_norm
 from systems.robot import RobotParameters
 from systems.scalar_types import define_for_scalars
@@ -97,10 +98,10 @@ def WheelSpeedCommand_(T):
             super().__init__(converter=converter)
             self._robot = robot or RobotParameters()
             self.set_name("wheel_speed_command")
-            self._acceleration = self.DeclareVectorInputPort(
-                name="acceleration_W", size=2
-            )
-            self._pose = self.DeclareVectorInputPort(name="pose_WB_estimated", size=3)
+            self._inputs = [
+                self.DeclareVectorInputPort(name=name, size=size)
+                for name, size in (("acceleration_W", 2), ("pose_WB_estimated", 3))
+            ]
             v_WP = self.DeclareDiscreteState(2)
             wheel_speeds = self.DeclareDiscreteState(2)
             self.DeclareStateOutputPort("wheel_speeds", wheel_speeds)
@@ -114,13 +115,13 @@ def WheelSpeedCommand_(T):
 
         def _update(self, context, discrete_state):
             robot = self._robot
+            acceleration_W, (_, _, theta) = read_lists(context, self._inputs)
             v_WP = integrate_velocity(
                 context.get_discrete_state(_V_WP).CopyToVector().tolist(),
-                self._acceleration.Eval(context).tolist(),
+                acceleration_W,
                 FRAME_PERIOD_S,
                 robot.top_speed_m_s,
             )
-            theta = self._pose.Eval(context).tolist()[2]
             twist = hand_position_twist(v_WP, theta, robot.control_point_m)
             wheels = limited_wheel_speeds(*twist, robot)
             discrete_state.set_value(_V_WP, np.array(v_WP))

@@ -52,7 +52,7 @@ def test_compare_prints_one_document(capsys, tmp_path):
         (["--set", "sourc.speed_m_s=1"], "sourc", "did you mean 'source'"),
         (["--runs", "0"], "runs", "1"),
         (["--runs", "many"], "command line", "--help"),
-        (["--workers", "0"], "workers", "raise it"),
+        (["--workers", "0"], "workers", "between 1 and 256"),
         (["--seed", "-1"], "seed", "whole number"),
         (["--grid", "hearing=audio"], "hearing", "list"),
     ],

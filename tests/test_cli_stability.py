@@ -12,6 +12,7 @@ from analysis.stability import stability_parts
 from analysis.stability.stability import Part
 from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
+from systems.input_error import InputError
 
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
 
@@ -23,7 +24,7 @@ def quick_parts(*, full: bool) -> tuple[Part, ...]:
         return (judge(MASS, study.scenario.robot.mass_kg),)
 
     def impossible(study):
-        raise ValueError("law: has no such thing; choose another one")
+        raise InputError("law", "has no such thing; choose another one")
 
     def render(data, name):
         return [paragraph(f"{len(data)} verdicts")]
@@ -43,6 +44,44 @@ def run(capsys, *words: str) -> tuple[int, str, str]:
     status = phonotaxis.main(["stability", *words])
     printed = capsys.readouterr()
     return status, printed.out, printed.err
+
+
+def test_a_part_that_fails_is_no_success(capsys, tmp_path, monkeypatch):
+    """The rest is written, the page says what failed, and so does the status."""
+
+    def broken(study):
+        return study.found["nothing"]
+
+    def show_broken(data, name):
+        raise ZeroDivisionError("no figure")
+
+    parts = (
+        *quick_parts(full=True),
+        Part("broken", "Broken", broken, lambda data, name: []),
+        Part("unshown", "Unshown", lambda study: [1], show_broken),
+        Part(
+            "after", "After", lambda study: [1, 2], lambda data, name: ["<p>last</p>"]
+        ),
+    )
+    monkeypatch.setattr(stability_parts, "parts", lambda *, full: parts)
+    out = tmp_path / "out"
+    status, printed, complaint = run(capsys, "--out", str(out))
+    assert status == 1
+    assert "mass" in printed.lower()
+    assert complaint.count("\n") == 1
+    assert "broken, unshown" in complaint
+    page = (out / "report.html").read_text("utf-8")
+    assert "This part failed: KeyError" in page
+    assert "This part failed: ZeroDivisionError" in page
+    assert "<p>last</p>" in page
+    document = json.loads((out / "summary.json").read_text())
+    assert document["broken"]["failed"]
+    assert "failed" not in document["impossible"]
+    again = ["--debug", "--out", str(tmp_path / "again")]
+    status, _, complaint = run(capsys, *again)
+    assert status == 1
+    assert "Traceback" in complaint
+    assert "KeyError" in complaint
 
 
 def test_one_law_json_and_files(quick, capsys, tmp_path):
@@ -66,7 +105,7 @@ def test_several_laws_stand_side_by_side(quick, capsys, tmp_path):
     status, printed, _ = run(capsys, "--law", "all", "--json", "--out", str(out))
     assert status == 0
     document = json.loads(printed)
-    laws = ["conventional", "active", "active2017"]
+    laws = ["conventional", "active", "conventional2017", "active2017"]
     assert [each["law"] for each in document["laws"]] == laws
     assert list(document["comparison"][0]["verdicts"]) == laws
 
@@ -120,5 +159,5 @@ def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):
     )
     status, printed, complaint = run(capsys, "--out", str(tmp_path / "out"))
     assert (status, printed) == (1, "")
-    assert "Drake ended the analysis" in complaint
+    assert "the command was ended from within" in complaint
     assert not (tmp_path / "out").exists()

@@ -88,7 +88,7 @@ def test_json_document_page_and_reproduction(capsys, tmp_path):
         ("grid: {law: [magic]}", [], "law", "conventional"),
         ("grid: {sound: [{}, {kind: wav, file: no.wav}]}", [], "sound.file", "no.wav"),
         ("run: 5", [], "run", "did you mean 'runs'"),
-        ("runs: 5", ["--workers", "0"], "workers", "at least 1"),
+        ("runs: 5", ["--workers", "0"], "workers", "between 1 and 256"),
         ("runs: 5", ["--workers", "two"], "command line", "--help"),
         ("runs: 5", ["--scheduler", "tcp://127.0.0.1:9"], "scheduler", "reached"),
         ("runs: 5", ["--scheduler", "nonsense"], "scheduler", "tcp://host:8786"),

@@ -1,4 +1,4 @@
-"""The avoidance formulas of Han 2019 as printed, against geometry and our code.
+"""The avoidance formulas of both papers as printed, against geometry and our code.
 
 Every test stands behind a row of docs/errata.md. What the paper prints is
 transcribed here and nowhere else.
@@ -13,12 +13,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from systems.active_impedance_2017_controller import active_2017_force
 from systems.active_impedance_controller import active_force
 from systems.collision_vector import echo_point, foot_on_segment
+from systems.conventional_impedance_2017_controller import conventional_2017_force
 from systems.conventional_impedance_controller import conventional_force
 from systems.geometry import rotate
 from systems.impedance import repulsion_force
-from systems.repulsion import ActiveParameters, ConventionalParameters
+from systems.repulsion import (
+    Active2017Parameters,
+    ActiveParameters,
+    Conventional2017Parameters,
+    ConventionalParameters,
+)
 from systems.robot import RobotParameters
 from systems.signals import FRAME_PERIOD_S
 
@@ -297,6 +304,32 @@ def test_han_mu_0_is_below_the_closing_speed() -> None:
     assert top_speed + 0.3 == pytest.approx(1.02)
     assert active_force(0.4, top_speed + 0.3, law) == active_force(0.4, 0.72, law)
     assert active_force(0.4, 0.46, law) - active_force(0.4, 0.72, law) > 0.3
+
+
+def test_kim_eq_20_is_bounded_by_the_sensors_alone() -> None:
+    """K_0/c doubles as c halves; ours stops at the sensors' least range, 3 cm."""
+    gains = Conventional2017Parameters(distance_gain_j=1.2, damping_n_s_m=0.8)
+    printed = [1.2 / c for c in (0.12, 0.06, 0.03, 0.015)]
+    assert printed == pytest.approx([10.0, 20.0, 40.0, 80.0])
+    found = [
+        conventional_2017_force(c, 0.0, gains, least_range_m=0.03)
+        for c in (0.12, 0.06, 0.03, 0.015)
+    ]
+    assert found == pytest.approx([10.0, 20.0, 40.0, 40.0])
+
+
+@given(c=st.floats(0.0, 3.0), s=st.floats(0.0, 2.0))
+def test_kim_eq_20_and_21_differ_where_eq_21_saturates(c, s) -> None:
+    """Nearer than 100 mm, and faster than mu_1, here 0.72 m/s: nowhere else."""
+    gains = {"distance_gain_j": 1.2, "damping_n_s_m": 0.8}
+    conventional = conventional_2017_force(
+        c, s, Conventional2017Parameters(**gains), least_range_m=0.03
+    )
+    active = active_2017_force(c, s, Active2017Parameters(**gains))
+    if c >= 0.1 and s <= 0.72:
+        assert active == conventional
+    elif c < 0.0999 or s > 0.7201:
+        assert active < conventional
 
 
 def test_han_table_6_swaps_width_and_length() -> None:

@@ -18,6 +18,7 @@ from analysis.stability.ideal_loop import ideal_scenario
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulate
 from systems.impedance import AttractionParameters
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -47,7 +48,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
     ratio, the follow distance from the overshoot and from the offsets.
 
     Raises:
-        ValueError: Nothing meets the requirements.
+        InputError: Nothing meets the requirements.
     """
     time = scenario.stop.goal_margin_m / scenario.source.speed_m_s
 
@@ -56,9 +57,10 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
 
     low, high = _STIFFNESSES_N_M
     if excess(low) * excess(high) > 0.0:
-        raise ValueError(
-            f"attraction.stiffness_n_m: nothing from {low} to {high} N/m has a damping "
-            f"ratio of {requirements.damping}; change plant.motor_lag_s"
+        raise InputError(
+            "attraction.stiffness_n_m",
+            f"nothing from {low} to {high} N/m has a damping "
+            f"ratio of {requirements.damping}; change plant.motor_lag_s",
         )
     # Rounded up, since damping grows with K_r here: D_r grows along with it.
     K_r = math.ceil(10.0 * brentq(excess, low, high)) / 10.0
@@ -109,9 +111,7 @@ def braking_overshoot(scenario: Scenario) -> float:
         "obstacles": (),
         "start": {},
         "attraction": attraction.model_dump(),
-        # A source that will move: else the run ends where it counts as reached.
-        "source": scenario.source.model_dump()
-        | {"waypoints_m": [[_APPROACH_M, 0.0], [9.0, 0.0]], "start_time_s": 1e3},
+        "source": scenario.source.model_dump() | {"waypoints_m": [[_APPROACH_M, 0.0]]},
     }
     data = ideal_scenario(scenario).model_dump() | changes
     run = simulate(Scenario.model_validate(data))

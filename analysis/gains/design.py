@@ -17,6 +17,7 @@ from analysis.gains.push_and_pull import (
 )
 from analysis.stability.contact_mode import largest_contact_stiffness
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 
 __all__ = [
     "Check",
@@ -119,15 +120,16 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
     """From an obstacle at rho_0 to where the attraction rests, m, at most.
 
     Raises:
-        ValueError: Nothing is left of the source's range.
+        InputError: Nothing is left of the source's range.
     """
     follow = scenario.attraction.follow_distance_m
     reach = scenario.repulsion.conventional.reach_m
     left = requirements.source_range_m - follow - reach
     if left <= 0.0:
-        raise ValueError(
-            f"attraction.follow_distance_m: {follow} m and a reach of {reach} m leave "
-            f"nothing of the {requirements.source_range_m} m to the source; lower it"
+        raise InputError(
+            "attraction.follow_distance_m",
+            f"{follow} m and a reach of {reach} m leave "
+            f"nothing of the {requirements.source_range_m} m to the source; lower it",
         )
     return left
 
@@ -146,7 +148,7 @@ def check_law(
     """Holds a law's gains, as they stand in the scenario, against requirements.
 
     Raises:
-        ValueError: The law has no gains to choose, or see ``metres_to_go``.
+        InputError: The law has no gains to choose, or see ``metres_to_go``.
     """
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)
@@ -158,7 +160,7 @@ def check_law(
             for row in (
                 (
                     "contact stiffness",
-                    stiffest(law, scenario.repulsion),
+                    stiffest(law, scenario),
                     allowed_stiffness(scenario, requirements),
                     "N/m",
                 ),

@@ -72,7 +72,7 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
         axes.plot(_DAMPING_N_S_M, limits, f"k{line}", label=label)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]
-        stiffness = stiffest(law, scenario.repulsion)
+        stiffness = stiffest(law, scenario)
         if stiffness < _STIFFNESS_N_M:
             label = f"{title}: {stiffness:.1f} N/m"
             axes.axhline(stiffness, color=colour, label=label)

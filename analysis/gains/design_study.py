@@ -66,7 +66,7 @@ class Alternative:
             "attraction": attraction,
             **plain,
             "laws": [law.to_dict() for law in self.laws],
-            "jams": [asdict(runs) | {"jams": runs.jams} for runs in self.jams],
+            "jams": [asdict(runs) for runs in self.jams],
         }
 
 

@@ -88,7 +88,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
         ("recommended", study.recommended),
     ):
         text = dump_scenario(alternative.scenario)
-        (directory / f"{name}.yaml").write_text(text)
+        (directory / f"{name}.yaml").write_text(text, "utf-8")
     plot_design(study).savefig(directory / "design.png", dpi=150)
     curves = []
     for term in ("printed", "closing"):

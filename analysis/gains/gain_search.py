@@ -27,6 +27,7 @@ from analysis.gains.push_and_pull import (
     stiffest,
 )
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 from systems.repulsion import RepulsionParameters
 
 __all__ = ["gain_for_barrier", "search_gains"]
@@ -48,13 +49,14 @@ def search_gains(
     attraction, the robot and the sensors.
 
     Raises:
-        ValueError: No gain meets a requirement that has to be met.
+        InputError: No gain meets a requirement that has to be met.
     """
     D_r = scenario.attraction.damping_n_s_m
     # The secant of D_0 s is D_0: it puts back D_0/D_r.
     damping = _rounded(requirements.injected_share * D_r)
     for law, field in (
         ("conventional", "stiffness_n_m"),
+        ("conventional2017", "distance_gain_j"),
         ("active2017", "distance_gain_j"),
     ):
         gain = _rounded(gain_for_barrier(scenario, law, field, requirements), up=True)
@@ -83,7 +85,7 @@ def gain_for_barrier(
         also: Further gains as multiples of this one.
 
     Raises:
-        ValueError: No gain in a sensible range meets it.
+        InputError: No gain in a sensible range meets it.
     """
     to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
 
@@ -154,7 +156,7 @@ def _active_spring(scenario: Scenario, requirements: DesignRequirements) -> Scen
 
     def too_stiff(alpha: float) -> float:
         allowed = allowed_stiffness(scenario, requirements)
-        return stiffest("active", with_alpha(alpha).repulsion) - allowed
+        return stiffest("active", with_alpha(alpha)) - allowed
 
     field = "repulsion.active.reference_stiffness_n_m"
     alpha = _root(too_far, *_ALPHAS_M, field)
@@ -167,9 +169,10 @@ def _root(
     function: Callable[[float], float], low: float, high: float, field: str
 ) -> float:
     if function(low) * function(high) > 0.0:
-        raise ValueError(
-            f"{field}: nothing from {low:g} to {high:g} meets the requirements; "
-            "change attraction or robot"
+        raise InputError(
+            f"{field}",
+            f"nothing from {low:g} to {high:g} meets the requirements; "
+            "change attraction or robot",
         )
     return float(brentq(function, low, high, rtol=1e-6))
 

@@ -18,6 +18,7 @@ from scipy.optimize import brentq
 from analysis.stability.radial_law import RadialLaw, radial_law
 from diagrams import Scenario
 from systems.geometry import control_point
+from systems.input_error import InputError
 
 __all__ = ["HeadOn", "head_on", "radial_equilibria"]
 
@@ -40,15 +41,16 @@ class HeadOn:
         """Where an approach is held up: the farthest stable equilibrium, m.
 
         Raises:
-            ValueError: There is none: the attraction overcomes the obstacle.
+            InputError: There is none: the attraction overcomes the obstacle.
         """
         held = [c for c in self.equilibria_m if self.slope(c) < 0.0]
         if not held:
-            raise ValueError(
-                f"law: {self.law.name!r} does not hold P before an obstacle with "
+            raise InputError(
+                "law",
+                f"{self.law.name!r} does not hold P before an obstacle with "
                 f"{self.to_go_m:.2f} m to go behind it; lower "
                 "attraction.stiffness_n_m, raise the law's stiffness, or bring the "
-                "source nearer"
+                "source nearer",
             )
         return held[0]
 
@@ -77,13 +79,13 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
             to the source, or half the way where there is none.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law has no radial force, or L is negative.
+        InputError: The law is not known.
+        InputError: The law has no radial force, or L is negative.
     """
     if to_go_m is None:
         to_go_m = _to_go(scenario)
     if to_go_m < 0.0:
-        raise ValueError(f"to_go_m: {to_go_m} must not be negative")
+        raise InputError("to_go_m", f"{to_go_m} must not be negative")
     law = radial_law(scenario)
     stiffness = scenario.attraction.stiffness_n_m
     pull = stiffness * (to_go_m + law.distances_m)

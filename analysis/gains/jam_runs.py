@@ -24,11 +24,8 @@ class JamRuns:
     law: str
     causes: dict[str, int]
     """Runs by cause."""
-
-    @property
-    def jams(self) -> int:
-        """Runs that stopped or circled short of the goal."""
-        return self.causes.get("stuck", 0) + self.causes.get("timeout", 0)
+    jams: int
+    """Runs that stopped or circled without ever having come into the goal."""
 
 
 def jam_runs(
@@ -51,8 +48,10 @@ def jam_runs(
     active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
     repulsion = scenario.repulsion.model_copy(update={"active": active})
     done, found = 0, []
+    goal = layout.model_copy(update={"attraction": scenario.attraction}).goal_radius_m
     for law in laws:
         causes: Counter[str] = Counter()
+        jams = 0
         for start in starts_m:
             place = layout.start.model_copy(update={"position_m": (0.0, start)})
             run = simulate(
@@ -66,8 +65,10 @@ def jam_runs(
                 )
             )
             causes[run.cause] += 1
+            came = bool(np.any(run.columns["source_range_true"] <= goal))
+            jams += run.cause in ("stuck", "timeout") and not came
             done += 1
             if progress is not None:
                 progress(done)
-        found.append(JamRuns(law, dict(causes)))
+        found.append(JamRuns(law, dict(causes), jams))
     return found

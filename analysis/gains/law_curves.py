@@ -68,7 +68,7 @@ def law_curves(
         at_distance_m: Distance of the latter, m; half of rho_0.
 
     Raises:
-        ScenarioError: There is no such law.
+        InputError: There is no such law.
     """
     curves = []
     for law in laws:

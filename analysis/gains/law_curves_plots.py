@@ -16,6 +16,7 @@ LAW_STYLES = {
     "none": (COLOURS["empty"], "no avoidance"),
     "conventional": (COLOURS["source"], "conventional"),
     "active": (COLOURS["robot"], "active 2019"),
+    "conventional2017": (COLOURS["echo"], "conventional 2017"),
     "active2017": (COLOURS["estimate"], "active 2017"),
 }
 

@@ -15,7 +15,7 @@ from scipy.optimize import brentq
 
 from analysis.stability.radial_law import law_function
 from diagrams.scenario import Scenario
-from systems.repulsion import RepulsionParameters
+from systems.input_error import InputError
 
 __all__ = [
     "DESIGNED_LAWS",
@@ -34,13 +34,13 @@ __all__ = [
 ]
 
 #: The laws whose gains are to be chosen.
-DESIGNED_LAWS = ("conventional", "active", "active2017")
+DESIGNED_LAWS = ("conventional", "active", "conventional2017", "active2017")
 
 #: Force away from the obstacle, N, at a distance in m.
 Push = Callable[[float], float]
 
 #: Distances at which a push is sampled, m.
-_STEP_M, _FARTHEST_M = 0.005, 3.0
+_STEP_M, _FARTHEST_M = 0.002, 3.0
 #: Speeds at which a velocity term is sampled, as shares of twice the top speed.
 _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
@@ -49,11 +49,11 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
     """``f(c, s)`` of a law with the scenario's gains, N.
 
     Raises:
-        ValueError: The law has no gains to choose.
+        InputError: The law has no gains to choose.
     """
     if law not in DESIGNED_LAWS:
-        raise ValueError(
-            f"law: {law!r} has no gains to be chosen; use {', '.join(DESIGNED_LAWS)}"
+        raise InputError(
+            "law", f"{law!r} has no gains to be chosen; use {', '.join(DESIGNED_LAWS)}"
         )
     return law_function(scenario.model_copy(update={"law": law}))
 
@@ -121,15 +121,20 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
     return 2.0 * (kinetic_energy(scenario) + work) / reach**2
 
 
-def stiffest(law: str, repulsion: RepulsionParameters) -> float:
+def stiffest(law: str, scenario: Scenario) -> float:
     """Largest -df/dc at rest, N/m: the worst distance to rest at.
 
-    K_0 within rho_0; k_ref/e^2 at 2 alpha; K_0/rho_1^2 just outside of rho_1.
+    K_0 within rho_0; k_ref/e^2 at 2 alpha; K_0/c^2 just outside of the sensors'
+    least range (Kim's conventional law) or of rho_1 (his active one).
     """
+    repulsion = scenario.repulsion
     if law == "conventional":
         return repulsion.conventional.stiffness_n_m
     if law == "active":
         return repulsion.active.reference_stiffness_n_m * math.exp(-2.0)
+    if law == "conventional2017":
+        nearest = scenario.ultrasonic.minimum_range_m
+        return repulsion.conventional2017.distance_gain_j / nearest**2
     gains = repulsion.active2017
     return gains.distance_gain_j / gains.saturation_distance_m**2
 

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from io import StringIO
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field, Strict, ValidationError, model_validator
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
 
+from diagrams.yaml_text import parse_yaml
 from systems.acoustics import AcousticParameters
 from systems.array_shape import ArrayShape
+from systems.input_error import InputError
 from systems.parameters import Parameters, Point, Positive
 
 __all__ = ["ArrayGeometry", "load_geometry"]
 
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
+
+# The work grows with the number of pairs.
+_MOST_MICROPHONES = 64
 
 _LEAST_BAND_HZ = 500.0
 
@@ -45,30 +47,39 @@ class ArrayGeometry(Parameters):
     @model_validator(mode="after")
     def _check(self) -> ArrayGeometry:
         count = len(self.microphones)
+        if count > _MOST_MICROPHONES:
+            raise InputError(
+                "microphones",
+                f"{count} given; give at most {_MOST_MICROPHONES}, and name their "
+                "columns in 'channels'",
+            )
         if self.channels is not None:
             if len(self.channels) != count:
-                raise ValueError(
-                    f"channels: {len(self.channels)} named for {count} microphones; "
-                    "name one for each"
+                raise InputError(
+                    "channels",
+                    f"{len(self.channels)} named for {count} microphones; "
+                    "name one for each",
                 )
             if len(set(self.channels)) != count:
-                raise ValueError("channels: one is named twice; name each once")
+                raise InputError("channels", "one is named twice; name each once")
         if self.sound_speed is not None and self.temperature_c is not None:
-            raise ValueError(
-                "sound_speed: given together with temperature_c; keep one of them"
+            raise InputError(
+                "sound_speed", "given together with temperature_c; keep one of them"
             )
         if self.band is not None and self.band[0] >= self.band[1]:
-            raise ValueError("band: must rise, as [300, 8000]")
+            raise InputError("band", "must rise, as [300, 8000]")
         if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
-            raise ValueError(
-                f"band: {list(self.band)} is too narrow to tell delays; give at least "
-                f"{_LEAST_BAND_HZ:g} Hz"
+            raise InputError(
+                "band",
+                f"{list(self.band)} is too narrow to tell delays; give at least "
+                f"{_LEAST_BAND_HZ:g} Hz",
             )
         aperture = ArrayShape.of(self.microphones).aperture_m
         if aperture > _LARGEST_M:
-            raise ValueError(
-                f"microphones: {aperture:g} m apart; give positions in m, at most "
-                f"{_LARGEST_M:g} m apart"
+            raise InputError(
+                "microphones",
+                f"{aperture:g} m apart; give positions in m, at most "
+                f"{_LARGEST_M:g} m apart",
             )
         return self
 
@@ -93,32 +104,31 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
             ``sound_speed`` or ``temperature_c``, and ``band``.
 
     Raises:
-        ValueError: The file is missing, not YAML or makes no sense; the
+        InputError: The file is missing, not YAML or makes no sense; the
             message names the field and the remedy.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8")
-        content = YAML(typ="safe").load(StringIO(text))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ValueError(
-            f"geometry: cannot read {str(path)!r} ({error}); give the path of a "
-            "YAML file"
+        content = parse_yaml(path.read_text(encoding="utf-8"), "geometry")
+    except InputError as error:
+        raise InputError(
+            "geometry", f"{str(path)!r} is not YAML that can be used; {error.message}"
         ) from None
-    except YAMLError as error:
-        reason = " ".join(str(error).split())
-        raise ValueError(
-            f"geometry: {str(path)!r} is not YAML ({reason}); see the documentation"
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(
+            "geometry",
+            f"cannot read {str(path)!r} ({error}); give the path of a YAML file",
         ) from None
     if not isinstance(content, dict) or "microphones" not in content:
-        raise ValueError(
-            f"geometry: {str(path)!r} names no microphones; write for instance "
-            "'microphones: [[0, 0.4], [0, 0], [0, -0.4]]'"
+        raise InputError(
+            "geometry",
+            f"{str(path)!r} names no microphones; write for instance "
+            "'microphones: [[0, 0.4], [0, 0], [0, -0.4]]'",
         )
     try:
         return ArrayGeometry(**content)
     except ValidationError as error:
-        raise ValueError(f"geometry: {str(path)!r}: {_first_error(error)}") from None
+        raise InputError("geometry", f"{str(path)!r}: {_first_error(error)}") from None
 
 
 def _first_error(error: ValidationError) -> str:

@@ -115,9 +115,9 @@ class Listener:
         p_WS = self._scenario.source.path().pose(0.0)[:2]
         p_BA = microphones_B(self._scenario.robot).mean(axis=0)
         p_WB = p_WS - p_AS - p_BA
-        plant = self._follower.blocks["plant"]
-        state = [*p_WB, *np.zeros(5)]
-        plant.GetMyMutableContextFromRoot(root).SetContinuousState(state)
+        plant = self._follower.blocks["plant"].GetMyMutableContextFromRoot(root)
+        at_rest = np.zeros(plant.num_continuous_states() - len(p_WB))
+        plant.SetContinuousState([*p_WB, *at_rest])
 
     def _redraw_errors(self, root: Any, tick: int, speed_tolerance: float) -> None:
         scenario = self._scenario

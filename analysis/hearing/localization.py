@@ -21,6 +21,7 @@ from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
 from diagrams import Scenario, load_scenario
 from systems.array_shape import ArrayShape
+from systems.input_error import InputError
 
 __all__ = [
     "ESTIMATORS",
@@ -63,8 +64,8 @@ ESTIMATORS: dict[str, dict[str, Any]] = {
         "suppress_echoes": False,
         "maximum_closure_s": 1.0,
         "maximum_ambiguity": 1.0,
-        "maximum_bearing_std_deg": 1e9,
-        "maximum_relative_range_std": 1e9,
+        "maximum_bearing_std_deg": 1e6,
+        "maximum_relative_range_std": 1e6,
     },
     "fast": {"method": "gcc"},
     "ml": {"method": "ml"},
@@ -178,7 +179,7 @@ class LocalizationExperiment:
             Cells by place, then by estimator.
 
         Raises:
-            ValueError: The sound cannot be played.
+            InputError: The sound cannot be played.
         """
         listeners = [
             (name, Listener(_with_estimator(self.scenario, name)))
@@ -219,10 +220,10 @@ def prepare_localization(
         tolerances: Whether the array has errors within REALISTIC_TOLERANCES.
 
     Raises:
-        ValueError: An override, or the number of trials, is wrong.
+        InputError: An override, or the number of trials, is wrong.
     """
     if not 2 <= trials <= _MOST_TRIALS:
-        raise ValueError(f"trials: {trials} must lie between 2 and {_MOST_TRIALS}")
+        raise InputError("trials", f"{trials} must lie between 2 and {_MOST_TRIALS}")
     own = REALISTIC_TOLERANCES if tolerances else ()
     return LocalizationExperiment(
         scenario=load_scenario("default", [*_SETTING, *own, *overrides]),

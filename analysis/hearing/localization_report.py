@@ -33,7 +33,7 @@ def localization_summary(
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.microphones, scenario.acoustics.c
     # Whatever the errors of the array do to a range is to be seen.
-    tdoa = scenario.tdoa.model_copy(update={"maximum_relative_range_std": 1e9})
+    tdoa = scenario.tdoa.model_copy(update={"maximum_relative_range_std": 1e6})
     estimate = frame_estimator(tdoa, shape, c)
     return {
         "schema_version": SCHEMA_VERSION,
@@ -69,7 +69,9 @@ def write_localization(
     """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``."""
     from analysis.hearing.localization_plots import plot_localization
 
-    (directory / "scenario.yaml").write_text(dump_scenario(experiment.scenario))
+    (directory / "scenario.yaml").write_text(
+        dump_scenario(experiment.scenario), "utf-8"
+    )
     (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
     plot_localization(cells).savefig(directory / "localization.png", dpi=150)
 

@@ -10,11 +10,13 @@ from numpy.typing import NDArray
 from analysis.hearing.array_geometry import ArrayGeometry, load_geometry
 from analysis.hearing.locate_result import LocateResult, SourceEstimate
 from analysis.hearing.recording_faults import channels_without_faults
-from analysis.hearing.recording_search import RecordingSearch
+from analysis.hearing.recording_search import RecordingSearch, Sighting
 from analysis.hearing.recording_spectra import RecordingSpectra
 from analysis.hearing.source_placement import place_source
+from analysis.hearing.wavefront_misfit import late_channel
 from systems.array_shape import ArrayShape
 from systems.channel_faults import ChannelFault, find_channel_faults
+from systems.input_error import InputError
 from systems.sound_file import read_sound
 
 __all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
@@ -33,6 +35,9 @@ _TOP_OF_RATE = 0.45
 _SNAPSHOTS = (8, 32, 128)
 _LEAST_ESTIMATES = 3
 
+# Faults that make channels seem late.
+_EXPLAINS_LATENESS = ("size", "near")
+
 
 def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
     """Locates the source of a recording, stretch by stretch.
@@ -48,22 +53,26 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         make. These are not in the standard deviations.
 
     Raises:
-        ValueError: The recording cannot be used; says why, and the remedy.
+        InputError: The recording cannot be used; says why, and the remedy.
     """
     geometry = geometry or ArrayGeometry()
     samples, rate = read_sound(path, "recording")
-    where = f"recording: {str(path)!r}"
+    where = repr(str(path))
     _check_recording(samples, rate, geometry, where)
     shape = ArrayShape.of(geometry.microphones)
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
     recording, faults = _recording(channels, rate, shape, geometry, where)
     if not recording.starts.size:
-        raise ValueError(
+        raise InputError(
+            "recording",
             f"{where} has {samples.shape[1]} samples, less than one frame of "
-            f"{recording.window.size}; record longer"
+            f"{recording.window.size}; record longer",
         )
-    search, estimates = _estimates(recording, shape, geometry.c)
+    search, sightings, estimates = _estimates(recording, shape, geometry.c)
+    late = late_channel(sightings, shape, geometry.c)
+    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        faults.append(late)
     array = {
         "microphones": [list(place) for place in geometry.microphones],
         "channels": list(geometry.columns),
@@ -108,17 +117,18 @@ def _recording(
 
 def _estimates(
     recording: RecordingSpectra, shape: ArrayShape, c: float
-) -> tuple[RecordingSearch, list[SourceEstimate]]:
+) -> tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]:
     """By the shortest stretches in which something is heard often enough."""
-    best: tuple[RecordingSearch, list[SourceEstimate]] | None = None
+    best: tuple[RecordingSearch, list[Sighting], list[SourceEstimate]] | None = None
     for snapshots in _SNAPSHOTS:
         search = RecordingSearch(recording, shape, c, snapshots)
-        placed = ((s.t_s, place_source(s, shape, c)) for s in search.sightings())
+        sightings = list(search.sightings())
+        placed = ((s.t_s, place_source(s, shape, c)) for s in sightings)
         found = [SourceEstimate.of(t_s, fix) for t_s, fix in placed if fix is not None]
-        if best is None or len(found) > len(best[1]):
-            best = search, found
+        if best is None or len(found) > len(best[2]):
+            best = search, sightings, found
         if len(found) >= min(_LEAST_ESTIMATES, len(search.stretches)):
-            return search, found
+            break
     assert best is not None
     return best
 
@@ -128,30 +138,41 @@ def _check_recording(
 ) -> None:
     count, needed = len(samples), len(geometry.microphones)
     if geometry.channels is not None and max(geometry.channels) >= count >= needed:
-        raise ValueError(
+        raise InputError(
+            "recording",
             f"{where} has {count} channels, numbers 0 to {count - 1}; 'channels' in "
-            f"the geometry file counts from 0 and names {max(geometry.channels)}"
+            f"the geometry file counts from 0 and names {max(geometry.channels)}",
         )
     if max(geometry.columns) >= count:
         what = "is mono" if count == 1 else f"has {count} channels"
-        raise ValueError(
+        raise InputError(
+            "recording",
             f"{where} {what}, but the array needs "
             f"{max(needed, max(geometry.columns) + 1)}; record every microphone on a "
-            "channel of its own"
+            "channel of its own",
         )
     if geometry.channels is None and count > needed:
-        raise ValueError(
-            f"{where} has {count} channels, but the array {needed} microphones; name "
-            "the channels to use in the geometry file, as "
+        default = geometry.microphones == ArrayGeometry().microphones
+        remedy = (
+            "give the places of its microphones by --geometry FILE"
+            if default
+            else "name the channels to use in the geometry file, as "
             f"'channels: {list(range(needed))}'"
         )
+        whose = "the robot's own array" if default else "the array"
+        raise InputError(
+            "recording",
+            f"{where} has {count} channels, but {whose} {needed} microphones; {remedy}",
+        )
     if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
-        raise ValueError(
+        raise InputError(
+            "recording",
             f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "
-            f"{_RATES_HZ[1]} Hz"
+            f"{_RATES_HZ[1]} Hz",
         )
     if geometry.band is not None and rate < 2.0 * geometry.band[1]:
-        raise ValueError(
+        raise InputError(
+            "recording",
             f"{where} has a sample rate of {rate} Hz, below twice the band's upper end "
-            f"of {geometry.band[1]:g} Hz; lower the band or record at a higher rate"
+            f"of {geometry.band[1]:g} Hz; lower the band or record at a higher rate",
         )

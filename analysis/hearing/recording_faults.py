@@ -9,11 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.channel_faults import ChannelFault
+from systems.input_error import InputError
 
 __all__ = ["channels_without_faults"]
 
 # What leaves nothing to locate with.
-_FATAL = ("nan", "dead", "copied")
+_FATAL = ("nan", "dead", "copied", "units")
+
+# Channels that one message names.
+_MOST_NAMED = 8
 
 
 def channels_without_faults(
@@ -38,15 +42,17 @@ def channels_without_faults(
         The channels, and the faults that remain worth saying.
 
     Raises:
-        ValueError: Channels are dead, not finite, copies, or exchanged.
+        InputError: Channels are dead, not finite, copies, or exchanged; or positions
+            are not in metres.
     """
     fatal = [fault for fault in faults if fault.kind in _FATAL]
     if fatal:
         first, *rest = fatal
         further = sorted({k + 1 for f in rest for k in f.channels if f is not first})
-        names = ", ".join(map(str, further))
+        names = ", ".join(map(str, further[:_MOST_NAMED]))
+        names += " ..." if len(further) > _MOST_NAMED else ""
         more = f"; see to channels {names} as well" if rest else ""
-        raise ValueError(f"{where}: {first.message}{more}")
+        raise InputError("recording", f"{where}: {first.message}{more}")
     inverted = [k for f in faults if f.kind == "inverted" for k in f.channels]
     if inverted:
         samples = samples.copy()
@@ -56,7 +62,7 @@ def channels_without_faults(
         if fault.kind != "swapped":
             kept.append(fault)
         elif _fits_better_exchanged(samples, fault.channels, agreement):
-            raise ValueError(f"{where}: {fault.message}")
+            raise InputError("recording", f"{where}: {fault.message}")
     return samples, kept
 
 

@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 
 from analysis.hearing.recording_search import Sighting
 from systems.array_shape import ArrayShape
@@ -20,7 +21,7 @@ from systems.multilateration import locate_source
 from systems.source_fix import SourceFix
 from systems.steered_response import NEAREST_M
 
-__all__ = ["place_source"]
+__all__ = ["inverse_range_std", "place_source", "tolerance"]
 
 # What is not known of the speed of sound, of the microphones' places in m, and
 # the share by which reflections alone would shorten the delays.
@@ -59,16 +60,10 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
         bearing cannot be told.
     """
     tau, covariance = sighting.tau, sighting.covariance
-    shrink = _SPEED_TOLERANCE**2
-    shrink += (_REFLECTION_SHARE * (1.0 - min(sighting.coherence, 1.0))) ** 2
-    count = len(tau)
-    tolerance = shrink * np.outer(tau, tau)
-    tolerance += (_PLACE_TOLERANCE_M / c) ** 2 * (np.eye(count) + 1.0)
-    bent = min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
-    far = locate_far_source(
-        tau, covariance, shape, c, tolerance, inverse_range_std=bent
-    )
-    near = locate_source(tau, covariance + tolerance, shape, c)
+    allowed = tolerance(sighting, c)
+    bent = inverse_range_std(shape)
+    far = locate_far_source(tau, covariance, shape, c, allowed, inverse_range_std=bent)
+    near = locate_source(tau, covariance + allowed, shape, c)
     if (
         near.range_valid
         and near.range >= NEAREST_M
@@ -83,13 +78,27 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
         lifted = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
         far = _level(
             locate_far_source(
-                tau, covariance, lifted, c, tolerance, inverse_range_std=bent
+                tau, covariance, lifted, c, allowed, inverse_range_std=bent
             )
         )
-        within = locate_far_source(tau, covariance + tolerance, lifted, c)
+        within = locate_far_source(tau, covariance + allowed, lifted, c)
         if within.bearing_std > _LARGEST_STD_RAD:
             return None
     return far if far.chi_square < _limit(shape.freedom + 1) else None
+
+
+def tolerance(sighting: Sighting, c: float) -> NDArray[np.float64]:
+    """(n - 1, n - 1) of delays, by what is not known of the air and the array, s^2."""
+    tau = sighting.tau
+    shrink = _SPEED_TOLERANCE**2
+    shrink += (_REFLECTION_SHARE * (1.0 - min(sighting.coherence, 1.0))) ** 2
+    places = (_PLACE_TOLERANCE_M / c) ** 2 * (np.eye(len(tau)) + 1.0)
+    return shrink * np.outer(tau, tau) + places
+
+
+def inverse_range_std(shape: ArrayShape) -> float:
+    """Of a source that was not heard yet, 1/m."""
+    return min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
 
 
 def _limit(freedom: int) -> float:

@@ -18,9 +18,11 @@ from analysis.runs.smoothness import (
     windows,
 )
 from diagrams.simulation import RunResult
+from diagrams.stop_rules import ROUNDING_S
+from systems.geometry import control_point_velocity
 from systems.signals import FRAME_PERIOD_S
 
-__all__ = ["following_error", "run_metrics"]
+__all__ = ["following_error", "frames_with_sound", "run_metrics"]
 
 #: A detection is off when it is farther from the source than this, m.
 OUTLIER_M = 0.5
@@ -45,6 +47,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_following_metrics(result),
         **_smoothness_metrics(result),
         **_effort_metrics(result),
+        **_odometry_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
         **_collision_metrics(result),
         **_hearing_metrics(result),
@@ -70,25 +73,41 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 def _goal_metrics(result: RunResult) -> dict[str, float | None]:
     """The goal: the radius of a resting source, the band of a moving one."""
-    scenario, columns, time = result.scenario, result.columns, result.time
-    source = scenario.bodies()["source"]
-    goal = scenario.goal_radius_m
-    if source.path.moves:
-        goal = scenario.attraction.follow_distance_m + scenario.stop.following_band_m
-    inside = columns["source_range_true"] <= goal
-    entries, exits = np.flatnonzero(inside), np.flatnonzero(~inside)
-    last_entry = int(exits[-1]) + 1 if len(exits) else 0
+    columns, moves = result.columns, result.scenario.source.path().moves
+    inside = columns["source_range_true"] <= result.scenario.goal_radius_m
+    entries = np.flatnonzero(inside)
     steps = np.hypot(np.diff(columns["p_WB_x"]), np.diff(columns["p_WB_y"]))
     length = float(np.sum(steps))
-    shortest = None if source.path.moves else _shortest_path(result)
+    shortest = None if moves else _shortest_path(result)
     return {
-        "time_to_goal_s": float(time[entries[0]]) if len(entries) else None,
-        "settling_time_s": float(time[last_entry]) if inside[-1] else None,
+        "time_to_goal_s": float(result.time[entries[0]]) if len(entries) else None,
+        "settling_time_s": _settling_time(result, inside),
         "path_length_m": length,
         "shortest_path_m": shortest,
         "spl": None if shortest is None else _spl(result.cause, length, shortest),
         "final_distance_m": float(columns["source_range_true"][-1]),
     }
+
+
+def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None:
+    """Since when P has been in the goal and, where the source rests, at rest."""
+    stop, settled, least = result.scenario.stop, inside, 0.0
+    if not result.scenario.source.path().moves:
+        settled = inside & (_speed_of_P(result) < stop.rest_speed_m_s)
+        least = stop.rest_time_s - ROUNDING_S
+    exits = np.flatnonzero(~settled)
+    first = int(exits[-1]) + 1 if len(exits) else 0
+    if first == len(settled) or result.time[-1] - result.time[first] < least:
+        return None
+    return float(result.time[first])
+
+
+def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
+    """(n,) m/s."""
+    columns = result.columns
+    velocity = columns["v_WB_x"], columns["v_WB_y"], columns["omega_WB"]
+    offset = result.scenario.robot.control_point_m
+    return np.hypot(*control_point_velocity(columns["theta_WB"], velocity, offset))
 
 
 def _shortest_path(result: RunResult) -> float | None:
@@ -107,7 +126,10 @@ def _shortest_path(result: RunResult) -> float | None:
 
 
 def _spl(cause: str, length: float, shortest: float) -> float:
-    """One run's term of SPL (Anderson et al. 2018): its mean over runs is SPL."""
+    """One run's term of SPL (Anderson et al. 2018): its mean over runs is SPL.
+
+    The whole way to the rest counts, swinging in the goal included.
+    """
     if cause != "reached":
         return 0.0
     longest = max(length, shortest)
@@ -115,13 +137,18 @@ def _spl(cause: str, length: float, shortest: float) -> float:
 
 
 def _following_metrics(result: RunResult) -> dict[str, float | None]:
-    """From the end of the second burst on."""
+    """From the end of the second burst on; the share from the first detection on."""
     sound, columns = result.scenario.sound, result.columns
     settled = result.time >= sound.start_s + sound.period_s + sound.on_s
-    error = np.abs(following_error(result)[settled])
-    bearing = np.degrees(columns["source_bearing_true"][settled])
+    errors = np.abs(following_error(result))
+    following = errors <= result.scenario.stop.following_band_m
+    since_heard = np.maximum.accumulate(columns["target_valid"] > 0.5)
+    error, bearing = (
+        errors[settled],
+        np.degrees(columns["source_bearing_true"][settled]),
+    )
     return {
-        "following_fraction": _mean(error <= result.scenario.stop.following_band_m),
+        "following_fraction": _mean(following[since_heard]),
         "following_error_rms_m": _rms(error),
         "following_error_p95_m": _quantile(error, 0.95),
         "following_bearing_rms_deg": _rms(bearing),
@@ -183,6 +210,27 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     }
 
 
+def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
+    """How far the robot is from where its wheels tell it to be."""
+    columns = result.columns
+    error = np.hypot(
+        columns["p_WB_estimated_x"] - columns["p_WB_x"],
+        columns["p_WB_estimated_y"] - columns["p_WB_y"],
+    )
+    turned = columns["theta_WB_estimated"] - columns["theta_WB"]
+    slip = None
+    if result.scenario.plant.friction is not None:
+        wheels = np.stack([columns["slip_left"], columns["slip_right"]])
+        speeds = np.hypot(wheels, columns["slip_sideways"])
+        slip = float(np.sum(np.mean(speeds, axis=0))) * FRAME_PERIOD_S
+    return {
+        "odometry_error_rms_m": _rms(error),
+        "odometry_error_final_m": float(error[-1]),
+        "odometry_heading_error_rms_deg": _rms(np.degrees(turned)),
+        "slip_way_m": slip,
+    }
+
+
 def _reaction_distance(proximity: Proximity) -> float | None:
     """From P to the nearest obstacle when the law first pushes back from it."""
     columns = proximity.result.columns
@@ -216,8 +264,8 @@ def _collision_metrics(result: RunResult) -> dict[str, float | None]:
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:
-    """How good the fresh estimates were."""
-    columns = result.columns
+    """How many frames with sound were heard, and how good the fresh estimates were."""
+    columns, sounding = result.columns, frames_with_sound(result)
     heard = columns["detected"] > 0.5
     ranged = heard & (columns["range_valid"] > 0.5)
     error = np.hypot(
@@ -226,12 +274,34 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
     )
     off = error[ranged] > OUTLIER_M
     return {
+        "frames_with_sound": int(np.count_nonzero(sounding)),
+        "frames_with_sound_heard": int(np.count_nonzero(sounding & heard)),
         "detections": int(np.count_nonzero(heard)),
         "detections_with_range": int(np.count_nonzero(ranged)),
         "source_error_median_m": _quantile(error[ranged], 0.5),
         "source_error_p95_m": _quantile(error[ranged], 0.95),
         "source_outlier_fraction": _mean(off),
     }
+
+
+def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
+    """(n,) whether the frame that a tick's estimate is of held sound for half or more.
+
+    The sound arrives by what it takes for the way, but with ideal hearing, and the
+    estimate a tick after the frame's end. The gate tells: a recording's own pauses
+    count as sound.
+    """
+    scenario, time = result.scenario, result.time
+    travel = np.zeros(len(time))
+    if scenario.hearing == "audio":
+        # The distance as it was at the frame's end, half a frame too late.
+        travel[1:] = result.columns["source_range_true"][:-1] / scenario.acoustics.c
+    elif not scenario.ideal_hearing.burst_gaps:
+        return time >= 0.5 * FRAME_PERIOD_S
+    sounds: NDArray[np.bool_] = scenario.sound.sounds(
+        time - 1.5 * FRAME_PERIOD_S - travel
+    )
+    return sounds
 
 
 def _least(values: NDArray[np.float64]) -> float | None:

@@ -19,6 +19,7 @@ from analysis.runs.trajectory_artists import (
     times_apart,
 )
 from diagrams import RunResult
+from systems.input_error import InputError
 
 __all__ = ["plot_time_series", "plot_trajectory"]
 
@@ -97,9 +98,10 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     panels = [_range, _bearing, _forces, _speeds, _turning]
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
     if distance is not None and distance.shape != result.time.shape:
-        raise ValueError(
-            f"clearance: {distance.shape} values for {result.time.shape} ticks; "
-            "give the clearance of the same run (analysis.runs.proximity)"
+        raise InputError(
+            "clearance",
+            f"{distance.shape} values for {result.time.shape} ticks; "
+            "give the clearance of the same run (analysis.runs.proximity)",
         )
     rows = len(panels) + (distance is not None)
     figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from analysis.runs.metrics import run_metrics
+from analysis.runs.plain_values import plain
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
 
@@ -34,7 +35,7 @@ def versions() -> dict[str, str]:
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     """The JSON document of a run."""
     collision = result.collision
-    return {
+    document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.scenario.name,
         "law": result.scenario.law,
@@ -55,6 +56,8 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
         "versions": versions(),
         "out": str(out) if out is not None else None,
     }
+    summary: dict[str, Any] = plain(document)
+    return summary
 
 
 def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
@@ -68,8 +71,10 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     from analysis.runs.replay import write_replay
     from analysis.runs.run_plots import plot_time_series, plot_trajectory
 
-    (directory / "scenario.yaml").write_text(dump_scenario(result.scenario))
-    (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    (directory / "scenario.yaml").write_text(dump_scenario(result.scenario), "utf-8")
+    (directory / "summary.json").write_text(
+        json.dumps(summary, indent=2, allow_nan=False) + "\n"
+    )
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
     plot_time_series(result, Proximity(result).clearance).savefig(
@@ -96,8 +101,9 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
         "following": _percent(metrics["following_fraction"])
         + f" of the time within {stop.following_band_m:.2f} m of it",
         "following error": _metres(metrics["following_error_rms_m"]) + " rms",
-        "frames heard": f"{metrics['detections']}, "
-        f"{metrics['detections_with_range']} of them with a range",
+        "frames heard": f"{metrics['frames_with_sound_heard']} of "
+        f"{metrics['frames_with_sound']} with sound; "
+        f"{metrics['detections_with_range']} of {metrics['detections']} with a range",
         "position error": _metres(metrics["source_error_median_m"])
         + " median, "
         + _metres(metrics["source_error_p95_m"])

@@ -37,6 +37,10 @@ SUCCESSES = (
     "control_effort_rms_n",
     "wheel_variation_m_s2",
     "saturated_fraction",
+    "odometry_error_rms_m",
+    "odometry_error_final_m",
+    "odometry_heading_error_rms_deg",
+    "slip_way_m",
 )
 
 

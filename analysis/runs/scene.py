@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from diagrams import RunResult, Scenario
 from diagrams.scenario import robot_rectangle
 from systems.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+from systems.input_error import InputError
 from systems.obstacles import ObstacleParameters
 
 __all__ = [
@@ -105,11 +106,11 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     """Where the robot touched what it hit, (2,) in W, m.
 
     Raises:
-        ValueError: The run had no collision.
+        InputError: The run had no collision.
     """
     hit, scenario = result.collision, result.scenario
     if hit is None:
-        raise ValueError(f"contact_point: the run ended by {result.cause!r}")
+        raise InputError("contact_point", f"the run ended by {result.cause!r}")
     body = scenario.bodies()[hit.object].rectangle(hit.time)
     pose = result.poses("WB")[tick_at(result, hit.time)]
     footprint = robot_rectangle(pose, scenario.robot)

@@ -21,6 +21,7 @@ from analysis.stability.open_loops import DIRECTIONS, Direction
 from analysis.stability.operating_points import OperatingPoint, motion_model
 from diagrams.scenario import Scenario
 from systems.geometry import control_point
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -118,7 +119,7 @@ def burst_cycle(
         point: The equilibrium, where it is known already.
 
     Raises:
-        ValueError: The cycle is no whole number of ticks, or has no sound; or
+        InputError: The cycle is no whole number of ticks, or has no sound; or
             there is no stable equilibrium.
     """
     point = point or follow_equilibrium(scenario)
@@ -127,9 +128,10 @@ def burst_cycle(
     gap = sound.period_s - sound.on_s if gap_s is None else gap_s
     ticks = (on + gap) / FRAME_PERIOD_S
     if on <= 0.0 or gap < 0.0 or abs(ticks - round(ticks)) > 1e-6:
-        raise ValueError(
-            f"sound: {on:g} s of sound and {gap:g} s of silence make no cycle of whole "
-            f"ticks; give multiples of {FRAME_PERIOD_S} s, and some sound"
+        raise InputError(
+            "sound",
+            f"{on:g} s of sound and {gap:g} s of silence make no cycle of whole "
+            f"ticks; give multiples of {FRAME_PERIOD_S} s, and some sound",
         )
     loop = ideal_loop(_with_bursts(point.loop.scenario, hold, on, on + gap))
     state = _settled(loop, point, round(ticks))

@@ -17,6 +17,7 @@ from analysis.stability.diagram_trials import DiagramTrials, try_diagram
 from analysis.stability.energy_certificate import certify_energy
 from analysis.stability.sos_region import SosRegion, sos_region
 from diagrams import load_scenario
+from systems.input_error import InputError
 
 __all__ = ["CertificateRow", "certificate_rows", "certificate_table"]
 
@@ -44,6 +45,7 @@ def certificate_rows(
     starts: int = 10_000,
     diagram_starts: int = 200,
     hearing: str = "audio",
+    settings: Sequence[str] = (),
     progress: Callable[[str], None] | None = None,
 ) -> list[CertificateRow]:
     """Certifies and tries each law.
@@ -54,16 +56,17 @@ def certificate_rows(
         starts: Simulated starts inside each certified set.
         diagram_starts: Runs of the full diagram.
         hearing: ``audio`` or ``ideal``, of those.
+        settings: Further fields of the scenario, ``key=value``.
         progress: Called with what is begun.
 
     Raises:
-        ScenarioError: There is no such scenario or law.
+        InputError: There is no such scenario or law.
         ValueError: A law has no certificate.
     """
     say = progress or (lambda text: None)
     rows = []
     for law in laws:
-        scenario = load_scenario(scenario_name, [f"law={law}"])
+        scenario = load_scenario(scenario_name, [f"law={law}", *settings])
         say(f"{law}: certificate and {starts} starts")
         certificate = certify_energy(scenario)
         trials = try_certificate(certificate, starts=starts)
@@ -73,7 +76,7 @@ def certificate_rows(
         region: SosRegion | str
         try:
             region = sos_region(scenario, starts=starts)
-        except ValueError as error:
+        except InputError as error:
             region = str(error)
         rows.append(CertificateRow(law, trials, diagram, region))
     return rows
@@ -186,6 +189,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--starts", type=int, default=10_000, metavar="N")
     parser.add_argument("--diagram", type=int, default=200, metavar="N")
     parser.add_argument("--hearing", choices=("audio", "ideal"), default="audio")
+    parser.add_argument("--set", action="append", default=[], metavar="KEY=VALUE")
     parser.add_argument("--pictures", metavar="DIR", type=Path, help="draw there")
     options = parser.parse_args(arguments)
     try:
@@ -195,9 +199,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
             starts=options.starts,
             diagram_starts=options.diagram,
             hearing=options.hearing,
+            settings=options.set,
             progress=lambda text: _say(sys.stderr, text),
         )
-    except ValueError as error:
+    except InputError as error:
         parser.error(str(error))
     _say(sys.stdout, certificate_table(rows))
     if options.pictures is not None:

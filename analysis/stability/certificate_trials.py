@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from analysis.stability.energy_certificate import EnergyCertificate
 from analysis.stability.point_mass import PointMassRuns
+from systems.input_error import InputError
 
 __all__ = ["BATCH", "CertificateTrials", "draw_starts", "try_certificate"]
 
@@ -119,10 +120,10 @@ def try_certificate(
         duration_s: Simulated time of each, s.
 
     Raises:
-        ValueError: There is nothing to try.
+        InputError: There is nothing to try.
     """
     if starts < 1:
-        raise ValueError(f"starts: {starts} must be at least 1")
+        raise InputError("starts", f"{starts} must be at least 1")
     rng = np.random.default_rng(certificate.scenario.seed)
     inside: list[NDArray[np.float64]] = []
     outside: list[NDArray[np.float64]] = []

@@ -23,6 +23,7 @@ from pydrake.systems.primitives import Linearize
 from scipy.optimize import brentq
 
 from analysis.stability.block_models import block_model
+from analysis.stability.ideal_scenarios import require_rolling
 from analysis.stability.linear_models import LinearModel
 from analysis.stability.model_reduction import minimal_model
 from diagrams.scenario import Scenario
@@ -65,8 +66,12 @@ def motion_chain(
         scenario: Robot and plant are used.
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
         period_s: In place of the 25 ms tick, s.
+
+    Raises:
+        ValueError: The wheels can slip.
     """
     plant = scenario.plant
+    require_rolling(plant)
     if motor_lag_s is not None:
         plant = plant.model_copy(update={"motor_lag_s": motor_lag_s})
     return _chain(scenario.robot, plant, period_s)

@@ -115,7 +115,7 @@ def contact_oscillation(
         duration_s: Simulated time, s.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: There is no contact equilibrium.
     """
     contact = head_on(scenario, to_go_m=to_go_m)
@@ -136,7 +136,7 @@ def simulate_oscillation(
     """Runs the all-ideal build head-on from rest, and takes its cycles apart.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
     """
     result = simulate(_head_on_scenario(contact, term, start_m, duration_s))
     face = contact.scenario.robot.control_point_m + start_m

@@ -19,10 +19,11 @@ from scipy.optimize import brentq
 
 from analysis.stability.linear_models import LinearModel
 from analysis.stability.linearisation import plant_derivatives
-from analysis.stability.loop_margins import loop_margins
+from analysis.stability.loop_margins import is_loop, loop_margins
 from analysis.stability.model_reduction import minimal_model
 from analysis.stability.open_loops import Direction, closed, cut_model, open_loop
 from analysis.stability.operating_points import OperatingPoint
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -189,17 +190,22 @@ def delay_margin(
     """The smallest delay at which the loop stops decaying.
 
     Raises:
-        ValueError: The loop oscillates without any delay already.
+        InputError: The loop oscillates without any delay already.
     """
     loop = DelayedLoop(point, at, direction)
     if loop.spectral_radius(0.0) >= 1.0:
-        raise ValueError(
-            f"{at}, {direction}: the loop is unstable without a delay, and has no "
-            "delay margin; take a stable operating point (follow_equilibrium)"
+        raise InputError(
+            f"{at}, {direction}",
+            "the loop is unstable without a delay, and has no "
+            "delay margin; take a stable operating point (follow_equilibrium)",
         )
-    guess = loop_margins(open_loop(point, at, direction)).delay_margin_s
+    none = DelayMargin(at, direction, math.inf, math.nan)
+    opened = open_loop(point, at, direction)
+    if not is_loop(opened):
+        return none
+    guess = loop_margins(opened).delay_margin_s
     if not guess < _LONGEST_S:
-        return DelayMargin(at, direction, math.inf, math.nan)
+        return none
 
     def excess(delay_s: float) -> float:
         return loop.spectral_radius(delay_s) - 1.0
@@ -209,5 +215,7 @@ def delay_margin(
         low = max(0.0, low - FRAME_PERIOD_S)
     while excess(high) < 0.0:
         high += FRAME_PERIOD_S
+        if high > _LONGEST_S + FRAME_PERIOD_S:
+            return none
     found = float(brentq(excess, low, high, xtol=1e-9))
     return DelayMargin(at, direction, found, loop.critical_frequency(found))

@@ -13,6 +13,7 @@ from analysis.stability.delay_margin import DelayMargin, DelayPlace, delay_margi
 from analysis.stability.open_loops import Direction
 from analysis.stability.operating_points import OperatingPoint
 from systems.ideal_source_sensor import relative_position
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -72,12 +73,12 @@ def check_delay_margin(
     """Simulates 0.95 and 1.05 of the computed delay margin.
 
     Raises:
-        ValueError: The loop has no finite delay margin.
+        InputError: The loop has no finite delay margin.
     """
     margin = delay_margin(point, at, direction)
     if not np.isfinite(margin.delay_s):
-        raise ValueError(
-            f"{at}, {direction}: no delay makes this loop unstable; nothing to check"
+        raise InputError(
+            f"{at}, {direction}", "no delay makes this loop unstable; nothing to check"
         )
     below, above = (
         simulate_delayed(
@@ -114,15 +115,16 @@ def simulate_delayed(
         duration_s: To simulate, s.
 
     Raises:
-        ValueError: The operating point moves, or the delay is negative.
+        InputError: The operating point moves, or the delay is negative.
     """
     if point.moves:
-        raise ValueError(
-            "point: moves, and simulate_delayed is about rest; take one of "
-            "find_equilibria(scenario).points"
+        raise InputError(
+            "point",
+            "moves, and simulate_delayed is about rest; take one of "
+            "find_equilibria(scenario).points",
         )
     if delay_s < 0.0:
-        raise ValueError(f"delay_s: is {delay_s}; give a delay of 0 s or more")
+        raise InputError("delay_s", f"is {delay_s}; give a delay of 0 s or more")
     c, s = np.cos(point.theta_WB), np.sin(point.theta_WB)
     axis = np.array([c, s] if direction == "along" else [-s, c])
     loop = point.loop

@@ -20,7 +20,7 @@ from analysis.runs.scene import touching_point
 from analysis.stability.certificate_trials import BATCH, draw_starts
 from analysis.stability.diagram_state import set_discrete_state
 from analysis.stability.energy_certificate import EnergyCertificate
-from analysis.stability.ideal_loop import frozen_scenario
+from analysis.stability.ideal_scenarios import frozen_scenario, require_rolling
 from diagrams import (
     Scenario,
     SoundFollower,
@@ -30,6 +30,7 @@ from diagrams import (
 from diagrams.scenario import robot_rectangle
 from diagrams.stop_rules import Collision, StopRules
 from systems.geometry import control_point, rectangle_clearance, rotate
+from systems.input_error import InputError
 from systems.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 
 __all__ = ["DiagramTrials", "try_diagram"]
@@ -96,10 +97,12 @@ def try_diagram(
         progress: Called with the share that is done.
 
     Raises:
-        ValueError: No start is certified, or ``starts`` is wrong.
+        InputError: No start is certified, the wheels can slip, or ``starts`` is
+            wrong.
     """
+    require_rolling(certificate.scenario.plant)
     if starts < 1:
-        raise ValueError(f"starts: {starts} must be at least 1")
+        raise InputError("starts", f"{starts} must be at least 1")
     scenario = frozen_scenario(certificate.scenario)
     scenario = scenario.model_copy(update={"hearing": hearing})
     follower = build_sound_follower(scenario)
@@ -134,9 +137,10 @@ def _certified_starts(
         if len(kept) == count:
             break
     if len(kept) < count:
-        raise ValueError(
-            f"starts: only {len(kept)} of {BATCH} random starts are certified and "
-            f"clear of all bodies; ask for fewer than {count}"
+        raise InputError(
+            "starts",
+            f"only {len(kept)} of {BATCH} random starts are certified and "
+            f"clear of all bodies; ask for fewer than {count}",
         )
     return np.array(kept), np.array(poses), skipped
 

@@ -117,7 +117,7 @@ def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBou
         runs: Simulated encounters a speed.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: The law has no radial force.
     """
     model = point_mass(scenario)
@@ -127,8 +127,7 @@ def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBou
     rows = []
     for speed in speeds:
         rows.append(source_bound(model, speed))
-        if radius > 0.0:
-            rows.append(source_bound(model, speed, speed**2 / radius, simulate=False))
+        rows.append(source_bound(model, speed, speed**2 / radius, simulate=False))
     rng = np.random.default_rng(scenario.seed)
     injection = velocity_term_passivity(scenario).largest_injection_n_s_m
     spare = model.damping_n_s_m - injection

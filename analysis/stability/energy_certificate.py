@@ -33,6 +33,7 @@ from analysis.stability.velocity_passivity import (
     velocity_term_passivity,
 )
 from diagrams import Scenario
+from systems.input_error import InputError
 
 __all__ = ["EnergyCertificate", "certify_energy"]
 
@@ -167,8 +168,8 @@ def certify_energy(
         velocity_term: Another term than the scenario's.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law has no radial force, it pulls somewhere, or an
+        InputError: The law is not known.
+        InputError: The law has no radial force, it pulls somewhere, or an
             argument is wrong.
     """
     model = point_mass(scenario)
@@ -181,9 +182,10 @@ def certify_energy(
         for a, b in zip(low, high, strict=True)
     )
     if len(x) * len(y) > MOST_CELLS:
-        raise ValueError(
-            f"cell_m: {cell_m} makes {len(x) * len(y)} cells; take at least "
-            f"{math.sqrt((high - low).prod() / MOST_CELLS):.3f}"
+        raise InputError(
+            "cell_m",
+            f"{cell_m} makes {len(x) * len(y)} cells; take at least "
+            f"{math.sqrt((high - low).prod() / MOST_CELLS):.3f}",
         )
     points = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     shape = (len(x), len(y))
@@ -217,16 +219,18 @@ def certify_energy(
 
 def _check(model: PointMass, cell_m: float, contact_m: float) -> None:
     if not cell_m > 0.0:
-        raise ValueError(f"cell_m: {cell_m} must be above 0")
+        raise InputError("cell_m", f"{cell_m} must be above 0")
     if not 0.0 <= contact_m < model.law.range_m:
-        raise ValueError(
-            f"contact_m: {contact_m} must lie between 0 and the sensors' range "
-            f"{model.law.range_m} m"
+        raise InputError(
+            "contact_m",
+            f"{contact_m} must lie between 0 and the sensors' range "
+            f"{model.law.range_m} m",
         )
     if model.law.forces_n.min() < -1e-9:
-        raise ValueError(
-            f"law: {model.law.name!r} pulls towards obstacles somewhere; the bounds of "
-            "its energy need a force that is never negative at rest"
+        raise InputError(
+            "law",
+            f"{model.law.name!r} pulls towards obstacles somewhere; the bounds of "
+            "its energy need a force that is never negative at rest",
         )
 
 

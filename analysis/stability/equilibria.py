@@ -22,6 +22,7 @@ from analysis.stability.operating_points import (
     resting_equilibrium,
 )
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 
 __all__ = [
     "EquilibriumSearch",
@@ -113,15 +114,15 @@ def find_equilibria(
         smallest_m: Edge below which cells are not quartered, m.
 
     Raises:
-        ValueError: The area is empty, or the law has no derivative.
+        InputError: The area is empty, or the law has no derivative.
     """
     if not smallest_m > 0.0:
-        raise ValueError(f"smallest_m: is {smallest_m}; give a positive length in m")
+        raise InputError("smallest_m", f"is {smallest_m}; give a positive length in m")
     scenario = frozen_scenario(ideal_scenario(scenario))
     area = area_m or _area(scenario)
     if not (area[0] < area[1] and area[2] < area[3]):
-        raise ValueError(
-            f"area_m: {area} is empty; give (x_min, x_max, y_min, y_max) in m"
+        raise InputError(
+            "area_m", f"{area} is empty; give (x_min, x_max, y_min, y_max) in m"
         )
     loop = ideal_loop(scenario)
     field_ = ForceField(loop)
@@ -233,15 +234,16 @@ def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
     """The stable equilibrium at rest that is nearest to the follow distance.
 
     Raises:
-        ValueError: There is no stable equilibrium.
+        InputError: There is no stable equilibrium.
     """
     search = find_equilibria(scenario)
     sinks = [point for point in search.points if point.stable]
     if not sinks:
         kinds = ", ".join(point.kind for point in search.points) or "none at all"
-        raise ValueError(
+        raise InputError(
+            "scenario",
             f"no stable equilibrium was found (found: {kinds}), so nothing can be "
             "linearised about it; lower repulsion or raise attraction.damping_n_s_m, "
-            "or linearise one of find_equilibria(scenario).points"
+            "or linearise one of find_equilibria(scenario).points",
         )
     return min(sinks, key=lambda point: abs(point.offset_m))

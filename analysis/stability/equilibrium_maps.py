@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from analysis.stability.ideal_loop import ideal_scenario
 from analysis.stability.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
+from systems.input_error import InputError
 
 __all__ = [
     "BOX_M",
@@ -162,8 +163,8 @@ def gap_map(
         progress: Called with the share that is done.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law has no radial force, or ``sensing`` is unknown.
+        InputError: The law is not known.
+        InputError: The law has no radial force, or ``sensing`` is unknown.
     """
 
     def boxes(gap: float) -> list[tuple[float, float]]:
@@ -189,8 +190,8 @@ def offset_map(
         progress: Called with the share that is done.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law has no radial force, or ``sensing`` is unknown.
+        InputError: The law is not known.
+        InputError: The law has no radial force, or ``sensing`` is unknown.
     """
 
     def box(offset: float) -> list[tuple[float, float]]:
@@ -211,8 +212,8 @@ def _map(
     """Of (parameter, values, boxes by value, cell of the grid)."""
     parameter, numbers, boxes, cell_m = varied
     if sensing not in ("exact nearest", "exact sum", "cones"):
-        raise ValueError(
-            f"sensing: {sensing!r} is none of 'exact nearest', 'exact sum', 'cones'"
+        raise InputError(
+            "sensing", f"{sensing!r} is none of 'exact nearest', 'exact sum', 'cones'"
         )
     values = tuple(float(v) for v in numbers)
     points = []

@@ -27,6 +27,7 @@ from analysis.stability.sos_region import sos_region
 from analysis.stability.sos_region_plots import plot_sos_region
 from analysis.stability.stability import Part, Study
 from analysis.stability.stiffness_ratio import RatioMap, stiffness_ratio_map
+from systems.input_error import InputError
 
 __all__ = ["extended_parts"]
 
@@ -117,8 +118,8 @@ def _listed(values: tuple[float, ...]) -> str:
 
 def _ratio_map(study: Study) -> RatioMap:
     if study.scenario.law != "active":
-        raise ValueError(
-            "law: the ratio k_ref/K_0 is one of the active law of 2019; choose active"
+        raise InputError(
+            "law", "the ratio k_ref/K_0 is one of the active law of 2019; choose active"
         )
     return stiffness_ratio_map(study.scenario)
 

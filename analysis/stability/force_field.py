@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.stability.autodiff import seed, value_and_gradient
 from analysis.stability.ideal_loop import IdealLoop
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["ForceField"]
@@ -26,7 +27,7 @@ class ForceField:
         time_s: The moment, s, of a scenario in which bodies move.
 
     Raises:
-        ValueError: A body moves, and no moment is given.
+        InputError: A body moves, and no moment is given.
     """
 
     def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
@@ -34,10 +35,11 @@ class ForceField:
         moving = [o.name for o in scenario.obstacles if o.path().moves]
         moving += ["source"] if scenario.source.path().moves else []
         if moving and time_s is None:
-            raise ValueError(
-                f"{', '.join(moving)}: moves, and equilibria are of bodies at rest; "
+            raise InputError(
+                f"{', '.join(moving)}",
+                "moves, and equilibria are of bodies at rest; "
                 "use frozen_scenario(scenario, time_s), or moving_equilibrium for a "
-                "source at constant velocity"
+                "source at constant velocity",
             )
         self.loop = loop
         self._time_s = time_s or 0.0

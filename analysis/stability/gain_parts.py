@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from analysis.runs.html_page import Cell, figure_html, number, paragraph, table
-from analysis.runs.plain_values import plain
 from analysis.stability.chart_plots import plot_contact_limits
 from analysis.stability.contact_mode import ContactLimits, contact_limits
 from analysis.stability.recommended_gains import (
@@ -63,13 +61,8 @@ def gain_parts() -> tuple[Part, ...]:
             "Recommended gains",
             lambda study: recommend_gains(study.scenario),
             _render_gains,
-            document=_document,
         ),
     )
-
-
-def _document(data: RecommendedGains) -> dict[str, Any]:
-    return {"recommended_gains": {**plain(data), "recommended": data.recommended}}
 
 
 def _render_gains(data: RecommendedGains, name: str) -> list[str]:
@@ -91,9 +84,9 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
             f"{t.phase_margin_deg:g} deg, M_s {t.sensitivity_peak:g}, disk margin "
             f"{t.disk_margin:.2f}, at sensor and actuator, and rest before an obstacle "
             f"with echoes {t.spare_ticks} tick late. The loop is the attraction's, "
-            "sampled, with motor lag. Lag: how far P stays behind the follow point of "
-            "a source that moves as this scenario's. Stiffest law: the largest spring "
-            "to obstacles that comes to rest."
+            "sampled, with motor lag; margins count both ways. Lag: how far P stays "
+            "behind the follow point of a source that moves as this scenario's. "
+            "Stiffest law: the largest spring to obstacles that comes to rest."
         ),
         table(headings, rows),
         paragraph(data.advice),

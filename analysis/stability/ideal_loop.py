@@ -39,6 +39,7 @@ from analysis.stability.ideal_scenarios import (
 from analysis.stability.state_names import state_names
 from diagrams import build_sound_follower
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -85,7 +86,7 @@ class IdealLoop:
         scenario: All ideal, see ``ideal_scenario``.
 
     Raises:
-        ValueError: The scenario, or a law of the user's, has no derivative.
+        InputError: The scenario, or a law of the user's, has no derivative.
     """
 
     def __init__(self, scenario: Scenario) -> None:
@@ -94,10 +95,11 @@ class IdealLoop:
         self.follower = build_sound_follower(scenario)
         twin = self.follower.diagram.ToAutoDiffXdMaybe()
         if twin is None:
-            raise ValueError(
-                f"law: the block of {scenario.law!r} has no AutoDiffXd form; write it "
+            raise InputError(
+                "law",
+                f"the block of {scenario.law!r} has no AutoDiffXd form; write it "
                 "as a function law(c, s, repulsion) with pydrake.math, or as a "
-                "TemplateSystem of float and AutoDiffXd"
+                "TemplateSystem of float and AutoDiffXd",
             )
         self.twin: Any = twin
         self._try_law()
@@ -128,10 +130,12 @@ class IdealLoop:
         try:
             block.GetOutputPort("acceleration_W").Eval(context)
         except Exception as error:  # whatever a user's function raises
-            raise ValueError(
-                f"law: {self.scenario.law!r} cannot be differentiated "
-                f"({type(error).__name__}: {error}); write it with pydrake.math "
-                "(exp, sqrt, ...) in the place of math and numpy"
+            own = error.__cause__ or error
+            raise InputError(
+                "law",
+                f"{self.scenario.law!r} cannot be differentiated "
+                f"({type(own).__name__}: {own}); write it with pydrake.math "
+                "(exp, sqrt, ...) in the place of math and numpy",
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
@@ -239,6 +243,7 @@ class IdealLoop:
         self,
         pose_WB: Sequence[float],
         v_WP: tuple[float, float] = (0.0, 0.0),
+        begin_s: float = 0.0,
     ) -> tuple[NDArray[np.float64], float]:
         """State in which all that remembers has seen a steady motion for long.
 
@@ -246,8 +251,9 @@ class IdealLoop:
         source does what its path says; forces do not act meanwhile.
 
         Args:
-            pose_WB: Pose at time zero, m and rad.
+            pose_WB: Pose at ``begin_s``, m and rad.
             v_WP: Velocity of P in W, m/s, along the heading.
+            begin_s: A multiple of 25 ms, s: when the source's motion is steady.
 
         Returns:
             State and its time in s.
@@ -263,8 +269,8 @@ class IdealLoop:
         tracker = self.indices("tracker")
         state[tracker[:9]] = [*pose_WB] * 3
         no_force = {("command", "acceleration_W"): (0.0, 0.0)}
-        state = self.period_map(state, 0.0, fixed=no_force, periods=SETTLING_TICKS)
-        time_s = SETTLING_TICKS * FRAME_PERIOD_S
+        state = self.period_map(state, begin_s, fixed=no_force, periods=SETTLING_TICKS)
+        time_s = begin_s + SETTLING_TICKS * FRAME_PERIOD_S
         # An obstacle's speed of rounding errors alone would have a slope.
         remembered = self.period_map(state, time_s, fixed=no_force)
         controller = self.indices("controller")
@@ -315,6 +321,6 @@ def ideal_loop(scenario: Scenario) -> IdealLoop:
     again.
 
     Raises:
-        ValueError: The scenario has no linear model.
+        InputError: The scenario has no linear model.
     """
     return _cached_loop(scenario.model_dump_json())

@@ -7,8 +7,15 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagrams.scenario import Scenario
+from systems.diff_drive_plant import PlantParameters
+from systems.input_error import InputError
 
-__all__ = ["frozen_scenario", "ideal_scenario", "require_ideal"]
+__all__ = [
+    "frozen_scenario",
+    "ideal_scenario",
+    "require_ideal",
+    "require_rolling",
+]
 
 _ALL_IDEAL: dict[str, Any] = {
     "hearing": "ideal",
@@ -23,7 +30,12 @@ _ALL_IDEAL: dict[str, Any] = {
 
 
 def ideal_scenario(scenario: Scenario) -> Scenario:
-    """The same scenario with exact sensors and a sound that never stops."""
+    """The same scenario with exact sensors and a sound that never stops.
+
+    Raises:
+        ValueError: Its wheels can slip.
+    """
+    require_rolling(scenario.plant)
     return _updated(scenario, _ALL_IDEAL)
 
 
@@ -51,34 +63,55 @@ def _updated(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     return Scenario.model_validate(data)
 
 
+def require_rolling(plant: PlantParameters) -> None:
+    """Raises what to do instead where the wheels can slip.
+
+    Raises:
+        InputError: ``plant.friction`` is set.
+    """
+    if plant.friction is not None:
+        raise InputError(
+            "plant.friction",
+            f"is {plant.friction:g}, and linear models are of wheels that roll; set "
+            "plant.friction to null, which below the limit of friction is the same "
+            "motion",
+        )
+
+
 def require_ideal(scenario: Scenario) -> None:
     """Raises what to do instead where a scenario has no linear model.
 
     Raises:
-        ValueError: Some block has no derivative.
+        InputError: Some block has no derivative.
     """
+    require_rolling(scenario.plant)
     hearing = scenario.ideal_hearing
     checks = (
         (
             scenario.hearing == "ideal",
-            "hearing: 'audio' has no linear model, for a waveform has no equilibrium",
+            "hearing",
+            "'audio' has no linear model, for a waveform has no equilibrium",
         ),
         (
             scenario.obstacle_sensing == "ideal",
-            "obstacle_sensing: 'ultrasonic' has no linear model, for cones jump",
+            "obstacle_sensing",
+            "'ultrasonic' has no linear model, for cones jump",
         ),
         (
             not scenario.odometry.rounding,
-            "odometry.rounding: a rounded wheel angle has no derivative",
+            "odometry.rounding",
+            "a rounded wheel angle has no derivative",
         ),
         (
             hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
-            "ideal_hearing: noise has no derivative",
+            "ideal_hearing",
+            "noise has no derivative",
         ),
     )
-    for holds, reason in checks:
+    for holds, field, reason in checks:
         if not holds:
-            raise ValueError(
+            raise InputError(
+                field,
                 f"{reason}; linearise ideal_scenario(scenario), which differs in "
-                "sensing alone"
+                "sensing alone",
             )

@@ -104,7 +104,7 @@ def lag_model(scenario: Scenario, *, to_go_m: float | None = None) -> LagModel:
     """The polynomial model on the widest domain that it fits.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: There is no contact equilibrium.
     """
     contact = head_on(scenario, to_go_m=to_go_m)

@@ -30,6 +30,7 @@ from analysis.stability.linearisation import (
 from analysis.stability.operating_point_plots import plot_equilibria
 from analysis.stability.operating_points import OperatingPoint, moving_equilibrium
 from analysis.stability.stability import Part, Study
+from systems.input_error import InputError
 
 __all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
 
@@ -94,15 +95,16 @@ def _operating_points(study: Study) -> OperatingPoints:
     sinks = [point for point in search.points if point.stable]
     if not sinks:
         kinds = ", ".join(point.kind for point in search.points) or "none at all"
-        raise ValueError(
-            f"attraction: the loop has no stable equilibrium (found: {kinds}), so that "
+        raise InputError(
+            "attraction",
+            f"the loop has no stable equilibrium (found: {kinds}), so that "
             "there is nothing to linearise about; raise attraction.damping_n_s_m or "
-            "lower the law's stiffness"
+            "lower the law's stiffness",
         )
     at = min(sinks, key=lambda point: abs(point.offset_m))
     try:
         return OperatingPoints(search, at, moving_equilibrium(study.scenario), "")
-    except ValueError as error:
+    except InputError as error:
         return OperatingPoints(search, at, None, str(error))
 
 

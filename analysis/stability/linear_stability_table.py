@@ -87,10 +87,11 @@ def mode_rows() -> Iterator[Sequence[str]]:
 
 
 def _margin_cells(found: LoopMargins) -> Sequence[str]:
-    gain, disk = found.gain_margin, found.disk
+    up, down, disk = found.gain_increase_margin, found.gain_reduction_margin, found.disk
     sizes = f"{disk.gain_margin_db:.1f} dB, {disk.phase_margin_deg:.0f} deg"
     return (
-        f"{gain:.1f}" if math.isfinite(gain) else "any",
+        f"{up:.1f}" if math.isfinite(up) else "any",
+        f"{down:.3f}" if down > 0.0 else "any",
         f"{found.phase_margin_deg:.2f}",
         f"{found.crossover_rad_s:.3f}",
         f"{found.modulus_margin:.3f}",
@@ -214,8 +215,8 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
     )  # fmt: skip
     yield ""
     yield from _table(
-        ("loop", "cut at", "gain margin", "phase margin (deg)", "crossover (rad/s)",
-         "modulus margin", "disk"),
+        ("loop", "cut at", "gain up to", "gain down to", "phase margin (deg)",
+         "crossover (rad/s)", "modulus margin", "disk"),
         margin_rows(),
     )  # fmt: skip
     yield ""

@@ -18,6 +18,7 @@ from analysis.stability.radial_law import DISTANCE_STEP_M, radial_law
 from analysis.stability.robustness import PoleFunction, UncertainParameter
 from diagrams import Scenario
 from diagrams.loading import scenario_from_mapping
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -44,13 +45,14 @@ def contact_uncertainty(scenario: Scenario) -> tuple[UncertainParameter, ...]:
     """The box of parameters of the loop that rests against an obstacle.
 
     Raises:
-        ValueError: The law has no spring to obstacles.
+        InputError: The law has no spring to obstacles.
     """
     stiffness = law_stiffness(scenario)
     if stiffness <= 0.0:
-        raise ValueError(
-            f"law: {scenario.law!r} does not push harder as an obstacle comes nearer, "
-            "so that it has no contact mode; choose another law"
+        raise InputError(
+            "law",
+            f"{scenario.law!r} does not push harder as an obstacle comes nearer, "
+            "so that it has no contact mode; choose another law",
         )
     law = _share(
         "law_stiffness_n_m", "K_law", "N/m", stiffness, 0.1, "largest slope -df/dc"
@@ -194,9 +196,10 @@ def following_poles(at: OperatingPoint) -> PoleFunction:
         loop = ideal_loop(with_values(at.loop.scenario, values))
         place = nearest_equilibrium(ForceField(loop), at.p_WP)
         if place is None:
-            raise ValueError(
-                f"attraction: with {dict(values)} the equilibrium at ({at.p_WP[0]:.3f},"
-                f" {at.p_WP[1]:.3f}) m is gone; narrow the box"
+            raise InputError(
+                "attraction",
+                f"with {dict(values)} the equilibrium at ({at.p_WP[0]:.3f},"
+                f" {at.p_WP[1]:.3f}) m is gone; narrow the box",
             )
         moved = resting_equilibrium(loop, place)
         return np.asarray(np.exp(moved.eigenvalues * FRAME_PERIOD_S))

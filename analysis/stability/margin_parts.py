@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
+from analysis.runs.html_page import Cell, figure_html, number, paragraph, table
 from analysis.stability.gang_of_four import GangOfFour, gang_of_four
 from analysis.stability.linear_models import LinearModel
 from analysis.stability.loop_margins import (
@@ -35,8 +36,10 @@ __all__ = ["Margins", "least_damped", "margin_parts"]
 _EXPLANATION = (
     "Each loop is cut at one place, the others stay closed: at the sensor (what "
     "hearing says of the source), at the actuator (the law's acceleration) and at the "
-    "commanded wheel speeds, along the line to the source and across it. A disk margin "
-    "counts gain and phase changes at once; its gain and phase margin stand beside it."
+    "commanded wheel speeds, along the line to the source and across it. Gain margins "
+    "are the least growth and the least fall of the gain that is too much; the phase "
+    "margin is the least lag or lead. A disk margin counts gain and phase changes at "
+    "once; the gains and phases within which it vouches for the loop stand beside it."
 )
 #: Faster modes are those of motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
@@ -53,8 +56,8 @@ class Margins:
     target_model: LinearModel
     """Cut at the sensor."""
     implemented: tuple[PointMargins, ...]
-    gang: GangOfFour
-    """Along the line to the source."""
+    gangs: tuple[GangOfFour, ...]
+    """Of the loops cut at the sensor."""
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
@@ -107,11 +110,12 @@ def _margins(study: Study) -> Margins:
         for place in BREAK_POINTS
         if place != "wheels"
     }
+    implemented = all_margins(at)
     return Margins(
         {place: loop_margins(model) for place, model in models.items()},
         models["sensor"],
-        all_margins(at),
-        gang_of_four(at),
+        implemented,
+        tuple(gang_of_four(at, m.direction) for m in implemented if m.at == "sensor"),
         at,
     )
 
@@ -120,10 +124,12 @@ def _document(data: Margins) -> dict[str, Any]:
     sensor = data.implemented_at(*_MAIN) or data.implemented[0].margins
     return {
         "target_loop": {
+            "cut_at": "sensor",
             **_loop_document(data.target_poles, data.target["sensor"]),
             "margins": {at: _margin_document(m) for at, m in data.target.items()},
         },
         "implemented_loop": {
+            "cut_at": sensor.name,
             **_loop_document(data.at.eigenvalues, sensor),
             "margins": {
                 f"{found.at}_{found.direction}": _margin_document(found.margins)
@@ -141,6 +147,7 @@ def _loop_document(
         "poles": poles,
         "damping_ratio": -pole.real / abs(pole),
         "natural_frequency_rad_s": abs(pole),
+        "gain_margin_db": margins.gain_margin_db,
         "phase_margin_deg": margins.phase_margin_deg,
         "delay_margin_s": margins.delay_margin_s,
         "disk_margin": margins.disk.alpha,
@@ -149,8 +156,9 @@ def _loop_document(
 
 def _margin_document(margins: LoopMargins) -> dict[str, Any]:
     names = (
-        "stable", "gain_margin", "gain_reduction_margin", "phase_margin_deg",
-        "crossover_rad_s", "delay_margin_s", "modulus_margin",
+        "stable", "gain_increase_margin", "gain_reduction_margin", "gain_margin_db",
+        "phase_lag_margin_deg", "phase_lead_margin_deg", "crossover_rad_s",
+        "phase_margin_deg", "delay_margin_s", "modulus_margin",
         "modulus_frequency_rad_s", "sensitivity_peak", "complementary_peak", "disks",
     )  # fmt: skip
     return {name: getattr(margins, name) for name in names}
@@ -165,7 +173,7 @@ def _render(data: Margins, name: str) -> list[str]:
         "cut at", "direction", "gain up (dB)", "gain down (dB)", "phase (deg)",
         "crossover (rad/s)", "modulus", "M_s", "M_t", "delay (s)",
     ]  # fmt: skip
-    loops = [m.margins for m in data.implemented if m.direction == "along"]
+    loops = [m.margins for m in data.implemented]
     disks: list[list[Cell]] = [
         [m.at, m.direction, *_disk_cells(m.margins.disks)] for m in data.implemented
     ]
@@ -174,11 +182,12 @@ def _render(data: Margins, name: str) -> list[str]:
         table(headings, rows),
         table(
             [
-                "cut at", "direction",
+                "cut at",
+                "direction",
                 *(f"skew {d.skew:+g}" for d in data.implemented[0].margins.disks),
             ],
             disks,
-            caption="Disk margins: size alpha; gain within +- dB; phase within +- deg",
+            caption="Disk margins: size alpha; gain in dB; phase within +- deg",
         ),
         figure_html(plot_bode(loops), f"{name}-bode", "Bode diagram with margins."),
         figure_html(
@@ -187,21 +196,23 @@ def _render(data: Margins, name: str) -> list[str]:
             "Nyquist curves, with the disk that they must stay out of.",
         ),
         figure_html(plot_nichols(loops), f"{name}-nichols", "Nichols diagram."),
-        figure_html(
-            plot_gang_of_four(data.gang),
-            f"{name}-gang",
-            "Gang of four, along the line to the source.",
+        *(
+            figure_html(
+                plot_gang_of_four(gang),
+                f"{name}-gang-{gang.direction}",
+                f"Gang of four, {gang.direction} the line to the source.",
+            )
+            for gang in data.gangs
         ),
-    ]  # fmt: skip
+    ]
 
 
 def _row(at: str, direction: str, margins: LoopMargins) -> list[Cell]:
-    reduction = margins.gain_reduction_margin
     return [
         at,
         direction,
-        margins.gain_margin_db,
-        20.0 * float(np.log10(reduction)) if reduction > 0.0 else -np.inf,
+        margins.gain_increase_margin_db,
+        margins.gain_reduction_margin_db,
         margins.phase_margin_deg,
         margins.crossover_rad_s,
         margins.modulus_margin,
@@ -213,6 +224,11 @@ def _row(at: str, direction: str, margins: LoopMargins) -> list[Cell]:
 
 def _disk_cells(disks: Sequence[DiskMargin]) -> list[Cell]:
     return [
-        f"{disk.alpha:.3f}; {disk.gain_margin_db:.2f} dB; {disk.phase_margin_deg:.1f}"
+        f"{disk.alpha:.3f}; {_db(disk.gain_low)} to {_db(disk.gain_high)}; "
+        f"{disk.phase_margin_deg:.1f}"
         for disk in disks
     ]
+
+
+def _db(factor: float) -> str:
+    return number(20.0 * math.log10(factor) if factor > 0.0 else -math.inf, 3)

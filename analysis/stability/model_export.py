@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.io import savemat
 
 from analysis.stability.linear_models import LinearModel
+from systems.input_error import InputError
 
 __all__ = ["write_models"]
 
@@ -29,11 +30,11 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
         directory: Exists.
 
     Raises:
-        ValueError: Two models have one name.
+        InputError: Two models have one name.
     """
     names = [_identifier(model.name) for model in models]
     if len(set(names)) < len(names):
-        raise ValueError(f"models: names {names} are not unique; rename one")
+        raise InputError("models", f"names {names} are not unique; rename one")
     structs = {name: _struct(model) for name, model in zip(names, models, strict=True)}
     savemat(directory / "models.mat", structs, long_field_names=True)
     folder = directory / "models"

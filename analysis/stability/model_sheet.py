@@ -269,9 +269,16 @@ _LAWS: dict[str, tuple[Equation, ...]] = {
             "alpha = rho_0 / (2 ln(k_ref/K_0)), beta = mu_0 / (2 ln(D_0/d_ref))",
         ),
     ),
+    "conventional2017": (
+        Equation(
+            "Conventional law of 2017 (Kim 2017, eq. 20)",
+            r"f = \frac{K_0}{\max(c,\,c_{min})}+D_0\,s",
+            "f = K_0/max(c, c_min) + D_0 s, c_min the sensors' least range",
+        ),
+    ),
     "active2017": (
         Equation(
-            "Active law of 2017 (Kim 2017, eq. 20-21)",
+            "Active law of 2017 (Kim 2017, eq. 21)",
             r"f = \frac{K_a(c)}{c}+D_a(s)\,s,\quad K_a = K_0\min(1,\,c/\rho_1),"
             r"\quad D_a = D_0\min(1,\,\mu_1/s)",
             "f = K_a(c)/c + D_a(s) s, K_a = K_0 min(1, c/rho_1), "

@@ -19,6 +19,7 @@ from analysis.stability.linear_models import LinearModel
 from analysis.stability.model_reduction import minimal_model
 from analysis.stability.operating_points import OperatingPoint
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -162,12 +163,12 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
     damper stays closed; at the actuator both are cut.
 
     Raises:
-        ValueError: There is no spring, hence no target loop.
+        InputError: There is no spring, hence no target loop.
     """
     if scenario.attraction.stiffness_n_m == 0.0:
-        raise ValueError(
-            "attraction.stiffness_n_m: is 0, and without a spring there is no loop "
-            "to the target; set it above 0"
+        raise InputError(
+            "attraction.stiffness_n_m",
+            "is 0, and without a spring there is no loop to the target; set it above 0",
         )
     stiffness, damping = _attraction_slopes(scenario)
     mass = scenario.robot.mass_kg

@@ -21,6 +21,7 @@ from analysis.stability.linear_models import LinearModel, Mode
 from analysis.stability.model_reduction import minimal_model
 from diagrams.scenario import Scenario
 from systems.geometry import control_point, nearest_point_on_rectangle
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -39,6 +40,8 @@ NO_FORCE_N = 1e-9
 FLAT = 1e-6
 #: Poles nearer to z = 1 than this are neutral.
 _NEUTRAL = 1e-7
+#: By then the source has started, and drives straight on to rounding errors, s.
+_STEADY_S = 20.0
 
 
 @dataclass(frozen=True)
@@ -196,15 +199,16 @@ def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> Operating
     """The state of rest with P at a place where no force acts.
 
     Raises:
-        ValueError: A force acts there, or a body moves.
+        InputError: A force acts there, or a body moves.
     """
     field_ = ForceField(loop)
     force, slope = field_.gradient(p_WP)
     left = float(np.linalg.norm(force))
     if left > NO_FORCE_N:
-        raise ValueError(
-            f"p_WP: at ({p_WP[0]:g}, {p_WP[1]:g}) a force of {left:.3g} N acts, and "
-            "there is no equilibrium; take one from find_equilibria(scenario).points"
+        raise InputError(
+            "p_WP",
+            f"at ({p_WP[0]:g}, {p_WP[1]:g}) a force of {left:.3g} N acts, and "
+            "there is no equilibrium; take one from find_equilibria(scenario).points",
         )
     to_source = field_.p_WS - p_WP
     theta = math.atan2(to_source[1], to_source[0])
@@ -235,14 +239,15 @@ def moving_equilibrium(
         velocity_W: Of the source, m/s; by default ``source.speed_m_s`` along x.
 
     Raises:
-        ValueError: The source is too fast or at rest, or no distance balances.
+        InputError: The source is too fast or at rest, or no distance balances.
     """
     vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
     speed, top = math.hypot(vx, vy), scenario.robot.top_speed_m_s
     if not 0.0 < speed < top:
-        raise ValueError(
-            f"velocity_W: a source at {speed:g} m/s cannot be followed steadily; give "
-            f"a speed above 0 and below robot.top_speed_m_s = {top:g} m/s"
+        raise InputError(
+            "velocity_W",
+            f"a source at {speed:g} m/s cannot be followed steadily; give "
+            f"a speed above 0 and below robot.top_speed_m_s = {top:g} m/s",
         )
     loop = ideal_loop(_steady_scenario(scenario, vx, vy))
     attraction = loop.scenario.attraction
@@ -250,9 +255,12 @@ def moving_equilibrium(
     theta = math.atan2(vy, vx)
     epsilon = loop.scenario.robot.control_point_m
 
+    p_WS = np.array(loop.scenario.source.path().pose(_STEADY_S)[:2])
+
     def settled(distance: float) -> tuple[NDArray[np.float64], float]:
-        place = -(distance + epsilon) * heading
-        return loop.settled_state((place[0], place[1], theta), (vx, vy))
+        place = p_WS - (distance + epsilon) * heading
+        pose = (place[0], place[1], theta)
+        return loop.settled_state(pose, (vx, vy), _STEADY_S)
 
     def pull(distance: float) -> float:
         """Acceleration along the line, m/s^2."""
@@ -265,24 +273,27 @@ def moving_equilibrium(
         guess += attraction.damping_n_s_m * speed / attraction.stiffness_n_m
     try:
         found = root_scalar(pull, x0=guess, x1=guess + 0.05, xtol=1e-14)
-    except (ArithmeticError, ValueError):
+    except (ArithmeticError, InputError):
         found = None
     if found is None or not found.converged or abs(pull(found.root)) > 1e-9:
-        raise ValueError(
-            f"velocity_W: no distance behind a source at {speed:g} m/s balances the "
-            "forces; lower repulsion, or raise attraction.stiffness_n_m"
+        raise InputError(
+            "velocity_W",
+            f"no distance behind a source at {speed:g} m/s balances the "
+            "forces; lower repulsion, or raise attraction.stiffness_n_m",
         )
     state, time_s = settled(found.root)
     return _moving_point(loop, state, time_s, (vx, vy), theta)
 
 
 def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
-    """Ideal, without obstacles, the source driving from the origin for an hour."""
+    """Ideal, without obstacles, the source driving 900 m from the origin."""
+    speed = math.hypot(vx, vy)
     data = ideal_scenario(scenario).model_dump()
     data["obstacles"] = []
     data["source"] |= {
-        "waypoints_m": [[0.0, 0.0], [3600.0 * vx, 3600.0 * vy]],
-        "speed_m_s": math.hypot(vx, vy),
+        "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],
+        "speed_m_s": speed,
+        "top_speed_m_s": 2.0 * speed + 1.0,
         "start_time_s": 0.0,
         "at_end": "stop",
     }

@@ -107,7 +107,7 @@ def phase_portrait(
         points: Starts along either axis.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: The law has no radial force.
     """
     contact = head_on(scenario, to_go_m=to_go_m)

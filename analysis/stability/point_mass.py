@@ -19,6 +19,7 @@ from analysis.stability import point_mass_kernels as kernels
 from analysis.stability.radial_law import RadialLaw, radial_law
 from diagrams import Scenario
 from systems.geometry import control_point
+from systems.input_error import InputError
 
 __all__ = ["PointMass", "PointMassRuns", "VelocityTermModel", "point_mass"]
 
@@ -177,17 +178,18 @@ def point_mass(scenario: Scenario) -> PointMass:
     """The point-mass model of a scenario, its bodies at rest where they are at 0 s.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law has no radial force, or ``aggregation: sum`` meets
+        InputError: The law is not known.
+        InputError: The law has no radial force, or ``aggregation: sum`` meets
             more bodies than the controller takes.
     """
     bodies = scenario.bodies()
     all_bodies = scenario.collision_vector.aggregation == "sum"
     if all_bodies and len(bodies) > 3:
-        raise ValueError(
-            "collision_vector.aggregation: the sum over the nearest 3 of "
+        raise InputError(
+            "collision_vector.aggregation",
+            "the sum over the nearest 3 of "
             f"{len(bodies)} bodies has no energy; use 'paper' or 'nearest', or fewer "
-            "obstacles"
+            "obstacles",
         )
     rectangles = np.array([body.rectangle(0.0) for body in bodies.values()])
     attraction = scenario.attraction

@@ -1,7 +1,8 @@
 """Least damping that meets the usual thresholds, for several springs, and its cost.
 
 The loop is the attraction's, sampled, with motor lag: springs and dampers of the
-law come in as the contact mode, whose stability is asked for as well.
+law come in as the contact mode, whose stability is asked for as well. What the
+law does about rest, pushing off the source's own body, has its margins stated beside.
 """
 
 from __future__ import annotations
@@ -19,11 +20,13 @@ from analysis.stability.contact_mode import (
     largest_contact_stiffness,
     motion_chain,
 )
+from analysis.stability.equilibria import follow_equilibrium
 from analysis.stability.linear_models import LinearModel
-from analysis.stability.loop_margins import loop_margins
+from analysis.stability.loop_margins import all_margins, loop_margins
 from analysis.stability.loop_uncertainty import law_stiffness, with_values
 from analysis.stability.open_loops import BreakPoint
 from diagrams import Scenario
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = [
@@ -31,6 +34,7 @@ __all__ = [
     "GainFigures",
     "GainThresholds",
     "RecommendedGains",
+    "WholeLoop",
     "attraction_loop",
     "gain_figures",
     "recommend_gains",
@@ -70,7 +74,7 @@ class GainFigures:
     phase_margin_deg: float
     """The lesser one of sensor and actuator, deg."""
     gain_margin_db: float
-    """The lesser one, dB."""
+    """The lesser one, up or down, dB."""
     sensitivity_peak: float
     """The greater one."""
     disk_margin: float
@@ -98,19 +102,36 @@ class GainChoice:
 
 
 @dataclass(frozen=True)
+class WholeLoop:
+    """Least margins of the loop with the law in it, over all cuts, at rest."""
+
+    gain_margin_db: float
+    """Up or down, dB."""
+    phase_margin_deg: float
+    """Lag or lead, deg."""
+    disk_margin: float
+    weakest: str
+    """The cut loop with the least disk margin."""
+
+    def meets(self, thresholds: GainThresholds) -> bool:
+        """Whether it has the margins that are asked of the attraction's loop."""
+        return (
+            self.phase_margin_deg >= thresholds.phase_margin_deg
+            and self.disk_margin >= thresholds.disk_margin
+        )
+
+
+@dataclass(frozen=True)
 class RecommendedGains:
     """Today's gains, and the least damping for each of several springs."""
 
     thresholds: GainThresholds
     today: GainFigures
     choices: tuple[GainChoice, ...]
-
-    @property
-    def recommended(self) -> GainFigures | None:
-        """With today's spring, or else the one with the least lag; none: nothing."""
-        found = [choice.figures for choice in self.choices if choice.figures]
-        same = [f for f in found if f.stiffness_n_m == self.today.stiffness_n_m]
-        return min(same or found, key=lambda f: f.following_lag_m, default=None)
+    recommended: GainFigures | None
+    """With today's spring, or else the one with the least lag; none: nothing."""
+    whole_loop: WholeLoop | None
+    """With the recommended gains; none: nothing is recommended."""
 
     @property
     def advice(self) -> str:
@@ -123,7 +144,7 @@ class RecommendedGains:
             )
         same_spring = best.stiffness_n_m == today.stiffness_n_m
         if same_spring and best.damping_n_s_m <= today.damping_n_s_m:
-            return "Today's gains meet everything asked for here."
+            return "Today's gains meet everything asked of the attraction here."
         settings = (
             f"attraction.stiffness_n_m={best.stiffness_n_m:g} "
             f"attraction.damping_n_s_m={best.damping_n_s_m:g}"
@@ -137,6 +158,20 @@ class RecommendedGains:
             f"may be as stiff as {best.largest_law_stiffness_n_m:.0f} N/m instead of "
             f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A stiffer "
             "K_r with more D_r lags less and leaves less delay margin."
+            f"{self._of_the_law}"
+        )
+
+    @property
+    def _of_the_law(self) -> str:
+        """What the law adds to the attraction's loop, where that is too much."""
+        whole = self.whole_loop
+        if whole is None or whole.meets(self.thresholds):
+            return ""
+        return (
+            " This is of the attraction's loop alone. With the law's push off the "
+            "source's body in it the same gains leave a gain margin of "
+            f"{whole.gain_margin_db:.2f} dB and {whole.phase_margin_deg:.1f} deg of "
+            f"phase (weakest: {whole.weakest})."
         )
 
 
@@ -202,19 +237,42 @@ def recommend_gains(
         springs: K_r that are tried, as multiples of today's.
 
     Raises:
-        ValueError: There is no spring today.
+        InputError: There is no spring today.
     """
     thresholds = thresholds or GainThresholds()
     today = scenario.attraction.stiffness_n_m
     if today == 0.0:
-        raise ValueError(
-            "attraction.stiffness_n_m: is 0, and gains of a loop that is not there "
-            "cannot be recommended; set it above 0"
+        raise InputError(
+            "attraction.stiffness_n_m",
+            "is 0, and gains of a loop that is not there "
+            "cannot be recommended; set it above 0",
         )
+    choices = tuple(_choice(scenario, share * today, thresholds) for share in springs)
+    best = _best(choices, today)
     return RecommendedGains(
         thresholds,
         gain_figures(scenario, thresholds),
-        tuple(_choice(scenario, share * today, thresholds) for share in springs),
+        choices,
+        best,
+        _whole_loop(scenario, best) if best else None,
+    )
+
+
+def _best(choices: Sequence[GainChoice], K_r: float) -> GainFigures | None:
+    found = [choice.figures for choice in choices if choice.figures]
+    same = [f for f in found if f.stiffness_n_m == K_r]
+    return min(same or found, key=lambda f: f.following_lag_m, default=None)
+
+
+def _whole_loop(scenario: Scenario, gains: GainFigures) -> WholeLoop:
+    chosen = _with_gains(scenario, gains.stiffness_n_m, gains.damping_n_s_m)
+    loops = [found.margins for found in all_margins(follow_equilibrium(chosen))]
+    weakest = min(loops, key=lambda loop: loop.disk.alpha)
+    return WholeLoop(
+        gain_margin_db=min(loop.gain_margin_db for loop in loops),
+        phase_margin_deg=min(loop.phase_margin_deg for loop in loops),
+        disk_margin=weakest.disk.alpha,
+        weakest=weakest.name,
     )
 
 

@@ -14,6 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import qmc
 
+from systems.input_error import InputError
+
 __all__ = [
     "PoleCloud",
     "PoleFunction",
@@ -54,9 +56,10 @@ class UncertainParameter:
 
     def __post_init__(self) -> None:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
-            raise ValueError(
-                f"{self.name}: {self.nominal:g} is not within [{self.low:g}, "
-                f"{self.high:g}], or these are equal; mend the interval"
+            raise InputError(
+                f"{self.name}",
+                f"{self.nominal:g} is not within [{self.low:g}, "
+                f"{self.high:g}], or these are equal; mend the interval",
             )
 
 

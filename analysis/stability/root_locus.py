@@ -12,6 +12,7 @@ from analysis.stability.contact_mode import contact_matrix
 from analysis.stability.force_field import ForceField
 from analysis.stability.ideal_loop import frozen_scenario, ideal_loop, ideal_scenario
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["ContactSlopes", "RootLocus", "contact_slopes", "root_loci"]
@@ -24,6 +25,7 @@ _DISTANCES_M = np.linspace(0.02, 2.0, 397)
 _GAINS = {
     "conventional": ("stiffness_n_m", "damping_n_s_m"),
     "active": ("reference_stiffness_n_m", "reference_damping_n_s_m"),
+    "conventional2017": ("distance_gain_j", "damping_n_s_m"),
     "active2017": ("distance_gain_j", "damping_n_s_m"),
 }
 
@@ -76,16 +78,17 @@ def contact_slopes(scenario: Scenario) -> ContactSlopes:
     """Slopes of the scenario's law where it is stiffest, from its controller.
 
     Raises:
-        ValueError: The law does not push, so that there is no contact.
+        InputError: The law does not push, so that there is no contact.
     """
     field = ForceField(ideal_loop(frozen_scenario(ideal_scenario(scenario))))
     forces = field.law(_DISTANCES_M)
     slope = -np.gradient(forces, _DISTANCES_M)
     stiffest = int(slope.argmax())
     if slope[stiffest] <= 0.0:
-        raise ValueError(
-            f"law: {scenario.law!r} does not push off obstacles and has no contact "
-            "mode; use conventional, active or active2017"
+        raise InputError(
+            "law",
+            f"{scenario.law!r} does not push off obstacles and has no contact "
+            "mode; use another law",
         )
     c = float(_DISTANCES_M[stiffest])
     return ContactSlopes(c, float(slope[stiffest]), field.approach_damping(c))

@@ -32,6 +32,7 @@ from analysis.stability.exact_polynomials import (
     match_gram,
 )
 from analysis.stability.lag_model import LagModel
+from systems.input_error import InputError
 
 __all__ = [
     "Feasibility",
@@ -87,10 +88,11 @@ def first_region(
             multipliers = find_multipliers(model, shrink * reach * P)
             if multipliers is not None:
                 return shrink * reach * P, multipliers
-    raise ValueError(
-        f"law: {model.contact.law.name!r} has no region of attraction of this form "
+    raise InputError(
+        "law",
+        f"{model.contact.law.name!r} has no region of attraction of this form "
         f"with {model.lag_s} s of motor lag; lower its stiffness or "
-        "plant.motor_lag_s, or raise attraction.damping_n_s_m"
+        "plant.motor_lag_s, or raise attraction.damping_n_s_m",
     )
 
 

@@ -117,7 +117,7 @@ def sos_region(
         starts: Simulated starts, inside the region and in the domain.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: There is no contact equilibrium, or it is unstable with the
             motor lag.
     """

@@ -13,11 +13,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from analysis.run_error import failure_text
 from analysis.stability.linear_models import LinearModel
 from analysis.stability.model_sheet import ModelSheet, model_sheet
 from diagrams import Scenario
 from diagrams.laws import LAWS, make_controller
 from diagrams.loading import scenario_from_mapping
+from systems.input_error import InputError
 
 __all__ = [
     "Finding",
@@ -42,11 +44,11 @@ class Study:
         """Data object of an earlier part.
 
         Raises:
-            ValueError: It has none.
+            InputError: It has none.
         """
         if self.found.get(key) is None:
-            raise ValueError(
-                f"{key}: has no result, on which this part is built; mend that first"
+            raise InputError(
+                f"{key}", "has no result, on which this part is built; mend that first"
             )
         return self.found[key]
 
@@ -59,7 +61,7 @@ class Part:
     """Name in the JSON document and in links."""
     title: str
     compute: Callable[[Study], Any]
-    """Raises ValueError where there is nothing to compute, and says why."""
+    """Raises InputError where there is nothing to compute, and says why."""
     render: Callable[[Any, str], list[str]]
     """Pieces of HTML from the data and a prefix for names of figures."""
     fresh: bool = False
@@ -80,6 +82,8 @@ class Finding:
     """Why there is no data; empty where there is."""
     seconds: float
     """Time that it took, s."""
+    failed: bool = False
+    """Whether the problem is a fault of the program, none of law or scenario."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +93,8 @@ class LawAnalysis:
     scenario: Scenario
     sheet: ModelSheet
     findings: dict[str, Finding]
+    failures: dict[str, Exception] = field(default_factory=dict)
+    """What parts raised that is no complaint about law or scenario, by key."""
 
     @property
     def law(self) -> str:
@@ -120,7 +126,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
             the scenario's own.
 
     Raises:
-        ScenarioError: There is no such law.
+        InputError: There is no such law.
     """
     every = [law for law in LAWS if law != "none"]
     laws = [law for name in names for law in (every if name == "all" else [name])]
@@ -147,26 +153,30 @@ def analyse_law(
         step: Called with the title of each part before it runs.
 
     Raises:
-        ValueError: The very first part, without which the others are nothing,
-            has no result.
+        InputError: The very first part, without which the others are nothing,
+            has no result. What else it raises, it raises too.
     """
     study = Study(scenario)
-    findings: dict[str, Finding] = {}
+    analysis = LawAnalysis(scenario, model_sheet(scenario), {})
     for part in parts:
         step(part.title)
-        finding = _run(part, study)
-        if not findings and finding.problem:
-            raise ValueError(finding.problem)
-        findings[part.key] = finding
+        finding = _run(part, study, analysis)
+        analysis.findings[part.key] = finding
         study.found[part.key] = finding.data
-    return LawAnalysis(scenario, model_sheet(scenario), findings)
+    return analysis
 
 
-def _run(part: Part, study: Study) -> Finding:
-    start = time.perf_counter()
+def _run(part: Part, study: Study, analysis: LawAnalysis) -> Finding:
+    start, data, problem, failed = time.perf_counter(), None, "", False
     try:
-        data, problem = part.compute(study), ""
-    except (ValueError, ArithmeticError, RuntimeError) as error:
-        # The last two are a computation's that broke down, Drake's among them.
-        data, problem = None, str(error) or type(error).__name__
-    return Finding(part, data, problem, time.perf_counter() - start)
+        data = part.compute(study)
+    except InputError as error:
+        if not analysis.findings:
+            raise
+        problem = str(error)
+    except Exception as error:  # the other parts must go on
+        if not analysis.findings:
+            raise
+        analysis.failures[part.key] = error
+        problem, failed = failure_text(error), True
+    return Finding(part, data, problem, time.perf_counter() - start, failed)

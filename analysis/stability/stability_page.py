@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from itertools import groupby
 from typing import Any
 
+from analysis.run_error import failure_text
 from analysis.runs.html_page import (
     Cell,
     bullets,
@@ -29,6 +30,7 @@ _NAMES = {
     "none": "No avoidance",
     "conventional": "Conventional law",
     "active": "Active law of 2019",
+    "conventional2017": "Conventional law of 2017",
     "active2017": "Active law of 2017",
 }
 
@@ -105,7 +107,7 @@ def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
             section(
                 f"{prefix}-{key}",
                 finding.part.title,
-                _finding(finding, prefix),
+                _finding(analysis, finding, prefix),
                 level=3,
                 fresh=finding.part.fresh,
             )
@@ -113,10 +115,17 @@ def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:
     return parts
 
 
-def _finding(finding: Finding, prefix: str) -> list[str]:
+def _finding(analysis: LawAnalysis, finding: Finding, prefix: str) -> list[str]:
+    if finding.failed:
+        return [note(f"This part failed: {finding.problem}.")]
     if finding.problem:
         return [note(f"Not computed: {finding.problem}.")]
-    return finding.part.render(finding.data, f"{prefix}-{finding.part.key}")
+    key = finding.part.key
+    try:
+        return finding.part.render(finding.data, f"{prefix}-{key}")
+    except Exception as error:  # noqa: BLE001  # the other parts must be shown
+        analysis.failures[key] = error
+        return [note(f"This part failed: {failure_text(error)}.")]
 
 
 def _model(sheet: ModelSheet) -> str:

@@ -55,13 +55,15 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
     for finding in findings:
         part = finding.part
         if finding.problem:
-            parts[part.key] = {"problem": finding.problem}
+            failed = {"failed": True} if finding.failed else {}
+            parts[part.key] = {"problem": finding.problem, **failed}
         elif part.document is None:
             parts[part.key] = plain(finding.data)
         else:
             for key, value in plain(part.document(finding.data)).items():
                 # Parts may add to a list of an earlier one.
-                parts[key] = parts[key] + value if key in parts else value
+                earlier = parts.get(key)
+                parts[key] = earlier + value if isinstance(earlier, list) else value
     return {
         "law": analysis.law,
         **parts,
@@ -74,7 +76,9 @@ def stability_text(document: dict[str, Any]) -> str:
     """The verdicts on one screen."""
     rows = document.get("comparison")
     if rows is None:
-        rows = [_as_comparison(row, document["law"]) for row in document["verdicts"]]
+        verdicts = document["verdicts"]
+        known = verdicts if isinstance(verdicts, list) else []
+        rows = [_as_comparison(row, document["law"]) for row in known]
     laws = list(rows[0]["values"]) if rows else []
     lines = [f"{'':<34}{'threshold':>14}" + "".join(f"{law:>22}" for law in laws)]
     for row in rows:
@@ -117,6 +121,6 @@ def write_stability(
     ]
     write_models(models, directory)
     scenario = analyses[0].scenario
-    (directory / "scenario.yaml").write_text(dump_scenario(scenario))
+    (directory / "scenario.yaml").write_text(dump_scenario(scenario), "utf-8")
     (directory / "summary.json").write_text(json.dumps(document) + "\n")
-    (directory / "report.html").write_text(stability_page(analyses))
+    (directory / "report.html").write_text(stability_page(analyses), "utf-8")

@@ -16,6 +16,7 @@ from analysis.stability.operating_points import OperatingPoint
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario import Scenario
 from systems.geometry import control_point
+from systems.input_error import InputError
 
 __all__ = ["Oscillation", "StepCheck", "check_step", "fitted_step"]
 
@@ -76,7 +77,7 @@ def check_step(
         full: Whether to run the scenario's own sensors too.
 
     Raises:
-        ValueError: There is no stable equilibrium, or nothing oscillates there.
+        InputError: There is no stable equilibrium, or nothing oscillates there.
     """
     point = follow_equilibrium(scenario)
     modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
@@ -99,10 +100,11 @@ def check_step(
 def _along(point: OperatingPoint, modes: list[Any]) -> Any:
     """The oscillation along the line to the source: the stiffest."""
     if not modes:
-        raise ValueError(
-            "attraction: about the equilibrium nothing oscillates, so that there is "
+        raise InputError(
+            "attraction",
+            "about the equilibrium nothing oscillates, so that there is "
             "no frequency to compare; take a stiffness_n_m that is larger for the "
-            "damping_n_s_m"
+            "damping_n_s_m",
         )
     return max(modes, key=lambda mode: mode.frequency_rad_s)
 
@@ -119,7 +121,7 @@ def _run(
         "position_m": [x, y],
         "heading_deg": math.degrees(point.theta_WB),
     }
-    # No stop rules: a resting source counts as reached at once.
+    # No stop rules: a small step is slow enough to count as rest.
     follower = build_sound_follower(Scenario.model_validate(data), log=True)
     simulator = make_simulator(follower)
     simulator.Initialize()

@@ -20,6 +20,7 @@ from systems.collision_vector import collision_vectors, echo_points
 from systems.geometry import control_point, rotate
 from systems.ideal_obstacle_sensor import nearest_vectors
 from systems.impedance import attraction_force, repulsion_force
+from systems.input_error import InputError
 from systems.signals import FRAME_PERIOD_S
 from systems.ultrasonic_array import cone_ranges
 
@@ -68,14 +69,14 @@ def trap_stiffness(
         body: ``point`` or ``face``.
 
     Raises:
-        ScenarioError: The law is not known.
-        ValueError: The law does not hold P before the body, or a word is
+        InputError: The law is not known.
+        InputError: The law does not hold P before the body, or a word is
             unknown.
     """
     if sensing not in ("exact", "cones"):
-        raise ValueError(f"sensing: {sensing!r} is neither 'exact' nor 'cones'")
+        raise InputError("sensing", f"{sensing!r} is neither 'exact' nor 'cones'")
     if body not in _BODIES_M:
-        raise ValueError(f"body: {body!r} is neither 'point' nor 'face'")
+        raise InputError("body", f"{body!r} is neither 'point' nor 'face'")
     size = _BODIES_M[body]
     case = boxes_scenario(scenario, [(BOX_X_M, 0.0)], "cones", size)
     contact = head_on(case, to_go_m=TO_GO_M + 0.5 * size[0])

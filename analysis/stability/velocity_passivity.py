@@ -109,7 +109,7 @@ def velocity_term_passivity(
     """The sector of the scenario's velocity term, or of another one.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: The law has no radial force.
     """
     model = point_mass(scenario)
@@ -131,7 +131,7 @@ def energy_balance(
     """Energies along a run of the point mass from the scenario's start.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: The law has no radial force.
     """
     passivity = velocity_term_passivity(scenario, velocity_term)

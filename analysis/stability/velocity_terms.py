@@ -183,7 +183,7 @@ def velocity_term_analysis(
         to_go_m: See ``head_on``.
 
     Raises:
-        ScenarioError: The law is not known.
+        InputError: The law is not known.
         ValueError: There is no contact equilibrium.
     """
     contact = head_on(scenario, to_go_m=to_go_m)

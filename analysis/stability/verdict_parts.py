@@ -54,8 +54,8 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     (
         Criterion(
             "least phase margin", "deg", "at least", 45.0,
-            "every cut loop stands the usual extra phase lag",
-            "a small extra phase lag makes it oscillate",
+            "every cut loop stands the usual extra phase, lag or lead",
+            "a small extra phase makes it oscillate",
             _MARGINS,
         ),
         read_worst_margin("phase_margin_deg", largest=False),
@@ -63,8 +63,9 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
     (
         Criterion(
             "least gain margin", "dB", "at least", 6.0,
-            "gains may double",
-            "a gain that is less than twice as large makes it oscillate",
+            "gains may double, or fall to half",
+            "a gain that is off by less than a factor of two, up or down, makes it "
+            "unstable",
             _MARGINS,
         ),
         read_worst_margin("gain_margin_db", largest=False),

@@ -13,12 +13,14 @@ __all__ = [
     "STATIC",
     "TWO",
     "Judge",
+    "accurate",
     "avoids_more",
     "blind",
     "collision_free",
     "earlier",
     "follows",
     "jams",
+    "slips_less",
     "smoother",
     "vibrates",
 ]
@@ -33,12 +35,17 @@ TOLERANCE = 0.05
 STATIC, ONE, TWO = "two_static_obstacles", "one_moving_obstacle", "two_moving_obstacles"
 FREE = "obstacle_free"
 
+#: Field of the runs in which wheels can slip.
+FRICTION = "plant.friction"
+#: Slip of less than this is none, m: twice what steps of 25 ms are off by.
+LEAST_SLIP_M = 0.005
+
 
 def _cell(summary: dict[str, Any], scenario: str, law: str) -> dict[str, Any]:
     return next(
         cell
         for cell in summary["cells"]
-        if (cell["scenario"], cell["law"]) == (scenario, law)
+        if (cell["scenario"], cell["law"], cell["fields"]) == (scenario, law, {})
     )
 
 
@@ -48,8 +55,8 @@ def _pair(
     return next(
         pair
         for pair in summary["pairs"]
-        if (pair["scenario"], pair["first"], pair["second"])
-        == (scenario, first, second)
+        if (pair["scenario"], pair["first"], pair["second"], pair["fields"])
+        == (scenario, first, second, {})
     )
 
 
@@ -119,18 +126,18 @@ def collision_free(scenario: str) -> Judge:
     return judge
 
 
-def avoids_more(scenario: str, law: str) -> Judge:
-    """A law collides on fewer layouts than conventional."""
+def avoids_more(scenario: str, law: str, baseline: str = "conventional") -> Judge:
+    """A law collides on fewer layouts than the one that its paper compares it with."""
 
     def judge(summary: dict[str, Any]) -> tuple[str, str]:
-        pair = _pair(summary, scenario, "conventional", law)["collision"]
+        pair = _pair(summary, scenario, baseline, law)["collision"]
         rates = (
             _percent(_cell(summary, scenario, name)["collision"])
-            for name in ("conventional", law)
+            for name in (baseline, law)
         )
         figure = (
-            f"collisions: conventional {next(rates)}, {law} {next(rates)}; "
-            f"{_points(pair)}; {pair['only_first']} layouts where conventional alone "
+            f"collisions: {baseline} {next(rates)}, {law} {next(rates)}; "
+            f"{_points(pair)}; {pair['only_first']} layouts where {baseline} alone "
             f"collides, {pair['only_second']} where {law} alone does"
         )
         return figure, _verdict(_sign(pair), wanted=1)
@@ -159,6 +166,51 @@ def smoother(scenario: str) -> Judge:
     return judge
 
 
+def slips_less(summary: dict[str, Any]) -> tuple[str, str]:
+    """Active slips less on every floor on which wheels slip."""
+    return _on_floors(summary, ("slip_way_m",), "the wheels slip")
+
+
+def accurate(summary: dict[str, Any]) -> tuple[str, str]:
+    """Active's odometry is nearer to the truth there, at the end and on the way."""
+    names = ("odometry_error_final_m", "odometry_error_rms_m")
+    return _on_floors(summary, names, "odometry is off at the end by")
+
+
+def _on_floors(
+    summary: dict[str, Any], names: tuple[str, ...], text: str
+) -> tuple[str, str]:
+    """Active has less of some lengths where both laws push and succeed.
+
+    Args:
+        summary: With ``--grid plant.friction``.
+        names: Metrics in m that are judged; the first is reported.
+        text: What it is of.
+    """
+    figures, signs = [], set()
+    for pair in summary["pairs"]:
+        friction, metrics = pair["fields"].get(FRICTION), pair["encounters"]
+        laws = (pair["scenario"], pair["first"], pair["second"])
+        if laws != (STATIC, "conventional", "active") or friction is None:
+            continue
+        floor, slip = f"friction {friction:g}:", metrics.get("slip_way_m")
+        if slip is None:
+            figures.append(f"{floor} no layout on which both push and succeed")
+            continue
+        if max(slip["first"], slip["second"]) < LEAST_SLIP_M:
+            figures.append(f"{floor} no slip")
+            continue
+        first, *_ = medians = [metrics[name] for name in names]
+        lengths = ("first", "second", "difference", "low", "high")
+        cm = {**first, **{key: 100.0 * first[key] for key in lengths}}
+        figures.append(_both(cm, floor, "cm"))
+        signs |= {_sign(median) for median in medians}
+    figure = f"{text}: {'; '.join(figures)}"
+    if {1, -1} <= signs:
+        return figure, "depends on the floor"
+    return figure, _verdict(signs.pop() if len(signs) == 1 else 0, wanted=1)
+
+
 def earlier(summary: dict[str, Any]) -> tuple[str, str]:
     """Active pushes first from farther away."""
     median = _pair(summary, STATIC, "conventional", "active")["metrics"][
@@ -169,7 +221,10 @@ def earlier(summary: dict[str, Any]) -> tuple[str, str]:
 
 
 def jams(summary: dict[str, Any]) -> tuple[str, str]:
-    """Conventional jams among two static obstacles, active does less."""
+    """Conventional jams among two static obstacles, active does less.
+
+    What has come into the goal has passed the obstacles, and is in no jam.
+    """
     rates = {}
     for law in ("conventional", "active"):
         cell = _cell(summary, STATIC, law)
@@ -178,8 +233,8 @@ def jams(summary: dict[str, Any]) -> tuple[str, str]:
         rates[law] = {"estimate": count / runs, "low": low, "high": high}
     conventional, active = rates.values()
     figure = (
-        f"stuck or out of time: conventional {_percent(conventional)}, active "
-        f"{_percent(active)} of all layouts"
+        "stuck, or out of time before the goal: conventional "
+        f"{_percent(conventional)}, active {_percent(active)} of all layouts"
     )
     if conventional["low"] > active["high"]:
         return figure, "holds"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -12,13 +11,15 @@ from typing import Any
 from pydantic import ValidationError
 
 import diagrams
-from analysis.runs.result_directory import choose_directory
+from analysis.runs.result_directory import ResultDirectory, take_directory
 from analysis.sweeps.comparison import Comparison, Pair, compare_runs, pooled_pairs
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from analysis.sweeps.sweep_plan import SweepPlan, load_sweep
-from diagrams import ScenarioError, load_scenario
+from analysis.sweeps.sweep_run import require_runs
+from diagrams import load_scenario
 from diagrams.laws import LAWS
 from diagrams.loading import explain, read_mapping
+from systems.input_error import InputError
 
 __all__ = [
     "EXPERIMENTS",
@@ -68,18 +69,25 @@ class PreparedComparison:
 
         Returns:
             Comparisons by name of the scenario, and the pairs of all together.
+
+        Raises:
+            RunError: Every run failed.
         """
-        comparisons, tables, before = {}, [], 0
+        tables: list[tuple[SweepPlan, Any]] = []
+        before = 0
 
         def report(before: int, done: int) -> None:
             if progress is not None:
                 progress(before + done)
 
-        for name, sweep in self.sweeps.items():
-            table = sweep.run(partial(report, before))
-            comparisons[name] = compare_runs(sweep.plan, table, name)
-            tables.append((sweep.plan, table))
+        for sweep in self.sweeps.values():
+            tables.append((sweep.plan, sweep.run(partial(report, before))))
             before += len(sweep.points)
+        require_runs([table for _, table in tables], self.out)
+        comparisons = {
+            name: compare_runs(plan, table, name)
+            for name, (plan, table) in zip(self.sweeps, tables, strict=True)
+        }
         return comparisons, pooled_pairs(tables)
 
 
@@ -110,7 +118,7 @@ def comparison_plan(
         grid: Further fields to compare, with their values.
 
     Raises:
-        ScenarioError: Something of that is unknown or no good; names the field.
+        InputError: Something of that is unknown or no good; names the field.
     """
     plan = _layouts(scenario)
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
@@ -143,12 +151,16 @@ def prepare_comparison(
         resume: Whether ``out`` may hold runs of the same comparison.
 
     Raises:
-        ValueError: Something of that is no good; says what, and the remedy.
+        InputError: Something of that is no good; says what, and the remedy.
     """
     if resume and out is None:
-        raise ValueError("out: --resume needs the directory to go on with; name it")
-    directory = Path(out) if resume and out is not None else choose_directory(out)
-    fresh, sweeps = not directory.exists(), {}
+        raise InputError("out", "--resume needs the directory to go on with; name it")
+    directory = Path(out).expanduser() if out is not None else None
+    taken: ResultDirectory | None = None
+    if directory is None or not (resume and directory.exists()):
+        taken = take_directory(out)
+        directory = directory or Path("results") / taken.path.name
+    sweeps: dict[str, PreparedSweep] = {}
     try:
         for name, plan in plans.items():
             sweeps[name] = prepare_sweep(
@@ -157,9 +169,11 @@ def prepare_comparison(
     except BaseException:
         for sweep in sweeps.values():
             sweep.store.close()
-        if fresh:
-            shutil.rmtree(directory, ignore_errors=True)
+        if taken is not None:
+            taken.undo(contents=True)
         raise
+    if taken is not None:
+        taken.close()  # from now on the directories of the runs are locked
     return PreparedComparison(directory, sweeps)
 
 
@@ -173,7 +187,7 @@ def _layouts(scenario: str) -> SweepPlan:
         if "scenario" in data:
             for key in _OURS:
                 if key in data:
-                    raise ScenarioError(
+                    raise InputError(
                         f"{scenario}: {key}",
                         "is for the comparison to set; remove it, or use sweep",
                     )

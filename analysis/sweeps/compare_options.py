@@ -8,9 +8,9 @@ from typing import Any
 
 from analysis.sweeps.compare import EXPERIMENTS, comparison_plan
 from analysis.sweeps.sweep_plan import SweepPlan
-from diagrams import ScenarioError
 from diagrams.laws import LAWS
 from diagrams.loading import parse_setting
+from systems.input_error import InputError
 
 __all__ = ["comparison_plans"]
 
@@ -39,7 +39,7 @@ def comparison_plans(
         grid: ``key=[value, ...]``.
 
     Raises:
-        ScenarioError: A word is no good; names the option or the field.
+        InputError: A word is no good; names the option or the field.
     """
     fields = dict(parse_setting(text) for text in settings)
     varied = dict(_values(text) for text in grid)
@@ -53,7 +53,7 @@ def comparison_plans(
     for scenario in scenarios or EXPERIMENTS:
         name = Path(scenario).stem
         if name in plans:
-            raise ScenarioError("scenario", f"{name} stands there twice; drop one")
+            raise InputError("scenario", f"{name} stands there twice; drop one")
         plans[name] = comparison_plan(
             scenario,
             laws=laws.split(",") if laws is not None else LAWS,
@@ -68,7 +68,7 @@ def comparison_plans(
 def _values(text: str) -> tuple[str, list[Any]]:
     key, values = parse_setting(text)
     if not isinstance(values, list):
-        raise ScenarioError(key, f"{values!r} is no list of values; write [a, b]")
+        raise InputError(key, f"{values!r} is no list of values; write [a, b]")
     return key, values
 
 
@@ -76,5 +76,5 @@ def _seed(text: str | None) -> int:
     if text is None:
         return 1
     if not text.isdigit():
-        raise ScenarioError("seed", f"{text!r} is not a whole number; give 0 or more")
+        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
     return int(text)

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
+from systems.input_error import InputError
 from systems.parameters import Parameters
 
 __all__ = ["Distribution"]
@@ -39,31 +40,34 @@ class Distribution(Parameters):
         names = list(type(self).model_fields)
         given = [name for name in names if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(
-                f"{len(given)} distributions are given; give one of {', '.join(names)}"
+            raise InputError(
+                "",
+                f"{len(given)} distributions are given; give one of {', '.join(names)}",
             )
         for name, low_high in (
             ("uniform", self.uniform),
             ("log_uniform", self.log_uniform),
         ):
             if low_high is not None and not low_high[0] < low_high[1]:
-                raise ValueError(
-                    f"{name}: {list(low_high)} is empty; give [low, high] with low < "
-                    "high, or use set for one value"
+                raise InputError(
+                    name,
+                    f"{list(low_high)} is empty; give [low, high] with low < "
+                    "high, or use set for one value",
                 )
         if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
-            raise ValueError(
-                f"log_uniform: {list(self.log_uniform)} must be positive; raise low"
+            raise InputError(
+                "log_uniform", f"{list(self.log_uniform)} must be positive; raise low"
             )
         if self.normal is not None and self.normal[1] <= 0.0:
-            raise ValueError(
-                f"normal: the standard deviation {self.normal[1]:g} must be positive; "
-                "give [mean, standard deviation]"
+            raise InputError(
+                "normal",
+                f"the standard deviation {self.normal[1]:g} must be positive; "
+                "give [mean, standard deviation]",
             )
         if self.integers is not None and self.integers[0] > self.integers[1]:
-            raise ValueError(
-                f"integers: {list(self.integers)} is empty; give [low, high] with "
-                "low <= high"
+            raise InputError(
+                "integers",
+                f"{list(self.integers)} is empty; give [low, high] with low <= high",
             )
         return self
 

@@ -19,6 +19,12 @@ MECHANISMS = (
     "heard late",
     "pushed too little",
     "jam",
+    "held off",
+    "swings",
+    "lost",
+    "astray",
+    "diverged",
+    "failed",
 )
 
 
@@ -27,16 +33,18 @@ def failure_table(summary: dict[str, Any]) -> str:
 
     Args:
         summary: JSON document of ``phonotaxis compare``. Scenarios in which
-            nothing failed are left out.
+            nothing failed are left out, and mechanisms that none failed by.
     """
-    heading = "| scenario | law | failures | " + " | ".join(MECHANISMS) + " |"
-    lines = [heading, "|---" * (3 + len(MECHANISMS)) + "|"]
+    found = [cell["mechanisms"] for cell in summary["cells"]]
+    names = [name for name in MECHANISMS if any(counts.get(name) for counts in found)]
+    heading = "| scenario | law | failures | " + " | ".join(names) + " |"
+    lines = [heading, "|---" * (3 + len(names)) + "|"]
     for cell in summary["cells"]:
         counts, runs = cell["mechanisms"], cell["runs"]
         failures = sum(counts.values())
         if failures == 0:
             continue
-        shares = [_share(counts, name, runs) for name in MECHANISMS]
+        shares = [_share(counts, name, runs) for name in names]
         row = [cell["scenario"], cell["law"], f"{100.0 * failures / runs:.1f} %"]
         lines.append("| " + " | ".join(row + shares) + " |")
     return "\n".join(lines)

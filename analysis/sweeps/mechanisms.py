@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pandas as pd
 
+from analysis.runs.run_table import figure
 from diagrams.stop_rules import SUCCESSFUL
 from systems.signals import FRAME_PERIOD_S
 
@@ -28,15 +30,19 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     - ``heard late``: the first one was less than 1 s before the contact;
     - ``pushed too little``: heard in time and to the end.
 
-    Of the others: ``jam`` (stuck, or out of time without having reached the
-    goal), ``lost`` and ``diverged`` (the source), ``failed`` (an error).
+    Of the others: ``jam`` (stuck, or out of time, without ever having come into the
+    goal), ``held off`` (stuck after it came: the push off the source itself keeps
+    it outside), ``swings`` (unsettled: it came, and did not come to rest there),
+    ``lost``, ``astray`` and ``diverged`` (the source), ``failed`` (an error).
 
     Args:
         rows: Of ``analysis.sweeps.sweep_store.load_results``, with cones.
     """
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))
-    names = names.replace({"stuck": "jam", "timeout": "jam"})
+    names = names.replace({"stuck": "jam", "timeout": "jam", "unsettled": "swings"})
+    came = np.isfinite(figure(rows, "time_to_goal_s"))
+    names = names.mask((cause == "stuck") & came, "held off")
     hits = cause == "collision"
     warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]
     names = names.mask(hits, "pushed too little")

@@ -13,12 +13,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.runs.result_directory import choose_directory
+from analysis.runs.result_directory import check_directory
 from analysis.sweeps.sweep_plan import SweepPlan, SweepPoint
 from analysis.sweeps.sweep_processes import run_locally
 from analysis.sweeps.sweep_run import Outcome, Task
 from analysis.sweeps.sweep_store import StoreError, SweepStore, load_results
 from diagrams import build_sound_follower
+from systems.input_error import InputError
 
 __all__ = ["PreparedSweep", "prepare_sweep", "reproducing_command", "run_sweep"]
 
@@ -77,6 +78,10 @@ class PreparedSweep:
                 yield Task(point, scenario, trajectory=self.plan.trajectories)
 
 
+#: Processes, each of some 300 MB.
+MOST_WORKERS = 256
+
+
 def prepare_sweep(
     plan: SweepPlan,
     out: str | Path | None = None,
@@ -95,18 +100,18 @@ def prepare_sweep(
         resume: Whether ``out`` may hold runs of the same plan, which are kept.
 
     Raises:
-        ValueError: Something of that is no good; says what, and the remedy.
+        InputError: Something of that is no good; says what, and the remedy.
     """
-    if workers is not None and workers < 1:
-        raise ValueError(f"workers: {workers} must be at least 1; raise it")
+    if workers is not None and not 1 <= workers <= MOST_WORKERS:
+        raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
     if scheduler is not None and workers is not None:
-        raise ValueError("workers: a cluster has its own; leave out --workers")
+        raise InputError("workers", "a cluster has its own; leave out --workers")
     if resume and out is None:
-        raise ValueError("out: --resume needs the directory to go on with; name it")
-    begun = (
-        resume and out is not None and Path(out).is_dir() and any(Path(out).iterdir())
-    )
-    directory = Path(out) if begun and out is not None else choose_directory(out)
+        raise InputError("out", "--resume needs the directory to go on with; name it")
+    directory = Path(out).expanduser() if out is not None else None
+    begun = directory is not None and directory.is_dir() and any(directory.iterdir())
+    if directory is not None and not (resume and begun):
+        check_directory(directory)
     points = plan.points()
     _build_each_kind(plan, points)
     runner: Runner

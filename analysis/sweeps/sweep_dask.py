@@ -24,6 +24,7 @@ from analysis.sweeps.sweep_processes import (
     WorkerProcess,
 )
 from analysis.sweeps.sweep_run import Outcome, Task, lost_outcome
+from systems.input_error import InputError
 
 __all__ = ["connect", "run_on_cluster"]
 
@@ -41,14 +42,14 @@ def connect(scheduler: str) -> Any:
         scheduler: Address of the scheduler, as tcp://host:8786.
 
     Raises:
-        ValueError: It cannot be reached, or has no workers, or they have other
+        InputError: It cannot be reached, or has no workers, or they have other
             packages than this process; ``scheduler: ...``.
     """
     try:
         import distributed
     except ImportError:
-        raise ValueError(
-            "scheduler: needs the package distributed; install phonotaxis[sweep]"
+        raise InputError(
+            "scheduler", "needs the package distributed; install phonotaxis[sweep]"
         ) from None
     try:
         address = urlsplit(scheduler)
@@ -57,13 +58,14 @@ def connect(scheduler: str) -> Any:
             client = distributed.Client(scheduler, timeout=_CONNECT_S)
         trouble = _trouble(client)
     except (OSError, ValueError, TypeError) as error:
-        raise ValueError(
-            f"scheduler: {scheduler} cannot be reached ({error}); give the address "
-            "that `dask scheduler` prints, as tcp://host:8786"
+        raise InputError(
+            "scheduler",
+            f"{scheduler} cannot be reached ({error}); give the address "
+            "that `dask scheduler` prints, as tcp://host:8786",
         ) from None
     if trouble:
         client.close()
-        raise ValueError(f"scheduler: {scheduler} {trouble}")
+        raise InputError("scheduler", f"{scheduler} {trouble}")
     return client
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import hashlib
 import json
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,7 +20,8 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from ruamel.yaml import YAML
 
 from analysis.sweeps.distributions import Distribution
-from diagrams import Scenario, ScenarioError, load_scenario
+from diagrams import Scenario, load_scenario
+from diagrams.laws import law_files
 from diagrams.loading import (
     explain,
     read_mapping,
@@ -27,12 +29,15 @@ from diagrams.loading import (
     scenario_from_mapping,
     set_field,
 )
+from systems.input_error import InputError
 from systems.parameters import Parameters
 
 __all__ = ["SweepPlan", "SweepPoint", "dump_plan", "load_sweep"]
 
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
-Count = Annotated[int, Field(ge=1, le=10_000_000)]
+#: All are drawn and checked before the first one runs, a millisecond each.
+MOST_RUNS = 1_000_000
+Count = Annotated[int, Field(ge=1, le=MOST_RUNS)]
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,16 @@ class SweepPlan(Parameters):
             texts = [json.dumps(value, default=str) for value in values]
             for text in texts:
                 if texts.count(text) > 1:
-                    raise ValueError(f"grid.{key}: {text} stands there twice; drop one")
+                    raise InputError(
+                        f"grid.{key}", f"{text} stands there twice; drop one"
+                    )
+        total = self.runs * math.prod(len(values) for values in self.grid.values())
+        if total > MOST_RUNS:
+            raise InputError(
+                "grid",
+                f"its cells with {self.runs} runs each make {total} runs; at most "
+                f"{MOST_RUNS} are possible, so narrow grid or lower runs",
+            )
         for part in ("set", "grid"):
             _check_plain(part, getattr(self, part))
         _check_plain("draw", self.model_dump(include={"draw"}, exclude_none=True))
@@ -137,7 +151,7 @@ class SweepPlan(Parameters):
             Points by index. A point does not depend on ``runs``.
 
         Raises:
-            ScenarioError: A field is unknown, or a value or a layout is not
+            InputError: A field is unknown, or a value or a layout is not
                 valid; names the field by its whole path.
         """
         cells = self.cells()
@@ -164,7 +178,25 @@ class SweepPlan(Parameters):
     def digest(self) -> str:
         """Hash of everything that the draws and the runs depend on."""
         document = {**self.model_dump(mode="json"), "base": self.base}
+        if self.file_digests:
+            document["files"] = self.file_digests
         return hashlib.sha256(json.dumps(document).encode()).hexdigest()
+
+    @cached_property
+    def file_digests(self) -> dict[str, str]:
+        """SHA-256 of each file on which runs depend: sounds, and laws' modules."""
+        values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
+        files: set[Path] = set()
+        for field, text in _texts("", values):
+            if field == "law":
+                files.update(law_files(text))
+            elif field in ("file", "ego_noise_file"):
+                files.add(Path(self.folder, text).resolve())
+        return {
+            str(path): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(files)
+            if path.is_file()
+        }
 
     def _draw_run(
         self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
@@ -191,25 +223,25 @@ class SweepPlan(Parameters):
         assert complaint is not None
         raise complaint
 
-    def _complaint(self, points: list[SweepPoint]) -> ScenarioError | None:
+    def _complaint(self, points: list[SweepPoint]) -> InputError | None:
         """What is wrong with the first point that makes no valid scenario."""
         for point in points:
             try:
                 self.scenario_of(point)
-            except ScenarioError as error:
+            except InputError as error:
                 where = f"cell {point.cell} of the grid"
                 if self._valid_undrawn(point):
                     times = f"drawn {self.redraws + 1} times; " if self.redraws else ""
                     where = f"run {point.run}, {where}; {times}narrow the draws, or "
                     where += "raise redraws to replace such runs"
-                return ScenarioError(error.field, f"{error.message} ({where})")
+                return InputError(error.field, f"{error.message} ({where})")
         return None
 
     def _valid_undrawn(self, point: SweepPoint) -> bool:
         undrawn = replace(point, fields=self.cells()[point.cell])
         try:
             self.scenario_of(undrawn)
-        except ScenarioError:
+        except InputError:
             return False
         return bool(self.draw)
 
@@ -231,11 +263,11 @@ def load_sweep(path: str | Path) -> SweepPlan:
             it begin in its folder.
 
     Raises:
-        ScenarioError: The file cannot be read, or a field is unknown or wrong.
+        InputError: The file cannot be read, or a field is unknown or wrong.
     """
     path = Path(path)
     if not path.is_file():
-        raise ScenarioError("sweep", f"there is no file {path}; check the path")
+        raise InputError("sweep", f"there is no file {path}; check the path")
     data = read_mapping(path)
     for part in ("set", "grid", "draw"):  # a heading with nothing below it
         if part in data and data[part] is None:
@@ -262,21 +294,36 @@ def _paths(key: str) -> list[str]:
     return [path.strip() for path in key.split(",")]
 
 
+def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Every text within a value, with the last part of the key that it stands at."""
+    if isinstance(value, dict):
+        for inner, item in value.items():
+            for path in _paths(str(inner)):
+                known = path.split(".")[-1]
+                # A distribution's own fields stand for the field that is drawn.
+                yield from _texts(key if known == "choice" else known, item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _texts(key, item)
+    elif isinstance(value, str):
+        yield key, value
+
+
 def _count(grid: dict[str, tuple[Any, ...]]) -> int:
     return int(np.prod([len(values) for values in grid.values()], dtype=np.int64))
 
 
 def _check_path(field: str, path: str, earlier: list[str]) -> None:
     if not all(path.split(".")):
-        raise ValueError(f"{field}: is no dotted path, as source.speed_m_s; mend it")
+        raise InputError(field, "is no dotted path, as source.speed_m_s; mend it")
     if path == "seed":
-        raise ValueError(
-            f"{field}: every run gets a seed of its own; set the sweep's own seed"
+        raise InputError(
+            field, "every run gets a seed of its own; set the sweep's own seed"
         )
     for other in earlier:
         if path == other or other.startswith(f"{path}."):
-            raise ValueError(
-                f"{field}: would overwrite {other}, which comes before it; drop one"
+            raise InputError(
+                field, f"would overwrite {other}, which comes before it; drop one"
             )
 
 
@@ -284,7 +331,8 @@ def _check_plain(part: str, value: Any) -> None:
     try:
         json.dumps(value, allow_nan=False)
     except (TypeError, ValueError):
-        raise ValueError(
-            f"{part}: values must be finite numbers, texts, truth values, lists or "
-            "mappings; quote what is meant as text"
+        raise InputError(
+            part,
+            "values must be finite numbers, texts, truth values, lists or "
+            "mappings; quote what is meant as text",
         ) from None

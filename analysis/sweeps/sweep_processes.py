@@ -11,6 +11,7 @@ import sys
 from collections.abc import Callable, Generator, Iterator
 from multiprocessing.connection import Connection, wait
 
+from analysis.run_error import RunError
 from analysis.sweeps.sweep_run import Outcome, Task, lost_outcome
 from analysis.sweeps.sweep_worker import READY
 from diagrams import Scenario
@@ -26,7 +27,7 @@ _MAIN = (
 )
 
 
-class WorkerError(RuntimeError):
+class WorkerError(RunError):
     """Workers that cannot be started, or reached any more."""
 
 

@@ -4,15 +4,21 @@ from __future__ import annotations
 
 import io
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+import pandas as pd
+
+from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.sweep_plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
+from systems.input_error import shortened
 
-__all__ = ["Outcome", "Task", "lost_outcome", "run_task"]
+__all__ = ["Outcome", "Task", "lost_outcome", "require_runs", "run_task"]
 
 #: Cause in the row of a run that raised an error.
 FAILED = "failed"
@@ -51,6 +57,20 @@ def run_task(task: Task) -> Outcome:
         text = " ".join(f"{type(error).__name__}: {error}".split())
         return Outcome(_row(task.point, FAILED, start, error=text))
     return Outcome(row, trajectory)
+
+
+def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
+    """Refuses results that hold no run but failed ones.
+
+    Raises:
+        RunError: All failed; says how the first one did.
+    """
+    causes = [cause for table in tables for cause in table["cause"]]
+    if causes and all(cause == FAILED for cause in causes):
+        raise RunError(
+            f"all {len(causes)} runs failed, the first one by "
+            f"{shortened(str(tables[0]['error'].iloc[0]), 160)}; {out} keeps them"
+        )
 
 
 def lost_outcome(task: Task, reason: str) -> Outcome:

@@ -15,7 +15,9 @@ from typing import Any
 
 import pandas as pd
 from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
 
+from analysis.run_error import RunError
 from analysis.runs.result_directory import whole_directory
 from analysis.runs.run_report import versions
 from analysis.sweeps.sweep_plan import SweepPlan, dump_plan
@@ -23,6 +25,7 @@ from analysis.sweeps.sweep_run import Outcome
 from analysis.sweeps.sweep_table import parquet_bytes, results_table
 from diagrams import dump_scenario
 from diagrams.loading import scenario_from_mapping
+from systems.input_error import InputError
 
 __all__ = ["StoreError", "SweepStore", "load_results", "trajectory_path"]
 
@@ -35,44 +38,49 @@ JOURNAL, TABLE, MANIFEST, PLAN = (
 )
 
 
-class StoreError(RuntimeError):
+class StoreError(RunError):
     """Results that cannot be written; what was written before is kept."""
 
 
 class SweepStore:
     """An open directory of a sweep, which no other process can open."""
 
-    def __init__(self, out: Path, plan: SweepPlan) -> None:
+    def __init__(self, out: Path | None, plan: SweepPlan) -> None:
         """Opens the directory of this plan, or makes it where there is none.
 
+        Args:
+            out: The directory; none: the next number under results/.
+            plan: What to run.
+
         Raises:
-            ValueError: It holds something else, cannot be written, or is in
+            InputError: It holds something else, cannot be written, or is in
                 use; ``out: ...``.
+            StoreError: The disk is full.
         """
-        self.out = out
         self._journal = -1
         try:
-            if out.is_dir() and any(out.iterdir()):
+            if out is not None and out.is_dir() and any(out.iterdir()):
                 _check_same(out, plan)
+                self.out = out
             else:
-                with whole_directory(out) as directory:
+                with whole_directory(out) as (self.out, directory):
                     _make(directory, plan)
-            self._lock = _locked(out / MANIFEST)
+            self._lock = _locked(self.out / MANIFEST)
         except BlockingIOError:
-            raise ValueError(f"out: another process works in {out}; wait") from None
+            raise InputError("out", f"another process works in {out}; wait") from None
         except OSError as error:
             raise _unwritable(out, error) from None
         try:
             self._open()
         except OSError as error:
             self.close()
-            raise _unwritable(out, error) from None
+            raise _unwritable(self.out, error) from None
 
     def _open(self) -> None:
         """Finds what is done, and cuts off a line that a crash left unfinished."""
         path = self.out / JOURNAL
         if (self.out / TABLE).exists() and not path.exists():
-            self.done = set(pd.read_parquet(self.out / TABLE)["index"])
+            self.done = set(load_results(self.out)["index"])
             return
         lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
         rows = [row for line in lines if (row := _parse(line)) is not None]
@@ -140,15 +148,18 @@ def load_results(out: str | Path) -> pd.DataFrame:
         See ``results_table``.
 
     Raises:
-        ValueError: The directory holds no sweep.
+        InputError: The directory holds no sweep.
     """
     journal, table = Path(out) / JOURNAL, Path(out) / TABLE
     if journal.exists():
         rows = map(_parse, journal.read_bytes().splitlines(keepends=True))
         return results_table({row["index"]: row for row in rows if row}.values())
     if table.exists():
-        return pd.read_parquet(table)
-    raise ValueError(f"out: {out} holds no results of a sweep; check the path")
+        try:
+            return pd.read_parquet(table)
+        except ValueError as error:  # pyarrow's complaint about a damaged file
+            raise InputError("out", f"{table} cannot be read ({error})") from None
+    raise InputError("out", f"{out} holds no results of a sweep; check the path")
 
 
 def trajectory_path(out: Path, index: int) -> Path:
@@ -156,10 +167,10 @@ def trajectory_path(out: Path, index: int) -> Path:
     return out / "trajectories" / f"{index:06d}.parquet"
 
 
-def _unwritable(out: Path, error: OSError) -> ValueError:
-    return ValueError(
-        f"out: {out} cannot be written ({error.strerror}); make room, or name another "
-        "directory"
+def _unwritable(out: Path | None, error: OSError) -> StoreError:
+    return StoreError(
+        f"{out or 'results'} cannot be written ({error.strerror}); make room, or name "
+        "another directory with --out"
     )
 
 
@@ -173,6 +184,7 @@ def _make(out: Path, plan: SweepPlan) -> None:
     manifest = {
         "schema_version": SCHEMA_VERSION,
         "plan_sha256": plan.digest,
+        "files_sha256": plan.file_digests,
         "versions": versions(),
     }
     (out / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n")
@@ -191,28 +203,35 @@ def _locked(path: Path) -> int:
 def _check_same(out: Path, plan: SweepPlan) -> None:
     """Whether the directory's runs are some of the plan's."""
     try:
-        manifest = json.loads((out / MANIFEST).read_text())
+        manifest = json.loads((out / MANIFEST).read_text("utf-8"))
         stored = YAML(typ="safe").load(out / PLAN)
-    except (OSError, ValueError):
-        raise ValueError(
-            f"out: {out} holds no sweep; name the directory of one, or a new one"
-        ) from None
-    if manifest["plan_sha256"] != plan.digest:
+        digest, found = manifest["plan_sha256"], manifest["versions"]
+        then = manifest.get("files_sha256", {})
         ours = YAML(typ="safe").load(dump_plan(plan))
         parts = [key for key in ours if stored.get(key) != ours[key]]
+    except (OSError, ValueError, YAMLError, TypeError, LookupError, AttributeError):
+        raise InputError(
+            "out", f"{out} holds no sweep; name the directory of one, or a new one"
+        ) from None
+    if digest != plan.digest:
+        files = plan.file_digests
+        names = sorted({*files, *then})
+        parts += [name for name in names if files.get(name) != then.get(name)]
         what = ", ".join(parts) or "the scenario's file"
-        raise ValueError(
-            f"out: {out} holds another sweep, which differs in {what}; name another "
-            "directory"
+        raise InputError(
+            "out",
+            f"{out} holds another sweep, which differs in {what}; name another "
+            "directory",
         )
-    found, now = manifest["versions"], versions()
+    now = versions()
     parts = [
         f"{name} {found.get(name)}" for name in now if found.get(name) != now[name]
     ]
     if parts:
-        raise ValueError(
-            f"out: the runs in {out} were made with {', '.join(parts)}; install that, "
-            "or name another directory"
+        raise InputError(
+            "out",
+            f"the runs in {out} were made with {', '.join(parts)}; install that, "
+            "or name another directory",
         )
 
 
@@ -221,8 +240,9 @@ def _parse(line: bytes) -> dict[str, Any] | None:
     if not line.endswith(b"\n"):
         return None
     with suppress(ValueError):
-        row: dict[str, Any] = json.loads(line)
-        return row
+        row = json.loads(line)
+        if isinstance(row, dict) and isinstance(row.get("index"), int):
+            return row
     return None
 
 

@@ -68,6 +68,8 @@ def two_boxes() -> Callable[..., Scenario]:
             "repulsion.active.reference_damping_n_s_m=0.2",
             "repulsion.active.matched_damping_n_s_m=0.8",
             "repulsion.active.speed_limit_m_s=0.6",
+            "robot.top_speed_m_s=0.72",
+            "repulsion.conventional2017.distance_gain_j=1.1",
             "repulsion.active2017.distance_gain_j=1.1",
             "repulsion.active2017.saturation_distance_m=0.1",
             "repulsion.active2017.damping_n_s_m=0.8",

@@ -125,6 +125,12 @@ def test_log_records_what_the_build_has():
     assert build().log is None
 
 
+def test_log_records_slip_where_there_is_friction():
+    scenario = Scenario.model_validate(IDEAL | {"plant": {"friction": 0.3}})
+    follower = build_sound_follower(scenario, log=True)
+    assert follower.logged[-1] == ("plant", "slip_velocities")
+
+
 def test_log_holds_the_ports_values_at_every_tick():
     follower = build_sound_follower(Scenario.model_validate(IDEAL), log=True)
     simulator = make_simulator(follower)

@@ -10,8 +10,8 @@ import pytest
 
 from diagrams import build_sound_follower
 from diagrams.laws import LAWS, make_controller
-from diagrams.loading import ScenarioError
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
@@ -61,6 +61,7 @@ def repulsion_of(controller) -> float:
         ("none", 0.0),
         ("conventional", -15.0 * 0.4),
         ("active", -16.0 * 0.4 - 0.2 * 0.72),
+        ("conventional2017", -0.9 / 0.4),
         ("active2017", -1.2 / 0.4),
     ],
 )
@@ -76,6 +77,7 @@ def test_laws_of_the_package_read_their_own_gains(law, force):
                 "reference_damping_n_s_m": 0.2,
                 "speed_limit_m_s": 0.72,
             },
+            "conventional2017": {"distance_gain_j": 0.9},
             "active2017": {"distance_gain_j": 1.2},
         },
     }
@@ -100,17 +102,39 @@ def test_own_law_is_built_into_the_diagram(own_laws):
     [
         (
             "activ",
-            "use none, conventional, active, active2017, or package",
+            "use none, conventional, active, conventional2017, active2017, package",
         ),
         (":inverse", "is not known"),
         ("own_laws_for_test:", "is not known"),
-        ("no_such_module_anywhere:law", "cannot be imported: No module named"),
+        ("no_such_module_anywhere:law", "cannot be imported: ModuleNotFoundError"),
         ("own_laws_for_test:missing", "has no function or class 'missing'"),
         ("own_laws_for_test:number", "has no function or class 'number'"),
     ],
 )
 def test_unknown_laws(own_laws, law, message):
     assert own_laws
-    with pytest.raises(ScenarioError, match=message) as error:
+    with pytest.raises(InputError, match=message) as error:
         make_controller(Scenario(law=law))
     assert error.value.field == "law"
+
+
+@pytest.mark.parametrize(
+    ("sensing", "firing", "rounds"),
+    [
+        ("ultrasonic", "sequential", 3),
+        ("ultrasonic", "simultaneous", 1),
+        ("ideal", "sequential", 1),
+    ],
+)
+def test_laws_remember_a_round_of_the_sensors(sensing, firing, rounds):
+    """Three numbers of three slots a tick; exact sensing has no order of firing."""
+    for law in LAWS:
+        scenario = Scenario.model_validate(
+            {
+                "law": law,
+                "obstacle_sensing": sensing,
+                "ultrasonic": {"firing": firing},
+            }
+        )
+        context = make_controller(scenario).CreateDefaultContext()
+        assert context.get_discrete_state(0).size() == 9 * rounds

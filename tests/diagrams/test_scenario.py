@@ -51,12 +51,12 @@ def test_no_obstacle_may_stand_on_the_start(x, y, clear):
     if clear:
         assert len(Scenario.model_validate(data).obstacles) == 2
         return
-    with pytest.raises(ValidationError, match=r"obstacles.1 \('box'\): stands on"):
+    with pytest.raises(ValidationError, match=r"obstacles\.1: 'box' stands on"):
         Scenario.model_validate(data)
 
 
 def test_the_source_may_not_stand_on_the_start():
-    with pytest.raises(ValidationError, match="source: stands on the robot's start"):
+    with pytest.raises(ValidationError, match="source: 'source' stands on the"):
         Scenario.model_validate({"source": {"waypoints_m": [[0.3, 0.0]]}})
 
 
@@ -94,7 +94,7 @@ def test_skew_is_given_for_every_microphone_or_none():
         ),
         (
             {"start": {"position_m": [3.4, 0.0]}},
-            r"start\.position_m \(the microphones\)",
+            r"start\.position_m: .*a microphone, is outside",
         ),
         ({"room": {"reverberation_time_s": 0.1}}, r"room\.reverberation_time_s"),
         ({"room": {"absorption": 0.01}}, r"room\.maximum_order"),

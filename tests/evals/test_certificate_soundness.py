@@ -8,7 +8,7 @@ import pytest
 from analysis.stability.certificate_trials import try_certificate
 from analysis.stability.energy_certificate import certify_energy
 from diagrams import Scenario, load_scenario
-from diagrams.loading import ScenarioError
+from systems.input_error import InputError
 
 LAWS = ("conventional", "active", "active2017")
 
@@ -46,7 +46,7 @@ def random_scenario(seed: int) -> Scenario:
     ]
     try:
         return load_scenario("two_static_obstacles", overrides)
-    except ScenarioError:  # a box stands on the robot or on the source
+    except InputError:  # a box stands on the robot or on the source
         return random_scenario(seed + 1000)
 
 

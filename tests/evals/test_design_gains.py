@@ -9,7 +9,8 @@ import pytest
 
 from analysis.gains.design import DesignRequirements, metres_to_go
 from analysis.gains.push_and_pull import DESIGNED_LAWS
-from diagrams import simulate
+from analysis.sweeps.compare import comparison_plan
+from diagrams import load_scenario, simulate
 from diagrams.scenario import Scenario
 from phonotaxis import main
 
@@ -20,6 +21,7 @@ WALL_X = 2.5
 SPRINGS = {
     "conventional": ("stiffness_n_m",),
     "active": ("reference_stiffness_n_m", "matched_stiffness_n_m"),
+    "conventional2017": ("distance_gain_j",),
     "active2017": ("distance_gain_j",),
 }
 
@@ -57,7 +59,10 @@ def test_P_stops_before_a_wall(law):
     assert speed.max() == pytest.approx(0.72, abs=1e-6), "it must come at top speed"
     assert run.cause == "timeout"
     ahead = run.columns["p_WB_x"] + 0.175 * np.cos(run.columns["theta_WB"])
-    assert WALL_X - ahead.max() > 0.03
+    clearance = WALL_X - ahead.max()
+    # Its push is steepest at 3 cm: a tick of 25 ms and the motors' lag cost 1 cm.
+    least = 0.015 if law == "conventional2017" else 0.03
+    assert clearance > least
 
 
 @pytest.mark.parametrize("law", DESIGNED_LAWS)
@@ -72,8 +77,8 @@ def test_command_derives_the_defaults(tmp_path, capsys):
     text = capsys.readouterr().out
     contact = [line for line in text.splitlines() if "contact stiffness" in line]
     assert [line.endswith("not met") for line in contact] == [
-        *(True, False, True),
-        *(False, False, True),
+        *(True, False, True, True),
+        *(False, False, True, True),
     ]
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     laws = {law["law"]: law for law in summary["today"]["laws"]}
@@ -81,8 +86,9 @@ def test_command_derives_the_defaults(tmp_path, capsys):
         assert laws[law]["gains"] == getattr(Scenario().repulsion, law).model_dump()
     assert all(runs["jams"] == 0 for runs in summary["today"]["jams"])
     better = summary["recommended"]
-    assert [law["met"] for law in better["laws"]] == [True, True, False]
+    assert [law["met"] for law in better["laws"]] == [True, True, False, False]
     assert better["damping_ratio"] >= 0.7
+    assert_layouts_have_the_gains_of(load_scenario(out / "recommended.yaml"))
     assert {path.name for path in out.iterdir()} == {
         "summary.json",
         "scenario.yaml",
@@ -90,6 +96,19 @@ def test_command_derives_the_defaults(tmp_path, capsys):
         "design.png",
         "law_curves.png",
     }
+
+
+def assert_layouts_have_the_gains_of(recommended: Scenario) -> None:
+    """Limits and saturations of two_static_obstacles stay its own."""
+    plan = comparison_plan("two_static_obstacles_recommended", runs=1)
+    scenario = plan.scenario_of(plan.points()[0])
+    assert scenario.attraction == recommended.attraction
+    own = load_scenario("two_static_obstacles").repulsion.model_dump()
+    printed = Scenario().repulsion.model_dump()
+    for law in DESIGNED_LAWS:
+        kept = {k: v for k, v in own[law].items() if v != printed[law][k]}
+        designed = getattr(recommended.repulsion, law).model_dump() | kept
+        assert getattr(scenario.repulsion, law).model_dump() == designed
 
 
 def test_command_refuses_what_cannot_be_designed(tmp_path, capsys):

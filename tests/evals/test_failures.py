@@ -53,6 +53,8 @@ def mechanism(result: RunResult, metrics: dict[str, Any]) -> Any:
         ("Never heard", "never heard"),
         ("Heard late", "heard late"),
         ("Jam", "jam"),
+        ("Swings", "swings"),
+        ("Held off", "held off"),
         ("The vanishing push", "pushed too little"),
     ],
 )

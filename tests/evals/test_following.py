@@ -32,6 +32,7 @@ def test_following_error_settles_and_stays_bounded():
 def test_estimates_are_where_the_source_is():
     metrics = run_metrics(simulate(load_scenario("obstacle_free", ["duration_s=20"])))
     assert metrics["detections_with_range"] == metrics["detections"] == 200
+    assert metrics["frames_with_sound_heard"] == metrics["frames_with_sound"] == 200
     # The source moves 11 mm in the 37.5 ms that an estimate is old.
     assert metrics["source_error_p95_m"] == pytest.approx(0.011, abs=0.01)
     assert metrics["source_outlier_fraction"] == 0.0
@@ -51,6 +52,35 @@ def test_tone_that_is_ambiguous_in_phase_gives_no_confident_wrong_target(tmp_pat
         columns["p_WS_estimated_y"] - columns["p_WS_y"],
     )
     assert not np.any(error[heard] > 0.5)
+
+
+def test_a_jingle_that_is_heard_too_seldom_is_no_success(tmp_path):
+    """Decaying notes of nine partials: a click of an attack now and then is heard.
+
+    The robot holds its target for a while, the source drives away, and the target
+    is forgotten 6 s after the last detection; the run's time is over before it has
+    been gone for 20 s.
+    """
+    time = np.arange(int(0.17 * 44100)) / 44100
+    partials = enumerate((1.0, 2.0, 3.0, 4.2, 5.4, 6.8, 8.2, 9.9, 11.6))
+    weights = [(partial, 1.0 / (k + 1)) for k, partial in partials]
+    notes = [
+        np.exp(-time / 0.05)
+        * sum(w * np.sin(2 * np.pi * p * f * time + p * p) for p, w in weights)
+        for f in (440.0, 554.0, 659.0, 880.0)
+    ]
+    jingle = np.concatenate(notes)
+    soundfile.write(tmp_path / "jingle.wav", 0.5 * jingle / np.ptp(jingle), 44100)
+    overrides = ["sound.kind=wav", f"sound.file={tmp_path / 'jingle.wav'}"]
+    result = simulate(load_scenario("default", [*overrides, "duration_s=30"]))
+    metrics = run_metrics(result)
+    assert result.simulated_s == pytest.approx(30.0)
+    figures = {name: float(x) for name, x in metrics.items() if x is not None}
+    assert 0 < figures["frames_with_sound_heard"] < 10
+    assert figures["frames_with_sound"] == 300
+    assert figures["following_fraction"] < 0.5
+    assert figures["final_distance_m"] > 3.0
+    assert result.cause == "lost"
 
 
 @pytest.mark.parametrize("kind", ["band_noise", "horn"])

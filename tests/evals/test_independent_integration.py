@@ -6,6 +6,8 @@ virtual mass and the plant are written again from docs/model.md.
 
 from __future__ import annotations
 
+import math
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -16,10 +18,12 @@ from diagrams.scenario import Scenario
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,
+    ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
 from systems.active_impedance_2017_controller import active_2017_force
 from systems.active_impedance_controller import active_force
+from systems.conventional_impedance_2017_controller import conventional_2017_force
 from systems.conventional_impedance_controller import conventional_force
 from systems.impedance import (
     AttractionParameters,
@@ -37,6 +41,7 @@ K_REF, D_REF, MU_0 = 64.0, 0.2, 0.72
 ALPHA = RHO_0 / (2 * np.log(K_REF / K_0))
 BETA = MU_0 / (2 * np.log(D_0 / D_REF))
 K_2017, RHO_1, D_2017, MU_1 = 1.1, 0.1, 0.7, 0.6
+LEAST = 0.03
 
 ATTRACTION = {
     "stiffness_n_m": K_R, "damping_n_s_m": D_R, "follow_distance_m": FOLLOW
@@ -51,6 +56,7 @@ REPULSION: dict[str, Any] = {
         "matched_damping_n_s_m": D_0,
         "speed_limit_m_s": MU_0,
     },
+    "conventional2017": {"distance_gain_j": K_2017, "damping_n_s_m": D_2017},
     "active2017": {
         "distance_gain_j": K_2017,
         "saturation_distance_m": RHO_1,
@@ -61,12 +67,12 @@ REPULSION: dict[str, Any] = {
 LAWS = tuple(REPULSION)
 TERMS = ("printed", "closing")
 
-SOURCE_START, SOURCE_VELOCITY = np.array([1.6, 0.3]), np.array([0.3, 0.0])
-SOURCE_STOPS = 7.4 / 0.3
+SOURCE_START, SOURCE_WAY, SOURCE_SPEED = np.array([1.6, 0.3]), 7.4, 0.3
 SOURCE_SIZE = (0.326, 0.352)
 BOX, BOX_SIZE = np.array([2.8, 0.9]), (0.2, 0.1)
-MOVING_START, MOVING_VELOCITY = np.array([4.4, -2.0]), np.array([0.0, 0.2])
-MOVING_STOPS = 5.0 / 0.2
+MOVING_START, MOVING_WAY, MOVING_SPEED = np.array([4.4, -2.0]), 5.0, 0.2
+#: Of source and moving obstacle, where they start and brake, m/s^2.
+RAMP = 1.0
 MOVING_SIZE = (0.3, 0.2)
 DURATION = 40.0
 #: Nodes and weights on [0, 1]: exact to 1e-15 over a tick.
@@ -104,8 +110,40 @@ def rotation(theta: float) -> np.ndarray:
     return np.array([[np.cos(theta), -np.sin(theta)], [np.sin(theta), np.cos(theta)]])
 
 
+def trapezoid(time: float, way: float, speed: float) -> tuple[float, float]:
+    """Way and speed from rest to rest; all of it is long enough to cruise."""
+    ends = way / speed + speed / RAMP
+    if time > ends / 2.0:
+        left, speed_then = trapezoid(max(ends - time, 0.0), way, speed)
+        return way - left, speed_then
+    if time < speed / RAMP:
+        return RAMP * time**2 / 2.0, RAMP * time
+    return speed * (time - speed / RAMP / 2.0), speed
+
+
+@cache
+def driven_ways() -> list[float]:
+    """Ways of the source at the ticks: straight on, its wheels follow in closed form.
+
+    The command is the speed to have when it has taken effect and 2/s of what is
+    missing, but leads the wheels by no more than 2 m/s^2 times the lag.
+    """
+    way, wheel, ways = 0.0, 0.0, [0.0]
+    kept = math.exp(-T / LAG)
+    for tick in range(round(DURATION / T)):
+        planned, _ = trapezoid(tick * T, SOURCE_WAY, SOURCE_SPEED)
+        _, ahead = trapezoid(tick * T + LAG + T / 2.0, SOURCE_WAY, SOURCE_SPEED)
+        lead = ahead + 2.0 * (planned - way) - wheel
+        lead = min(max(lead, -2.0 * LAG), 2.0 * LAG)
+        way += wheel * T + lead * (T - LAG * (1.0 - kept))
+        wheel += lead * (1.0 - kept)
+        ways.append(way)
+    return ways
+
+
 def source_position(time: float) -> np.ndarray:
-    return SOURCE_START + SOURCE_VELOCITY * min(time, SOURCE_STOPS)
+    """At a tick."""
+    return SOURCE_START + np.array([driven_ways()[round(time / T)], 0.0])
 
 
 def nearest_vector(p: np.ndarray, time: float) -> tuple[int, np.ndarray] | None:
@@ -113,7 +151,8 @@ def nearest_vector(p: np.ndarray, time: float) -> tuple[int, np.ndarray] | None:
     bodies = [
         (BOX, 0.0, BOX_SIZE),
         (
-            MOVING_START + MOVING_VELOCITY * min(time, MOVING_STOPS),
+            MOVING_START
+            + np.array([0.0, trapezoid(time, MOVING_WAY, MOVING_SPEED)[0]]),
             np.pi / 2,
             MOVING_SIZE,
         ),
@@ -138,6 +177,8 @@ def law_force(law: str, c: Any, s: Any) -> Any:
         slow = np.minimum(s, MU_0)
         damper = D_REF * np.exp(slow / BETA) * (MU_0 - slow)
         return K_REF * np.exp(-c / ALPHA) * c + damper
+    if law == "conventional2017":
+        return K_2017 / np.maximum(c, LEAST) + D_2017 * s
     K_a = np.where(c >= RHO_1, K_2017, K_2017 * c / RHO_1)
     D_a = np.where(s <= MU_1, D_2017, D_2017 * MU_1 / np.maximum(s, MU_1))
     return K_a / c + D_a * s
@@ -273,11 +314,13 @@ def total_force(law: str, velocity_term: str, state: dict[str, np.ndarray]) -> A
 FUNCTIONS: dict[str, Any] = {
     "conventional": conventional_force,
     "active": active_force,
+    "conventional2017": lambda c, s, gains: conventional_2017_force(c, s, gains, LEAST),
     "active2017": active_2017_force,
 }
 BLOCKS: dict[str, Any] = {
     "conventional": ConventionalImpedanceController,
     "active": ActiveImpedanceController,
+    "conventional2017": ConventionalImpedance2017Controller,
     "active2017": ActiveImpedance2017Controller,
 }
 

@@ -62,6 +62,34 @@ def test_nothing_failed_and_the_printed_gains_do_not_pass(document):
     assert verdicts["collisions from certified starts"] == "pass"
 
 
+def test_margin_verdicts_are_the_least_of_every_cut_both_ways(document):
+    """From the document's own margins: null is a margin without end."""
+    loops = document["implemented_loop"]["margins"].values()
+    verdicts = {row["name"]: row["value"] for row in document["verdicts"]}
+    directions = [
+        20.0 * abs(np.log10(loop[name]))
+        for loop in loops
+        for name in ("gain_increase_margin", "gain_reduction_margin")
+        if loop[name]
+    ]
+    assert verdicts["least gain margin"] == pytest.approx(min(directions))
+    turns = [
+        loop[name]
+        for loop in loops
+        for name in ("phase_lag_margin_deg", "phase_lead_margin_deg")
+    ]
+    assert verdicts["least phase margin"] == pytest.approx(min(turns))
+    balanced = [d["alpha"] for loop in loops for d in loop["disks"] if d["skew"] == 0.0]
+    assert verdicts["least disk margin"] == pytest.approx(min(balanced))
+    peaks = [loop["sensitivity_peak"] for loop in loops]
+    assert verdicts["largest sensitivity peak"] == pytest.approx(max(peaks))
+    delays = [row["delay_s"] for row in document["sampled"]["delay_margins"]]
+    assert len(delays) == 2
+    assert verdicts["least delay margin"] == pytest.approx(min(delays))
+    largest = {row["hold"]: row["largest"] for row in document["burst_cycle"]}
+    assert verdicts["left after a burst cycle"] == pytest.approx(largest["motion"])
+
+
 def test_page_holds_everything_and_loads_nothing(report):
     page = (report / "report.html").read_text()
     ids = re.findall(r'\bid="([^"]+)"', page)

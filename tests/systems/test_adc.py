@@ -29,6 +29,17 @@ def test_rounds_to_nearest_and_clips():
     assert counts.dtype == np.int16
 
 
+def test_noise_alone_clips_as_sound_does():
+    """Counts of 0.6 V of noise a unit, of 1.65 V full scale, 512 counts."""
+    parameters = MicArrayParameters()
+    units = np.array([[1.0, 2.0, 3.0, 9.0, -2.0, -3.0]], dtype=np.float32)
+    noise_pa = 0.6 / 10 ** (17 / 20)
+    wanted = [[186, 372, 511, 511, -372, -512]]  # 186.18 a unit
+    for pressure in (None, np.zeros_like(units)):
+        counts = convert(pressure, units, noise_pa, parameters)
+        np.testing.assert_array_equal(counts, wanted)
+
+
 @pytest.mark.parametrize("bits", [2, 8, 16])
 def test_limits_follow_the_resolution(bits):
     parameters = MicArrayParameters(adc_bits=bits)

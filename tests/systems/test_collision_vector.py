@@ -201,3 +201,40 @@ def test_gradient(bench, check_gradient, parameters, ranges):
     check_gradient(
         CollisionVector(parameters=parameters, sensors=sensors), respond, ranges
     )
+
+
+def test_gradient_of_ranges_that_are_carried_on(bench, check_gradient):
+    """By the ranges, and by the poses now and in the two ticks before."""
+    sensors = UltrasonicParameters(firing="sequential")
+
+    def respond(block, x):
+        at = bench(
+            block,
+            state=x[6:12],
+            ranges=x[0:3],
+            echo=[1, 1, 1],
+            range_ages=[0.05, 0.025, 0.0],
+            pose_WB_estimated=x[3:6],
+        )
+        return [*at.output("collision_vectors_B"), *at.updated()]
+
+    poses = [0.3, -0.2, 0.4, 0.29, -0.21, 0.38, 0.27, -0.2, 0.35]
+    block = CollisionVector(parameters=SUM, sensors=sensors)
+    check_gradient(block, respond, [0.9, 0.7, 0.8, *poses])
+
+
+def test_a_held_range_is_turned_and_moved_with_the_robot(bench):
+    """Seen 1 m ahead of P at the origin; P then moved 0.2 m on and B turned left."""
+    block = CollisionVector(
+        parameters=NEAREST, sensors=UltrasonicParameters(firing="sequential")
+    )
+    at = bench(
+        block,
+        state=[-0.175, 0.0, 0.0, 9.0, 9.0, 9.0],
+        ranges=[3.0, 1.0, 3.0],
+        echo=[0, 1, 0],
+        range_ages=[0.0, 0.025, 0.05],
+        pose_WB_estimated=[0.2, -0.175, math.pi / 2],
+    )
+    C = at.output("collision_vectors_B")[:2]
+    np.testing.assert_allclose(C, [0.0, -0.8], atol=1e-12)

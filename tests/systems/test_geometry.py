@@ -15,6 +15,7 @@ from systems.geometry import (
     cone_range,
     contact_time,
     control_point,
+    control_point_velocity,
     nearest_point_on_rectangle,
     rectangle_clearance,
     rectangle_corners,
@@ -75,6 +76,16 @@ def test_rotations_add_and_keep_lengths(a, b, x, y):
     once = rotate(a + b, x, y)
     assert rotate(a, *rotate(b, x, y)) == pytest.approx(once, abs=1e-12)
     assert math.hypot(*once) == pytest.approx(math.hypot(x, y))
+
+
+@pytest.mark.parametrize("theta", [0.0, 0.7, -2.5])
+def test_control_point_velocity_is_the_rate_of_its_place(theta):
+    """By central differences of a motion at constant rates."""
+    pose, rates, h = np.array([1.0, 2.0, theta]), np.array([0.3, -0.2, 0.9]), 1e-5
+    ahead, behind = (control_point(pose + dt * rates, 0.175) for dt in (h, -h))
+    expected = np.subtract(ahead, behind) / (2.0 * h)
+    found = control_point_velocity(theta, rates, 0.175)
+    np.testing.assert_allclose(found, expected, atol=1e-9)
 
 
 def test_control_point_lies_ahead():

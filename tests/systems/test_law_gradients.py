@@ -15,20 +15,30 @@ from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,
+    ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
 from systems.active_impedance_2017_controller import active_2017_force
 from systems.active_impedance_controller import active_force
+from systems.conventional_impedance_2017_controller import conventional_2017_force
 from systems.conventional_impedance_controller import conventional_force
 from systems.repulsion import (
     Active2017Parameters,
     ActiveParameters,
+    Conventional2017Parameters,
     ConventionalParameters,
     RepulsionParameters,
 )
 
 #: Nearer than this to a kink a law has two derivatives, m or m/s.
 KINK = 1e-6
+
+#: Least range of the sensors, m, and the law of 2017 that is bounded by it.
+LEAST = 0.03
+
+
+def conventional_2017(c, s, gains):
+    return conventional_2017_force(c, s, gains, LEAST)
 
 
 def active_gains(K_0, r, rho_0, D_0, q, mu_0):
@@ -57,6 +67,11 @@ def active_slopes(c, s, gains):
     return by_c, by_s
 
 
+def conventional_2017_slopes(c, s, gains):
+    by_c = -gains.distance_gain_j / c**2 if c > LEAST else 0.0
+    return by_c, gains.damping_n_s_m
+
+
 def active_2017_slopes(c, s, gains):
     near, fast = gains.saturation_distance_m, gains.saturation_speed_m_s
     by_c = -gains.distance_gain_j / c**2 if c > near else 0.0
@@ -69,8 +84,8 @@ class Law(NamedTuple):
     force: Callable[..., Any]
     slopes: Callable[..., tuple[float, float]]
     gains: st.SearchStrategy[Any]
-    kink_c: str | None
-    kink_s: str | None
+    kink_c: str | float | None
+    kink_s: str | float | None
 
 
 LAWS = {
@@ -97,6 +112,17 @@ LAWS = {
         None,
         "speed_limit_m_s",
     ),
+    "conventional2017": Law(
+        conventional_2017,
+        conventional_2017_slopes,
+        st.builds(
+            Conventional2017Parameters,
+            distance_gain_j=st.floats(0.1, 9),
+            damping_n_s_m=st.floats(0.1, 9),
+        ),
+        LEAST,
+        None,
+    ),
     "active2017": Law(
         active_2017_force,
         active_2017_slopes,
@@ -113,13 +139,18 @@ LAWS = {
 }
 
 
+def place(kink: str | float, gains: Any) -> float:
+    """Where a kink is, m or m/s: one of the gains, or the same for all."""
+    return float(getattr(gains, kink)) if isinstance(kink, str) else kink
+
+
 @pytest.mark.parametrize("law", LAWS)
 @given(data=st.data(), c=st.floats(0.01, 3.0), s=st.floats(0.0, 3.0))
 def test_autodiff_equals_the_derivatives_by_hand(law, data, c, s):
     force, slopes, any_gains, *kinks = LAWS[law]
     gains = data.draw(any_gains)
     for value, kink in zip((c, s), kinks, strict=True):
-        assume(kink is None or abs(value - getattr(gains, kink)) > KINK)
+        assume(kink is None or abs(value - place(kink, gains)) > KINK)
     point: Any = np.array([c, s])
     dual = force(*InitializeAutoDiff(point).ravel(), gains)
     assert dual.value() == pytest.approx(force(c, s, gains), rel=1e-12)
@@ -132,6 +163,10 @@ DEFAULTS = RepulsionParameters()
 BLOCKS: dict[str, tuple[Any, Any]] = {
     "conventional": (ConventionalImpedanceController(), DEFAULTS.conventional),
     "active": (ActiveImpedanceController(), DEFAULTS.active),
+    "conventional2017": (
+        ConventionalImpedance2017Controller(),
+        DEFAULTS.conventional2017,
+    ),
     "active2017": (ActiveImpedance2017Controller(), DEFAULTS.active2017),
 }
 DUALS = {law: block.ToAutoDiffXd() for law, (block, _) in BLOCKS.items()}
@@ -145,7 +180,7 @@ def test_block_s_stiffness_is_radial_slope_and_tangential_secant(
     """F = -f(c) C/c has dF/dC = -f' u u' - (f/c)(1 - u u'), u = C/c; s = 0."""
     force, slopes, _, kink, _ = LAWS[law]
     gains = BLOCKS[law][1]
-    assume(kink is None or abs(c - getattr(gains, kink)) > KINK)
+    assume(kink is None or abs(c - place(kink, gains)) > KINK)
     u = np.array([math.cos(direction), math.sin(direction)])
     C = InitializeAutoDiff(c * u).ravel()
     at = bench(

@@ -386,3 +386,41 @@ def test_a_range_too_uncertain_is_left_out():
         fix, _ = localiser.localise(frame, localiser.blank())
         assert fix is not None
         assert fix.range_valid == valid
+
+
+COPIES = {
+    "1 is 2": lambda x: x[[0, 0, 2]],
+    "2 is 3": lambda x: x[[0, 1, 1]],
+    "1 is 3": lambda x: x[[0, 1, 0]],
+    "all": lambda x: x[[0, 0, 0]],
+    "gain": lambda x: np.stack((x[0], np.rint(0.7 * x[0]).astype(np.int16), x[2])),
+}
+
+
+@pytest.mark.parametrize("bearing_deg", [0.0, 30.0, -50.0, 60.0])
+def test_channels_that_repeat_each_other_are_no_place(bearing_deg):
+    """An amplifier's two outputs of one microphone, counts of 10 bits."""
+    localiser = listener()
+    place = polar(bearing_deg, 1.5)
+    frame = heard(ROW, [place])
+    counts = np.rint(frame * (400.0 / np.abs(frame).max())).astype(np.int16)
+    noise = np.rint(2.0 * np.random.default_rng(1).standard_normal((3, N)))
+    _, memory = localiser.localise(noise.astype(np.int16), localiser.blank())
+    fix, _ = localiser.localise(counts, memory._replace(heard=True))
+    assert fix is not None
+    assert fix.bearing == pytest.approx(math.radians(bearing_deg), abs=0.02)
+    for name, copy in COPIES.items():
+        assert localiser.localise(copy(counts), memory)[0] is None, name
+        # Before any noise was heard, equal ends of the row are a source ahead.
+        if name != "1 is 3":
+            assert localiser.localise(copy(counts), localiser.blank())[0] is None, name
+
+
+def test_without_noise_a_source_ahead_is_heard_alike_at_both_ends():
+    localiser = listener()
+    frame = heard(ROW, [polar(0.0, 1.5)], snr_db=200.0)
+    counts = np.rint(frame * (400.0 / np.abs(frame).max())).astype(np.int16)
+    counts[2] = counts[0]
+    fix, _ = localiser.localise(counts, localiser.blank())
+    assert fix is not None
+    assert fix.range == pytest.approx(1.5, rel=0.05)

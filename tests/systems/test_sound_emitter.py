@@ -69,13 +69,17 @@ def test_reaches_back_a_frame_and_the_largest_travel():
 
 
 def test_path_is_that_of_the_source():
-    """At ticks well after the start, on a straight line at 0.3 m/s."""
-    source = SourceRobotParameters(waypoints_m=((1.0, 2.0), (9.0, 2.0)))
-    (emission,) = emission_at([1.5], source=source)
+    """At ticks well after the start, on a straight line at 0.3 m/s.
+
+    The start of 1 m/s^2 costs v^2 / 2a.
+    """
+    source = SourceRobotParameters(waypoints_m=((1.0, 2.0), (30.0, 2.0)))
+    (emission,) = emission_at([12.0], source=source)
     t = emission.knot_times
-    expected = np.stack([1.0 + 0.3 * t, np.full_like(t, 2.0)], axis=1)
+    expected = np.stack([1.0 + 0.3 * t - 0.045, np.full_like(t, 2.0)], axis=1)
     np.testing.assert_allclose(emission.p_WS, expected, atol=1e-9)
-    np.testing.assert_allclose(emission.v_WS, np.tile([0.3, 0.0], (len(t), 1)))
+    steady = np.tile([0.3, 0.0], (len(t), 1))
+    np.testing.assert_allclose(emission.v_WS, steady, atol=1e-9)
 
 
 def test_silence_before_the_start_and_between_the_bursts():

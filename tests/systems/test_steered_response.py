@@ -107,3 +107,20 @@ def test_large_arrays_get_a_coarser_grid():
     assert GRIDS["square"].coarseness == 1.0
     assert GRIDS["large"].coarseness > 1.0
     assert GRIDS["large"].lags.size < 2_000_000
+
+
+@pytest.mark.parametrize(("count", "dimension"), [(48, 2), (35, 3), (64, 2), (64, 3)])
+def test_many_microphones_have_a_grid_of_4_deg(count, dimension):
+    """It is no finer than that, and no direction is farther from it."""
+    rng = np.random.default_rng(count)
+    shape = ArrayShape.of(rng.uniform(-0.15, 0.15, (count, dimension)))
+    grid = SearchGrid.of(shape, C, HIGH, LAG_DENSITY * HIGH)
+    far = grid.p_AS[grid.inverse_range == 0.0]
+    far = far[np.linalg.norm(far, axis=1) > 1.0 - 1e-9]
+    # A sphere is covered by caps of 4 deg at 4 pi / 0.0698^2 = 2579 points.
+    assert len(far) <= (2_600 if dimension == 3 else 180)
+    assert len(grid.lags) < 1.5 * 3_900
+    for _ in range(50):
+        u = rng.standard_normal(dimension)
+        u /= np.linalg.norm(u)
+        assert np.degrees(np.arccos((far @ u).max())) < 4.0

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -76,6 +77,21 @@ def test_K_0_holds_the_barrier_in_closed_form():
     assert found == pytest.approx(expected, rel=1e-3)
 
 
+def test_K_0_of_2017_holds_the_barrier_in_closed_form():
+    """K_0/c against 2 (c + 2.0), from where they are equal in to 3 cm."""
+
+    def missing(K_0):
+        balance = math.sqrt(1.0 + K_0 / 2.0) - 1.0
+        pull = balance**2 + 4.0 * balance - 0.03**2 - 4.0 * 0.03
+        return K_0 * math.log(balance / 0.03) - pull - 3.94 * 0.72**2 / 2.0
+
+    expected = brentq(missing, 0.2, 9.0)
+    assert expected == pytest.approx(0.9170, abs=5e-5)
+    law, field = "conventional2017", "distance_gain_j"
+    found = gain_for_barrier(SCENARIO, law, field, REQUIREMENTS)
+    assert found == pytest.approx(expected, rel=1e-3)
+
+
 def test_contact_allows_what_independent_code_found():
     """Largest K_0 with 50 ms of motor lag and 0, 1, 2, 4 periods of latency."""
     limits = [
@@ -88,7 +104,7 @@ def test_contact_allows_what_independent_code_found():
 def test_laws_have_the_same_barrier():
     barriers = [
         check_law(SCENARIO, law, REQUIREMENTS).check("barrier").ratio
-        for law in ("conventional", "active", "active2017")
+        for law in DESIGNED_LAWS
     ]
     np.testing.assert_allclose(barriers, 1.0, atol=0.015)
 
@@ -109,8 +125,9 @@ def test_a_little_more_damping_resolves_it():
     assert designed(with_attraction(damping_n_s_m=1.1), "conventional").met
 
 
-def test_law_of_2017_gives_contact_and_offsets_for_the_barrier():
-    design = check_law(SCENARIO, "active2017", REQUIREMENTS)
+@pytest.mark.parametrize("law", ["conventional2017", "active2017"])
+def test_laws_of_2017_give_contact_and_offsets_for_the_barrier(law):
+    design = check_law(SCENARIO, law, REQUIREMENTS)
     expected = {"contact stiffness", "offset behind the source", "offset by a far echo"}
     assert unmet(design) == expected
 

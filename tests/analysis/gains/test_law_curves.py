@@ -8,8 +8,8 @@ import pytest
 from analysis.gains.law_curves import law_curves, radial_forces
 from analysis.gains.law_curves_plots import plot_law_curves
 from diagrams.laws import LAWS, make_controller
-from diagrams.loading import ScenarioError
 from diagrams.scenario import Scenario
+from systems.input_error import InputError
 
 SCENARIO = Scenario.model_validate(
     {
@@ -82,7 +82,7 @@ def test_printed_term_is_even_in_speed_and_closing_ignores_retreat(law):
 
 
 def test_unknown_law_is_refused():
-    with pytest.raises(ScenarioError, match="'activ' is not known"):
+    with pytest.raises(InputError, match="'activ' is not known"):
         law_curves(SCENARIO, ["activ"])
 
 

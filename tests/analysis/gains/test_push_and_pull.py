@@ -93,7 +93,7 @@ def test_stiffest_slope_is_that_of_the_curve(law):
     push = spring(law, SCENARIO)
     c = np.linspace(0.02, 3.0, 300_000)
     slopes = -np.diff([push(x) for x in c]) / np.diff(c)
-    found = stiffest(law, SCENARIO.repulsion)
+    found = stiffest(law, SCENARIO)
     assert found == pytest.approx(slopes.max(), rel=1e-3)
 
 

@@ -202,6 +202,17 @@ def test_arrays_of_any_shape(tmp_path, name, bearing, elevation, distance, range
     assert ("range" in summary["observable"]) == range_known
 
 
+@pytest.mark.parametrize(("count", "dimension"), [(48, 2), (35, 3)])
+def test_many_microphones(tmp_path, count, dimension):
+    places = np.random.default_rng(11).uniform(-0.15, 0.15, (count, dimension))
+    source = np.array([*polar(-70.0, 2.0), 0.5][:dimension])
+    path = record(tmp_path / "a.wav", places, source, rate=16_000, seconds=0.25)
+    p_AS = source - places.mean(axis=0)
+    summary = locate(path, array(places)).summary()
+    bearing = math.degrees(math.atan2(p_AS[1], p_AS[0]))
+    assert summary["bearing_deg"] == pytest.approx(bearing, abs=0.3)
+
+
 def test_upright_row_tells_the_elevation_alone(tmp_path):
     places = np.array([[0, 0, 0.0], [0, 0, 0.1], [0, 0, 0.25]])
     source = places.mean(axis=0) + 3.0 * np.array([0.6, 0.0, 0.8])
@@ -406,3 +417,83 @@ def test_document_has_the_keys_that_others_rely_on(tmp_path):
     assert times[0] == pytest.approx(document["array"]["frame_s"] / 2, abs=1e-3)
     assert times == sorted(times)
     assert "25.0" in locate_text(result)
+
+
+SMALL_SQUARE = 0.02285 * np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0.0]])
+
+
+@pytest.mark.parametrize(
+    ("times", "says"),
+    [
+        (100.0, r"an array of 6.46 m can have; give positions in m \(divide"),
+        (0.1, r"array of 0.00646 m cannot have delays .* positions in m \(multiply"),
+    ],
+)
+def test_positions_in_other_units_are_refused(tmp_path, times, says):
+    """6.5 cm across: in cm, and in a unit of 10 m."""
+    source = np.array([*polar(150.0, 1.5), 0.5])
+    path = record(tmp_path / "a.wav", SMALL_SQUARE, source, rate=16_000, seconds=1.0)
+    bearing = locate(path, array(SMALL_SQUARE)).summary()["bearing_deg"]
+    assert bearing == pytest.approx(150.0, abs=0.3)
+    with pytest.raises(ValueError, match=says):
+        locate(path, array(times * SMALL_SQUARE))
+
+
+def test_positions_in_inches_are_named(tmp_path):
+    source = np.array([*polar(150.0, 1.5), 0.5])
+    path = record(tmp_path / "a.wav", SMALL_SQUARE, source, rate=16_000, seconds=1.0)
+    result = locate(path, array(SMALL_SQUARE / 0.0254))
+    assert [fault.kind for fault in result.faults] == ["size"]
+    assert "or the positions are not in m" in result.faults[0].message
+
+
+def test_positions_in_mm_are_farther_apart_than_any_array():
+    with pytest.raises(ValueError, match=r"64.6.* m apart; give positions in m"):
+        array(1_000.0 * SMALL_SQUARE)
+
+
+@pytest.mark.parametrize("name", ["level square", "circle", "unequal row"])
+def test_source_straight_above_or_ahead_is_not_refused(tmp_path, name):
+    """All delays are next to nothing, as they should be."""
+    places = np.array(ARRAYS[name])
+    heard_by = np.pad(places, ((0, 0), (0, 3 - places.shape[1])))
+    ahead = [0.0, 1.0, 0.0] if name == "unequal row" else [0.02, 0.03, 1.0]
+    source = heard_by.mean(axis=0) + 3.0 * np.array(ahead)
+    path = record(tmp_path / "a.wav", heard_by, source, rate=16_000, seconds=1.0)
+    assert locate(path, array(places)).frames > 0
+
+
+def late_by(samples, rate, channel, seconds):
+    """(samples, n) with one channel later, by its phases."""
+    spectrum = np.fft.rfft(samples[:, channel])
+    f = np.fft.rfftfreq(len(samples), 1.0 / rate)
+    turned = np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * seconds), len(samples))
+    return np.column_stack(
+        [turned if k == channel else x for k, x in enumerate(samples.T)]
+    )
+
+
+@pytest.mark.parametrize("late_us", [0, 10, 20, 50])
+def test_a_channel_that_is_late_is_named(tmp_path, late_us):
+    places = np.array(ARRAYS["circle"])
+    path = record(tmp_path / "a.wav", places, polar(60.0, 2.0), snr_db=20.0)
+    altered(path, lambda x: late_by(x, 48_000, 2, 1e-6 * late_us))
+    result = locate(path, array(places))
+    if not late_us:
+        assert result.faults == []
+        return
+    late = [f for f in result.faults if f.kind == "late"]
+    assert len(late) == 1
+    assert 2 in late[0].channels
+
+
+@pytest.mark.parametrize(("gain", "shift"), [(0.7, 0), (-0.4, 0), (1.0, 5)])
+def test_channel_copied_with_gain_or_delay_is_refused(tmp_path, gain, shift):
+    path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5), snr_db=20.0)
+
+    def copied(samples):
+        samples[:, 1] = gain * np.roll(samples[:, 0], shift)
+        return samples
+
+    with pytest.raises(ValueError, match="channels 1 and 2: the same samples"):
+        locate(altered(path, copied))

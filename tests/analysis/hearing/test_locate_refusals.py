@@ -8,8 +8,8 @@ import soundfile
 
 from analysis.hearing.locate import ArrayGeometry, load_geometry, locate
 
-#: (samples, 3) a tone in three channels.
-THREE = 0.1 * np.sin(np.arange(9_600))[:, np.newaxis] * [1.0, 0.9, 0.8]
+#: (samples, 3) noise in three channels.
+THREE = 0.1 * np.random.default_rng(0).standard_normal((9_600, 3))
 
 
 def write(path, samples, rate=48_000):
@@ -31,7 +31,7 @@ def test_recordings_that_cannot_be_used(tmp_path):
         write(tmp_path / "mono.wav", tone): "is mono.*needs 3",
         write(tmp_path / "two.wav", three[:, :2]): "has 2 channels.*needs 3",
         write(tmp_path / "four.wav", np.stack([tone] * 4, axis=1)): (
-            "has 4 channels.*name the channels"
+            "has 4 channels.*robot's own array 3.*--geometry FILE"
         ),
         write(tmp_path / "short.wav", three[:100]): "100 samples.*longer",
         write(tmp_path / "slow.wav", three, 4_000): "4000 Hz.*8000",
@@ -41,6 +41,13 @@ def test_recordings_that_cannot_be_used(tmp_path):
             locate(path)
         assert str(caught.value).startswith("recording: ")
         assert path.name in str(caught.value)
+
+
+def test_further_channels_beside_those_of_a_geometry(tmp_path):
+    path = write(tmp_path / "a.wav", np.stack([THREE[:, 0]] * 4, axis=1))
+    places = ((0.0, 0.1), (0.0, 0.0), (0.0, -0.1))
+    with pytest.raises(ValueError, match=r"has 4 channels.*'channels: \[0, 1, 2\]'"):
+        locate(path, ArrayGeometry(microphones=places))
 
 
 def test_rate_below_twice_the_band(tmp_path):
@@ -62,6 +69,10 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
         ("microphones: [[0, 400], [0, 0], [0, -400]]\n", "800 m apart.*in m"),
+        (
+            f"microphones: {[[0.01 * k, 0.0] for k in range(65)]}\n",
+            "65 given; give at most 64",
+        ),
         (GOOD + "channels: [0, 1]\n", "2 named for 3"),
         (GOOD + "channels: [0, 1, 1]\n", "twice"),
         (GOOD + "channels: [0, 1, -1]\n", "channels"),

@@ -105,3 +105,20 @@ def test_stated_errors_hold_in_a_room(tmp_path):
     stated = np.array([e.bearing_std_deg for e in result.estimates])
     assert 0.5 * np.median(stated) < np.median(np.abs(errors)) / 0.6745
     assert np.median(np.abs(errors)) / 0.6745 < 2.0 * np.median(stated)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("places", [SMALL_SQUARE, CIRCLE, TETRAHEDRON, ROW])
+def test_no_fault_is_named_in_good_recordings(tmp_path, places):
+    rng = np.random.default_rng(len(places))
+    for _ in range(6):
+        result = record(
+            tmp_path / "a.wav",
+            np.array(places) * rng.uniform(0.8, 1.6),
+            bearing=rng.uniform(-180.0, 180.0),
+            elevation=rng.uniform(-10.0, 35.0),
+            distance=rng.uniform(0.8, 2.0),
+            t60=rng.uniform(0.2, 0.5),
+            snr_db=rng.uniform(10.0, 30.0),
+        )
+        assert result.faults == []

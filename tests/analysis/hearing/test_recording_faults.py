@@ -27,7 +27,7 @@ def agrees_with(order):
 AS_GIVEN = agrees_with([0, 1, 2])
 
 
-@pytest.mark.parametrize("kind", ["nan", "dead", "copied"])
+@pytest.mark.parametrize("kind", ["nan", "dead", "copied", "units"])
 def test_nothing_to_locate_with(kind):
     with pytest.raises(ValueError, match=rf"a.wav: {kind} \(1,\)"):
         channels_without_faults(
@@ -39,6 +39,22 @@ def test_all_channels_that_are_of_no_use_are_named():
     found = [fault("dead", 1), fault("clipped", 0), fault("copied", 0, 2)]
     with pytest.raises(ValueError, match=r"dead \(1,\); see to channels 1, 3 as well"):
         channels_without_faults(SAMPLES, found, AS_GIVEN, "")
+
+
+def test_a_message_names_a_few_of_many_channels():
+    found = [fault("copied", 0, k) for k in range(1, 64)]
+    with pytest.raises(
+        ValueError, match=r"see to channels 1, 3, 4, .*\.\.\."
+    ) as caught:
+        channels_without_faults(SAMPLES, found, AS_GIVEN, "")
+    assert len(str(caught.value)) < 100
+
+
+@pytest.mark.parametrize("kind", ["late", "size", "geometry"])
+def test_doubtful_estimates_are_said(kind):
+    samples, faults = channels_without_faults(SAMPLES, [fault(kind, 1)], AS_GIVEN, "")
+    np.testing.assert_array_equal(samples, SAMPLES)
+    assert [f.kind for f in faults] == [kind]
 
 
 def test_inverted_channel_is_turned_back_and_said():

@@ -24,6 +24,29 @@ def test_bootstrap_interval_of_a_mean_is_that_of_the_normal_law():
     assert high == pytest.approx(values.mean() + half, abs=0.05 * half)
 
 
+def test_wilson_interval_of_another_confidence():
+    """None of n: from 0 to z^2 / (n + z^2), z = 1.644854 at 90 %."""
+    top = 1.644854**2 / (20.0 + 1.644854**2)
+    assert wilson_interval(0, 20, confidence=0.9) == pytest.approx((0.0, top), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("confidence", "ends"), [(0.95, (1.0, 5.0)), (0.8, (2.0, 4.0)), (0.2, (3.0, 3.0))]
+)
+def test_bootstrap_interval_of_a_median_is_that_of_the_binomial(confidence, ends):
+    """Of 5 values the median is the lowest in 5.8 %, one of two in 31.7 % of draws."""
+    assert bootstrap_interval([3, 1, 2, 5, 4], seed=1, confidence=confidence) == ends
+
+
+@pytest.mark.parametrize(
+    ("count", "confidence", "ranks"), [(10, 0.8, (3, 8)), (10, 0.99, (1, 10))]
+)
+def test_median_interval_of_another_confidence(count, confidence, ranks):
+    """P(Binomial(10, 1/2) <= 0, 1, 2) = 0.001, 0.011, 0.055; to 0.1 and 0.005."""
+    values = np.arange(1.0, count + 1.0)
+    assert median_interval(values, confidence=confidence) == ranks
+
+
 def test_bootstrap_interval_of_one_value_is_that_value():
     assert bootstrap_interval([4.5], seed=1) == (4.5, 4.5)
 

@@ -8,9 +8,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from analysis.runs.metrics import run_metrics
+from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
+from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
+from diagrams import load_scenario, simulate
 from diagrams.scenario import Scenario
 from diagrams.simulation import COLUMNS, RunResult
 from diagrams.stop_rules import Collision
@@ -86,44 +89,90 @@ def test_time_to_contact_counts_both_motions():
         "speed_m_s": 0.3,
     }
     run = straight(obstacles=[cart], source={"waypoints_m": [[0.0, 3.0]]})
-    gap = 8.0 - 0.3 * 4.0 - 0.1 - (2.0 + FRONT)
+    gap = 8.0 - 0.3 * (4.0 - 0.15) - 0.1 - (2.0 + FRONT)  # half of v/a to start
     assert Proximity(run).time_to_contact[-1] == pytest.approx(gap / 0.8)
 
 
-def test_clearance_between_ticks():
-    """A speck at 4 m/s passes the foremost corner, 1 cm off, midway between ticks.
+@pytest.mark.parametrize(("speed", "passed"), [(4.0, 20.5), (7.0, 20.1), (7.0, 20.9)])
+def test_clearance_between_ticks(speed, passed):
+    """A speck passes the foremost corner, 1 cm off, so many ticks from the start.
 
-    Turned by 45 deg, that corner lies at (FRONT - SIDE, FRONT + SIDE) / sqrt 2.
+    Turned by 45 deg, that corner lies at (FRONT - SIDE, FRONT + SIDE) / sqrt 2. At
+    7 m/s the speck is within 0.1 m at one of the two ticks alone.
     """
     still = np.zeros(40)
     corner = np.array([FRONT - SIDE, FRONT + SIDE]) / math.sqrt(2.0)
-    start = corner + np.array([20.5 * 0.1, 0.011])
+    start = corner + np.array([passed * speed * TICK, 0.011])
     speck = {
         "name": "speck",
         "size_m": [0.002, 0.002],
-        "waypoints_m": [start.tolist(), [-9.0, float(start[1])]],
-        "speed_m_s": 4.0,
+        "waypoints_m": [start.tolist(), [-19.0, float(start[1])]],
+        "speed_m_s": speed,
+        "acceleration_m_s2": 1e6,
     }
     run = motion(still, still, still + math.pi / 4, obstacles=[speck])
-    assert np.min(Proximity(run).clearances[0]) > 0.03
+    assert np.min(Proximity(run).clearances[0]) > 0.015
     least = run_metrics(run)["minimum_obstacle_clearance_m"]
     assert least == pytest.approx(0.01, abs=2e-4)
 
 
-def test_time_to_the_goal_and_settling():
-    """P enters 1.5 m round the source, leaves, and comes back for good.
+def test_distance_of_P_is_from_the_turned_box():
+    """0.4 by 0.2 m at (2, 1), turned by 30 deg: beside it, off a corner, within."""
+    turn = math.radians(30.0)
+    cos, sin = math.cos(turn), math.sin(turn)
+    box = {
+        "size_m": [0.4, 0.2],
+        "waypoints_m": [[2.0, 1.0], [2.0 + 9.0 * cos, 1.0 + 9.0 * sin]],
+        "speed_m_s": 1e-6,
+    }
+    u = np.array([-0.5, 0.1, 0.7, 0.5, -0.1])
+    v = np.array([0.5, -0.4, 0.05, -0.5, 0.05])
+    x, y = 2.0 + cos * u - sin * v, 1.0 + sin * u + cos * v
+    run = motion(x - FRONT, y, 0.0 * x, obstacles=[box])
+    distances = Proximity(run).distances_from_P()
+    assert distances.shape == (2, 5)
+    np.testing.assert_allclose(distances[0], [0.5, 0.3, 0.5, 0.5, 0.0], atol=1e-6)
 
-    P starts at 0.175 and the goal begins at 3.675 - 1.5 = 2.175: 2 m at 1 m/s.
+
+def to_and_fro(rest_s: float, **scenario: Any) -> dict[str, float | None]:
+    """P enters 1.5 m round the source, leaves, comes back, and stops.
+
+    P starts at 0.175 and the goal begins at 3.675 - 1.5 = 2.175: 2 m at 1 m/s. It
+    stops 2.2 + 0.4 + 0.6 s from the start.
     """
     there = np.arange(0.0, 2.2, TICK)
     back = np.arange(2.2, 1.8, -TICK)
-    x = np.concatenate([there, back, np.arange(1.8, 2.4, TICK)])
-    metrics = run_metrics(motion(x, 0 * x, 0 * x, source=RESTING))
+    rest = np.full(round(rest_s / TICK), 2.4)
+    x = np.concatenate([there, back, np.arange(1.8, 2.4, TICK), rest])
+    return run_metrics(motion(x, 0 * x, 0 * x, **scenario))
+
+
+def test_time_to_the_goal_and_settling():
+    metrics = to_and_fro(2.0, source=RESTING)
     assert metrics["time_to_goal_s"] == pytest.approx(2.0, abs=TICK)
-    assert metrics["settling_time_s"] == pytest.approx(2.2 + 0.4 + 0.2, abs=2 * TICK)
+    assert metrics["settling_time_s"] == pytest.approx(3.2, abs=2 * TICK)
+    assert to_and_fro(0.0, source=RESTING)["settling_time_s"] is None
+    assert to_and_fro(0.9, source=RESTING)["settling_time_s"] is None, "a pause"
     away = run_metrics(straight(0.1, source=RESTING))
     assert away["time_to_goal_s"] is None
     assert away["settling_time_s"] is None
+
+
+def test_turning_on_the_spot_is_not_settled():
+    """P, 0.175 m ahead of the centre, goes 0.07 m/s at 0.4 rad/s, 0.035 at 0.2."""
+    still = np.full(161, 2.4)
+    time = TICK * np.arange(161)
+    for rate, settled in ((0.4, None), (0.2, 0.0)):
+        run = motion(still, 0 * still, rate * time - 0.8, source=RESTING)
+        assert run_metrics(run)["settling_time_s"] == settled
+
+
+def test_settling_behind_a_moving_source_is_to_stay_within_the_band():
+    """At rest 3.5 m behind, 2 m being the band's end, to 0.5 m/s faster than it."""
+    source = {"waypoints_m": [[3.675, 0.0], [9.0, 0.0]], "speed_m_s": 0.1}
+    metrics = run_metrics(straight(0.6, source=source))
+    assert metrics["time_to_goal_s"] == pytest.approx(1.5 / 0.5, abs=TICK)
+    assert metrics["settling_time_s"] == metrics["time_to_goal_s"]
 
 
 def test_spl_of_a_detour():
@@ -146,17 +195,96 @@ def test_spl_of_a_detour():
 
 
 def test_following_a_moving_source():
-    """After 2.5 s: source from 2 m at 0.3 m/s, P from 0.175 m at 0.5 m/s."""
+    """After 2.5 s: source from 2 m at 0.3 m/s, P from 0.175 m at 0.5 m/s.
+
+    The source's start of 1 m/s^2 costs v^2 / 2a; its drive has 1 mm to settle.
+    """
     source = {"waypoints_m": [[2.0, 0.0], [9.0, 0.0]]}
-    metrics = run_metrics(straight(source=source))
+    heard = {"target_valid": np.arange(161) >= 80}
+    metrics = run_metrics(straight(source=source, columns=heard))
     time = np.arange(100, 161) * TICK
-    error = np.abs(2.0 + 0.3 * time - FRONT - 0.5 * time - 1.2)
-    assert metrics["following_error_rms_m"] == pytest.approx(
-        math.sqrt(np.mean(error**2))
-    )
-    assert metrics["following_error_p95_m"] == pytest.approx(np.quantile(error, 0.95))
+    error = np.abs(2.0 + 0.3 * time - 0.045 - FRONT - 0.5 * time - 1.2)
+    rms, p95 = math.sqrt(np.mean(error**2)), np.quantile(error, 0.95)
+    assert metrics["following_error_rms_m"] == pytest.approx(rms, abs=1e-4)
+    assert metrics["following_error_p95_m"] == pytest.approx(p95, abs=1e-4)
     assert metrics["following_fraction"] == 1.0
     assert metrics["following_bearing_rms_deg"] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_the_share_of_following_counts_from_the_first_target_on():
+    """P leaves the band, 0.4 m to 2 m, after 3 s; the target comes at 1 s, and goes.
+
+    P from 0.175 m at -0.5 m/s, the source at rest at 0.675 m.
+    """
+    valid = (np.arange(161) >= 40) & (np.arange(161) < 60)
+    run = straight(
+        -0.5,
+        source={"waypoints_m": [[0.675, 0.0]]},
+        start={"position_m": [-3.0, 0.0]},
+        columns={"target_valid": valid},
+    )
+    share = run_metrics(run)["following_fraction"]
+    assert share == pytest.approx(81 / 121)
+    assert run_metrics(straight())["following_fraction"] is None
+
+
+def burst_frames(distance: float, **scenario: Any) -> NDArray[np.int64]:
+    """Ticks with sound in 41 s, the robot and the source at rest."""
+    still = np.zeros(1641)
+    source = {"waypoints_m": [[FRONT + distance, 0.0]]}
+    run = motion(still, still, still, source=source, **scenario)
+    return np.flatnonzero(frames_with_sound(run))
+
+
+@pytest.mark.parametrize("hearing", ["audio", "ideal"])
+@pytest.mark.parametrize("distance", [0.5, 4.0, 4.5, 8.0])
+def test_frames_with_sound(hearing, distance):
+    """20 frames of 25 ms in each of the bursts of 0.5 s in 2 s.
+
+    The last of 21 bursts began at 40 s. A frame's estimate comes a tick after its
+    end: of the frame [0, 25 ms) at tick 2. Of sound that is half a frame late, from
+    12.5 ms x c = 4.3 m on, the first frame holds less than half, and one more at
+    the end holds more.
+    """
+    ticks = burst_frames(distance, hearing=hearing)
+    late = int(hearing == "audio" and distance > 4.3)
+    first = 2 + late + 80 * np.arange(21)
+    np.testing.assert_array_equal(ticks, (first[:, None] + np.arange(20)).ravel())
+
+
+def test_frames_with_sound_of_other_gates():
+    """It begins at 1 s: 20 periods are over, and the 21st begins at the end."""
+    sound = {"start_s": 1.0, "on_s": 0.1}
+    assert len(burst_frames(1.0, sound=sound)) == 20 * 4
+    endless = {"on_s": 2.0}
+    assert len(burst_frames(1.0, sound=endless)) == 1639
+    always = {"burst_gaps": False}
+    assert len(burst_frames(1.0, hearing="ideal", ideal_hearing=always)) == 1640
+
+
+@pytest.mark.parametrize("hearing", ["audio", "ideal"])
+def test_what_is_heard_and_what_sounds_agree(hearing):
+    """A loud source in the free field is heard in every frame that it fills."""
+    overrides = ["law=none", f"hearing={hearing}", "duration_s=4.3"]
+    result = simulate(load_scenario("default", overrides))
+    metrics = run_metrics(result)
+    assert metrics["frames_with_sound"] == 20 + 20 + 11
+    assert metrics["frames_with_sound_heard"] == metrics["detections"] == 51
+    np.testing.assert_array_equal(
+        frames_with_sound(result), result.columns["detected"] > 0.5
+    )
+
+
+def test_completed_is_decided_by_the_share_that_is_reported():
+    source = "source.waypoints_m=[[1.98, 0], [9, 0]]"
+    words = ["hearing=ideal", "law=none", "attraction.stiffness_n_m=0", source]
+    scenario = load_scenario("default", [*words, "obstacles=[]", "duration_s=6"])
+    share = run_metrics(simulate(scenario))["following_fraction"]
+    assert share is not None
+    for bound, cause in ((share, "completed"), (share + 1e-6, "astray")):
+        stop = scenario.stop.model_copy(update={"following_share": bound})
+        run = simulate(scenario.model_copy(update={"stop": stop}))
+        assert run.cause == cause
 
 
 def test_swinging_to_and_fro():
@@ -206,6 +334,57 @@ def test_effort_and_saturation():
     assert metrics["impossible_obstacle_speed_ticks"] == 5
 
 
+def test_saturated_is_a_wheel_or_the_command_at_its_top():
+    """12 rad/s on either side, 0.72 m/s; obstacles at twice that are impossible."""
+    tick = np.arange(100)
+    columns = {
+        "wheel_speed_left": np.where(tick < 10, -12.0, 11.9),
+        "wheel_speed_right": np.where((tick >= 5) & (tick < 20), 12.0, 0.0),
+        "v_WP_x": np.where((tick >= 15) & (tick < 50), 0.432, 0.0),
+        "v_WP_y": np.where((tick >= 15) & (tick < 45), -0.576, 0.0),
+        "obstacle_speed_2": np.where(tick < 7, 1.45, 1.43),
+        "obstacle_speed_3": np.where((tick >= 5) & (tick < 9), 1.45, 0.0),
+    }
+    metrics = run_metrics(straight(ticks=100, columns=columns))
+    assert metrics["saturated_fraction"] == pytest.approx(0.45)
+    assert metrics["impossible_obstacle_speed_ticks"] == 9
+
+
+def test_errors_of_hearing_are_of_fresh_estimates_with_range():
+    """Off by 0.1, 0.2, 0.3, 0.48 and 0.6 m; the rest has no range, or is old."""
+    tick = np.arange(161)
+    off = np.zeros(161)
+    off[10:15] = [0.6, 0.1, 0.3, 0.48, 0.2]
+    columns = {
+        "detected": (tick >= 10) & (tick < 20),
+        "range_valid": (tick < 15) | (tick > 40),
+        "p_WS_estimated_x": 3.675 + 0.6 * off,
+        "p_WS_estimated_y": -0.8 * off,
+    }
+    columns["p_WS_estimated_x"][15:] = 9.0
+    metrics = run_metrics(straight(source=RESTING, columns=columns))
+    assert (metrics["detections"], metrics["detections_with_range"]) == (10, 5)
+    assert metrics["source_error_median_m"] == pytest.approx(0.3)
+    # Four fifths of the way from the fourth to the fifth.
+    assert metrics["source_error_p95_m"] == pytest.approx(0.576)
+    assert metrics["source_outlier_fraction"] == pytest.approx(0.2)
+
+
+def test_smoothness_is_of_movements_of_4_s_and_not_of_rests():
+    """A bell of speed, one of 4 cm/s, two bells, an even drive, and half a bell."""
+    time = np.arange(-80, 80) * TICK
+    bell = 0.4 * np.exp(-5.0 * time**2)
+    pair = 0.4 * (np.exp(-5.0 * (time - 1) ** 2) + np.exp(-5.0 * (time + 1) ** 2))
+    even = np.full(160, 0.3)
+    speed = np.concatenate([bell, 0.1 * bell, pair, even, bell[:80]])
+    x = np.cumsum(speed) * TICK
+    metrics = run_metrics(motion(x, 0 * x, 0 * x, columns={"v_WB_x": speed}))
+    sparc = [float(spectral_arc_length(v, 40.0)) for v in (bell, pair)]
+    ldlj = [float(log_dimensionless_jerk(v, 40.0)) for v in (bell, pair)]
+    assert metrics["sparc"] == pytest.approx(sum(sparc) / 2.0)
+    assert metrics["ldlj"] == pytest.approx(sum(ldlj) / 2.0)
+
+
 def test_reaction_is_to_the_obstacle_and_not_to_the_source():
     """The push exceeds 0.5 N when P is 0.8 m from the box's near face, 0.95."""
     ticks = 81
@@ -237,12 +416,42 @@ def test_figures_of_a_whole_run(crossing_run):
     moving_source = {"shortest_path_m", "spl"}
     no_collision = {"contact_warning_s", "contact_unseen_s", "contact_push_n"}
     without = {name for name, value in metrics.items() if value is None}
-    assert without == moving_source | no_collision
+    assert without == moving_source | no_collision | {"slip_way_m"}
     value = {name: float(x) for name, x in metrics.items() if x is not None}
     assert value["jerk_max_m_s3"] >= value["jerk_rms_m_s3"]
     assert value["minimum_clearance_m"] <= value["clearance_p05_m"]
     assert value["sparc"] < -1.0
     assert 0.0 <= value["saturated_fraction"] <= 1.0
+
+
+def test_odometry_error_is_from_the_true_pose_to_the_believed_one():
+    """Off by 3 and 4 parts in 10 of the way: half of it, 0 to 1 m in equal steps."""
+    run = straight()
+    x = run.columns["p_WB_x"]
+    believed = {
+        "p_WB_estimated_x": 1.3 * x,
+        "p_WB_estimated_y": 0.4 * x,
+        "theta_WB_estimated": np.full(len(x), math.radians(5.0)),
+    }
+    metrics = run_metrics(replace(run, columns=run.columns | believed))
+    n = len(x) - 1
+    assert metrics["odometry_error_final_m"] == pytest.approx(1.0)
+    rms = math.sqrt((2 * n + 1) / (6 * n))
+    assert metrics["odometry_error_rms_m"] == pytest.approx(rms)
+    assert metrics["odometry_heading_error_rms_deg"] == pytest.approx(5.0)
+    assert metrics["slip_way_m"] is None, "wheels that roll have none"
+
+
+def test_slip_way_is_the_mean_of_both_wheels():
+    """At 0.3 and 0.4 m/s on one and 0.4 m/s on the other, for 161 ticks."""
+    run = straight(plant={"friction": 0.3})
+    slip = {
+        "slip_left": np.full(161, -0.3),
+        "slip_right": np.zeros(161),
+        "slip_sideways": np.full(161, 0.4),
+    }
+    metrics = run_metrics(replace(run, columns=run.columns | slip))
+    assert metrics["slip_way_m"] == pytest.approx((0.5 + 0.4) / 2 * 161 * TICK)
 
 
 def collision(x: float, y: float, theta: float, *, ticks: int = 81) -> RunResult:

@@ -72,10 +72,18 @@ def test_bodies_are_where_the_columns_say(crossing_run, recorded, path, body):
         assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
 
 
+def cart_way(time):
+    """4 m at 0.3 m/s, with 1 m/s^2 at the start and the end."""
+    left = max(4.0 / 0.3 + 0.3 - time, 0.0)
+    if time < 0.3:
+        return 0.5 * time**2
+    return 4.0 - 0.5 * left**2 if left < 0.3 else 0.3 * time - 0.045
+
+
 def test_a_moving_obstacle_moves_and_a_resting_one_rests(recorded):
     assert "obstacles/box" not in recorded.transforms
     for time, X in recorded.transforms["obstacles/cart"][::32]:
-        y = -2.0 + min(0.3 * time, 4.0)
+        y = -2.0 + cart_way(time)
         assert X.translation()[:2] == pytest.approx([3.0, y])
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.integrate import quad
 from scipy.signal import savgol_filter
 
 from analysis.runs.smoothness import (
@@ -30,6 +31,45 @@ def test_published_value_of_sparc():
 
 def test_published_value_of_ldlj():
     assert log_dimensionless_jerk(BELL, 100.0) == pytest.approx(-5.81636, abs=5e-6)
+
+
+def test_a_stack_of_movements_has_a_value_each():
+    stack = np.stack([BELL, 2.0 * BELL, 3.0 * BELL])
+    sparc, ldlj = (
+        spectral_arc_length(stack, 100.0),
+        log_dimensionless_jerk(stack, 100.0),
+    )
+    np.testing.assert_allclose(sparc, np.full(3, -1.41403), atol=5e-6)
+    np.testing.assert_allclose(ldlj, np.full(3, -5.81636), atol=5e-6)
+
+
+def test_sparc_of_two_jolts_is_the_arc_of_a_cosine_up_to_10_hz():
+    """1 and 1/2, 0.1 s apart: |1 + exp(-j 2 pi x)/2| / 1.5 over x = f / 10 Hz."""
+    jolts = np.zeros(256)
+    jolts[0], jolts[8] = 1.0, 0.5
+
+    def slope(x):
+        size = math.sqrt(1.25 + math.cos(2.0 * math.pi * x))
+        return math.pi * math.sin(2.0 * math.pi * x) / (1.5 * size)
+
+    arc = quad(lambda x: math.hypot(1.0, slope(x)), 0.0, 1.0)[0]
+    assert spectral_arc_length(jolts, 80.0) == pytest.approx(-arc, rel=2e-4)
+    # Of 16 samples 10 Hz is the 32nd line of the spectrum, and counts.
+    assert spectral_arc_length(jolts[:16], 80.0) == pytest.approx(-arc, rel=4e-3)
+
+
+def test_sparc_is_of_the_band_from_the_first_loud_frequency_to_the_last():
+    """1 and -1, 0.1 s apart: |sin(pi x)|, of 5 % or more but at the ends."""
+    jolts = np.zeros(1024)
+    jolts[0], jolts[8] = 1.0, -1.0
+    edge = math.asin(0.05) / math.pi
+    width = 1.0 - 2.0 * edge
+
+    def slope(u):
+        return width * math.pi * math.cos(math.pi * (edge + width * u))
+
+    arc = quad(lambda u: math.hypot(1.0, slope(u)), 0.0, 1.0)[0]
+    assert spectral_arc_length(jolts, 80.0) == pytest.approx(-arc, rel=2e-3)
 
 
 @given(scale=st.floats(1e-3, 1e3))
@@ -84,6 +124,7 @@ def test_reversals_of_a_swinging_heading():
     assert turn_reversals(rate, least=0.1) == 9
     assert turn_reversals(0.05 * rate, least=0.1) == 0
     assert turn_reversals(np.abs(rate), least=0.1) == 0
+    assert turn_reversals([0.1, 0.0, -0.1, 0.05, 0.1], least=0.1) == 2
 
 
 def test_windows_leave_the_rest_out():

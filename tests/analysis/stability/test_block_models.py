@@ -22,7 +22,9 @@ def build(law, hold="motion", **data):
     return ideal_loop(ideal_scenario(Scenario.model_validate(data)))
 
 
-@pytest.mark.parametrize("law", ["none", "conventional", "active", "active2017"])
+@pytest.mark.parametrize(
+    "law", ["none", "conventional", "active", "conventional2017", "active2017"]
+)
 @pytest.mark.parametrize("hold", ["motion", "world", "robot"])
 def test_blocks_joined_by_control_are_the_derivative_of_one_period(law, hold):
     """At a place where forces act, which is no equilibrium."""

@@ -50,7 +50,19 @@ def test_command_prints_the_tables_and_says_what_it_does(row, monkeypatch, capsy
         return [row]
 
     monkeypatch.setattr(table, "certificate_rows", rows)
-    table.main(["corridor", "--laws", "active", "--starts", "7", "--hearing", "ideal"])
+    table.main(
+        [
+            "corridor",
+            "--laws",
+            "active",
+            "--starts",
+            "7",
+            "--hearing",
+            "ideal",
+            "--set",
+            "seed=3",
+        ]
+    )
     printed = capsys.readouterr()
     assert printed.out == table.certificate_table([row]) + "\n"
     assert printed.err == "conventional: certificate\n"
@@ -60,6 +72,7 @@ def test_command_prints_the_tables_and_says_what_it_does(row, monkeypatch, capsy
         "starts": 7,
         "diagram_starts": 200,
         "hearing": "ideal",
+        "settings": ["seed=3"],
     }
 
 

@@ -19,7 +19,7 @@ from analysis.stability.linearisation import (
 from analysis.stability.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario import Scenario
 
-LAWS = ["none", "conventional", "active", "active2017"]
+LAWS = ["none", "conventional", "active", "conventional2017", "active2017"]
 
 
 def points(law):

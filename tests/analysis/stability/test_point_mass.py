@@ -13,7 +13,7 @@ from diagrams.laws import make_controller
 from systems.ideal_obstacle_sensor import nearest_vectors
 from systems.impedance import attraction_force, repulsion_force
 
-LAWS = ("conventional", "active", "active2017")
+LAWS = ("conventional", "active", "conventional2017", "active2017")
 
 
 def block_force(scenario, law, state, *, before=None):

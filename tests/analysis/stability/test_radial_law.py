@@ -35,11 +35,18 @@ def active_2017_energy(c):
     return 1.1 * math.log(RANGE / c)
 
 
+def conventional_2017_energy(c):
+    if c < 0.03:
+        return 1.1 * math.log(RANGE / 0.03) + 1.1 / 0.03 * (0.03 - c)
+    return 1.1 * math.log(RANGE / c)
+
+
 @pytest.mark.parametrize(
     ("law", "energy"),
     [
         ("conventional", conventional_energy),
         ("active", active_energy),
+        ("conventional2017", conventional_2017_energy),
         ("active2017", active_2017_energy),
     ],
 )
@@ -47,7 +54,15 @@ def test_energy_is_the_integral_of_the_force(two_boxes, law, energy):
     table = radial_law(two_boxes(law))
     distances = np.linspace(0.0, RANGE, 301)
     expected = [energy(c) for c in distances.tolist()]
-    np.testing.assert_allclose(table.energy(distances), expected, atol=2e-6)
+    np.testing.assert_allclose(table.energy(distances), expected, atol=5e-6)
+
+
+def test_least_range_of_the_sensors_bounds_kim_s_conventional_law(two_boxes):
+    """1.1 J/3 cm, and 1.1 J/5 cm: a table for each."""
+    for least in (0.03, 0.05):
+        setting = f"ultrasonic.minimum_range_m={least}"
+        table = radial_law(two_boxes("conventional2017", setting))
+        assert float(table.at_rest(0.0)) == pytest.approx(1.1 / least)
 
 
 @given(st.floats(1e-3, 2.999))
@@ -93,6 +108,11 @@ def test_a_block_without_a_radial_law_is_refused(two_boxes, tmp_path, monkeypatc
         "class Block(LeafSystem):\n"
         "    def __init__(self, robot, attraction, repulsion):\n"
         "        super().__init__()\n"
+        "        for name, size in (\n"
+        "            ('acceleration_W', 2), ('forces_W', 4), ('obstacle_speeds', 3)\n"
+        "        ):\n"
+        "            calc = lambda context, output: None\n"
+        "            self.DeclareVectorOutputPort(name, size, calc)\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
     with pytest.raises(ValueError, match="write it as a function law"):
@@ -105,5 +125,5 @@ def test_a_force_that_is_not_finite_is_refused(two_boxes, tmp_path, monkeypatch)
     )
     monkeypatch.syspath_prepend(tmp_path)
     scenario = two_boxes("active", "law=own_laws:no_number")
-    with pytest.raises(ValueError, match=r"law: .* not finite"):
+    with pytest.raises(ValueError, match=r"law: .* returns nan"):
         radial_law(scenario)

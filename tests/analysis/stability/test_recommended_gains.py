@@ -79,6 +79,32 @@ def test_recommended_gains_meet_everything_and_less_damping_does_not():
     assert found.today.following_lag_m == pytest.approx(0.15)
 
 
+@pytest.mark.parametrize("law", ["conventional", "active"])
+def test_advice_says_what_the_law_leaves_of_the_margins(law):
+    """Pushed off the source the loop across stands (r + epsilon)/r at any gains."""
+    found = recommend_gains(load_scenario("default", [f"law={law}"]), springs=(1.0,))
+    best, whole = found.recommended, found.whole_loop
+    assert best is not None
+    assert whole is not None
+    assert best.disk_margin >= found.thresholds.disk_margin
+    alone = "attraction's loop alone" in found.advice
+    assert alone == (law == "active")
+    if alone:
+        gains = [
+            f"attraction.stiffness_n_m={best.stiffness_n_m}",
+            f"attraction.damping_n_s_m={best.damping_n_s_m}",
+        ]
+        point = follow_equilibrium(load_scenario("default", [f"law={law}", *gains]))
+        factor = 1.0 + 0.175 / point.source_distance_m
+        assert whole.gain_margin_db == pytest.approx(20.0 * np.log10(factor), rel=1e-4)
+        assert f"gain margin of {whole.gain_margin_db:.2f} dB" in found.advice
+        assert not whole.meets(found.thresholds)
+        assert whole.weakest == "L at the sensor, across"
+    else:
+        assert whole.phase_margin_deg == pytest.approx(best.phase_margin_deg, abs=0.01)
+        assert whole.disk_margin == pytest.approx(best.disk_margin, abs=1e-3)
+
+
 def test_law_that_is_too_stiff_has_no_gains():
     scenario = load_scenario(
         "default", ["law=conventional", "repulsion.conventional.stiffness_n_m=5000"]
@@ -86,6 +112,7 @@ def test_law_that_is_too_stiff_has_no_gains():
     found = recommend_gains(scenario, springs=(1.0,))
     assert found.choices[0].figures is None
     assert found.recommended is None
+    assert found.whole_loop is None
 
 
 def test_no_spring_is_refused():

@@ -11,7 +11,8 @@ from analysis.stability.stability import Part, analyse_law, chosen_laws
 from analysis.stability.stability_page import stability_page
 from analysis.stability.stability_report import stability_document, stability_text
 from analysis.stability.verdicts import Criterion, judge
-from diagrams import ScenarioError, load_scenario
+from diagrams import load_scenario
+from systems.input_error import InputError
 
 LIGHT = Criterion("mass", "kg", "below", 4.0, "light", "heavy", "a test")
 
@@ -21,7 +22,7 @@ def render(data, name):
 
 
 def refuse(study):
-    raise ValueError("law: cannot; choose another")
+    raise InputError("law", "cannot; choose another")
 
 
 MASS = Part("mass", "Mass", lambda study: study.scenario.robot.mass_kg, render)
@@ -57,9 +58,14 @@ def test_laws_are_chosen_once_each():
     base = load_scenario("default", ["law=none", "seed=3"])
     assert [s.law for s in chosen_laws(base, [])] == ["none"]
     chosen = chosen_laws(base, ["active", "all"])
-    assert [s.law for s in chosen] == ["active", "conventional", "active2017"]
+    assert [s.law for s in chosen] == [
+        "active",
+        "conventional",
+        "conventional2017",
+        "active2017",
+    ]
     assert {s.seed for s in chosen} == {3}
-    with pytest.raises(ScenarioError, match="law: 'magic'"):
+    with pytest.raises(InputError, match="law: 'magic'"):
         chosen_laws(base, ["magic"])
 
 

@@ -38,6 +38,7 @@ def test_verdicts_say_what_follows():
     assert judge(MARGIN, math.inf).verdict == "pass"
     missing = judge(MARGIN, None, "there is no loop")
     assert (missing.verdict, missing.text) == ("not applicable", "there is no loop")
+    assert judge(MARGIN, None).text == "this law has no such number"
     assert MARGIN.threshold == "\u2265 45 deg"
 
 
@@ -54,6 +55,26 @@ def test_laws_of_one_verdict_stand_together():
     assert rows[0].verdicts == {"a": "fail", "b": "pass", "c": "fail"}
     same = compare_verdicts({law: [judge(MARGIN, 20.0)] for law in "abc"})
     assert same[0].text == "All: fragile."
+    two = compare_verdicts({law: [judge(MARGIN, 50.0)] for law in "ab"})
+    assert two[0].text == "a and b: robust."
+    (one,) = compare_verdicts({"a": [judge(MARGIN, 50.0)]})
+    assert (one.text, one.values) == ("robust.", {"a": 50.0})
+
+
+def test_laws_are_compared_by_name_in_the_first_ones_order():
+    gain = Criterion("gain margin", "dB", "above", 6.0, "ample", "scant", "textbook")
+    rows = compare_verdicts(
+        {
+            "a": [judge(MARGIN, 50.0), judge(gain, 6.0)],
+            "b": [judge(gain, 7.0), judge(MARGIN, 20.0)],
+        }
+    )
+    assert [row.name for row in rows] == ["phase margin", "gain margin"]
+    assert [row.values for row in rows] == [
+        {"a": 50.0, "b": 20.0},
+        {"a": 6.0, "b": 7.0},
+    ]
+    assert rows[1].text == "a: scant. b: ample."
 
 
 @pytest.mark.parametrize(("spring_n_m", "certified"), [(0.01, 0.0), (1000.0, 1.0)])

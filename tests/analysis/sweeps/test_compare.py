@@ -19,7 +19,8 @@ from analysis.sweeps.compare_report import (
     compare_text,
     write_comparison,
 )
-from diagrams import ScenarioError, load_scenario, simulate
+from diagrams import load_scenario, simulate
+from systems.input_error import InputError
 
 IDEAL = {"hearing": "ideal"}
 
@@ -67,6 +68,18 @@ def test_a_layout_does_not_depend_on_laws_or_runs():
         assert values[1][::2][:2] == values[0]
 
 
+def test_the_recommended_attraction_meets_the_same_layouts():
+    printed, recommended = (
+        comparison_plan(name, laws=("active",), runs=5)
+        for name in ("two_static_obstacles", "two_static_obstacles_recommended")
+    )
+    for one, other in zip(printed.points(), recommended.points(), strict=True):
+        a, b = printed.scenario_of(one), recommended.scenario_of(other)
+        changed = {"name": a.name, "attraction": a.attraction, "repulsion": a.repulsion}
+        assert a.attraction != b.attraction
+        assert b.model_copy(update=changed) == a
+
+
 def test_a_users_own_layouts(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text(
@@ -91,7 +104,7 @@ def test_a_users_own_scenario_differs_in_noise_alone(tmp_path):
 def test_layouts_that_set_what_the_comparison_sets_are_refused(tmp_path):
     file = tmp_path / "mine.yaml"
     file.write_text("scenario: default\nruns: 3\n")
-    with pytest.raises(ScenarioError, match=r"runs: .*remove it"):
+    with pytest.raises(InputError, match=r"runs: .*remove it"):
         comparison_plan(str(file))
 
 
@@ -109,7 +122,7 @@ def test_layouts_that_set_what_the_comparison_sets_are_refused(tmp_path):
     ],
 )
 def test_mistakes_are_named(words, field):
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(InputError) as caught:
         comparison_plans(**words)
     assert caught.value.field == field
 
@@ -118,7 +131,7 @@ def test_velocity_terms_are_set_or_compared():
     (one,) = comparison_plans(["default"], velocity_terms="closing").values()
     assert one.set == {"repulsion.velocity_term": "closing"}
     (both,) = comparison_plans(["default"], velocity_terms="printed,closing").values()
-    assert len(both.cells()) == 8
+    assert len(both.cells()) == 10
 
 
 def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
@@ -129,7 +142,7 @@ def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
         "first": comparison_plan("default", runs=1),
         "bad": comparison_plan(str(bad), runs=20),
     }
-    with pytest.raises(ScenarioError, match="stands on"):
+    with pytest.raises(InputError, match="stands on"):
         prepare_comparison(plans, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 

@@ -148,6 +148,32 @@ def test_pairs_differ_in_one_field_alone():
     ]
 
 
+def test_pooled_pairs_join_cells_that_differ_in_the_same_values():
+    """Two experiments, each with two pairs of laws and two of hearings, of 1 run."""
+    grid = {"law": ("none", "active"), "hearing": ("audio", "ideal")}
+    plan = SweepPlan(grid=grid, runs=1)
+    causes = ["reached", "collision", "reached", "reached"]
+    rows = pd.DataFrame(
+        {
+            "index": range(4),
+            "cell": range(4),
+            "run": 0,
+            "cause": causes,
+            "collision_fault": None,
+        }
+    )
+    found = {pair.field: pair for pair in pooled_pairs([(plan, rows), (plan, rows)])}
+    assert set(found) == {"law", "hearing"}
+    for field, first, second in (("law", 0, 2), ("hearing", 2, 0)):
+        pair = found[field]
+        assert (pair.scenario, pair.fields, pair.success.pairs) == ("all", {}, 4)
+        assert (pair.success.only_first, pair.success.only_second) == (first, second)
+        assert (pair.collision.only_first, pair.collision.only_second) == (
+            second,
+            first,
+        )
+
+
 def test_encounters_are_of_layouts_on_which_both_pushed():
     """Both succeed on layouts 2 and 3 of these; only on 3 do both push."""
     rows = table()

@@ -19,11 +19,31 @@ KINDS = [
     ("collision", 0.5, 0.3, "out of sight"),
     ("collision", 0.5, 0.0, "heard late"),
     ("collision", 5.0, 0.02, "pushed too little"),
+    # a tick without an echo is none at the tick before the last
+    ("collision", 5.0, 0.025, "pushed too little"),
+    ("collision", 5.0, 0.05, "out of sight"),
+    ("collision", 1.0, 0.0, "pushed too little"),
+    ("collision", 0.975, 0.0, "heard late"),
     ("stuck", math.nan, math.nan, "jam"),
     ("timeout", math.nan, math.nan, "jam"),
+    ("unsettled", math.nan, math.nan, "swings"),
+    ("astray", math.nan, math.nan, "astray"),
     ("lost", math.nan, math.nan, "lost"),
     ("failed", math.nan, math.nan, "failed"),
 ]
+
+
+def test_a_robot_that_came_to_the_goal_is_in_no_jam():
+    """It has passed all obstacles: the master robot's own push keeps it off."""
+    nothing = {"contact_warning_s": math.nan, "contact_unseen_s": math.nan}
+    rows = [
+        {"cause": "stuck", "time_to_goal_s": 5.0, **nothing},
+        {"cause": "stuck", "time_to_goal_s": math.nan, **nothing},
+        {"cause": "unsettled", "time_to_goal_s": 5.0, **nothing},
+        {"cause": "lost", "time_to_goal_s": 5.0, **nothing},
+    ]
+    found = failure_mechanisms(pd.DataFrame(rows))
+    assert list(found) == ["held off", "jam", "swings", "lost"]
 
 
 def test_each_kind():
@@ -51,7 +71,7 @@ def test_runs_that_fail_so(obstacle, mechanism):
         "hearing=ideal",
         "law=none",
         "source.waypoints_m=[[4, 0]]",
-        f"obstacles=[{{name: box, {obstacle}}}]",
+        f"obstacles=[{{name: box, acceleration_m_s2: 1e6, {obstacle}}}]",
     ]
     result = simulate(load_scenario("default", overrides))
     row = {"cause": result.cause, **run_metrics(result)}

@@ -36,6 +36,24 @@ def test_methods_that_never_differ():
     assert rate.low < rate.difference == 0.0 < rate.high
 
 
+@pytest.mark.parametrize(("confidence", "z"), [(0.95, 1.959964), (0.90, 1.644854)])
+def test_interval_is_walds_with_a_pair_more_of_each_kind(confidence, z):
+    """20 and 10 of 100: 0.1 and a standard error of sqrt(0.3 - 0.01) / 10."""
+    first, second = flags(0, 19, 9, 70)
+    rate = paired_rate(first, second, confidence=confidence)
+    half = z * math.sqrt(0.29) / 10.0
+    assert (rate.low, rate.high) == pytest.approx((0.1 - half, 0.1 + half), abs=1e-6)
+
+
+def test_interval_ends_where_differences_do():
+    """Of one pair it would go from -0.73 to 1.40."""
+    rate = paired_rate([True], [False])
+    half = 1.959964 * math.sqrt((1.0 - 1.0 / 9.0) / 3.0)
+    assert (rate.difference, rate.high) == (1.0, 1.0)
+    assert rate.low == pytest.approx(1.0 / 3.0 - half, abs=1e-6)
+    assert paired_rate([False], [True]).low == -1.0
+
+
 @given(counts=st.tuples(*[st.integers(0, 30)] * 4).filter(lambda c: sum(c) > 0))
 def test_swapping_the_methods_swaps_the_sign(counts):
     first, second = flags(*counts)
@@ -70,6 +88,20 @@ def test_wilcoxon_of_five_differences_of_one_sign():
     assert median.difference == pytest.approx(0.3)
     assert median.low == pytest.approx(0.1)
     assert median.high == pytest.approx(0.5)
+
+
+def test_interval_of_a_median_is_as_wide_as_asked():
+    """0.1 is the median where three of five draws are: in 5.8 % of the resamples."""
+    first = np.array([0.1, 0.2, 0.3, 0.4, 0.5])
+    for confidence, ends in ((0.95, (0.1, 0.5)), (0.8, (0.2, 0.4))):
+        median = paired_median(first, np.zeros(5), seed=1, confidence=confidence)
+        assert (median.low, median.high) == pytest.approx(ends)
+
+
+def test_one_difference_among_ties_is_a_coin_thrown_once():
+    first = np.array([1.0, 1.0, 1.0, 2.0])
+    median = paired_median(first, np.ones(4), seed=1)
+    assert (median.pairs, median.difference, median.p_value) == (4, 0.0, 1.0)
 
 
 def test_pairs_in_which_one_has_no_figure_are_left_out():

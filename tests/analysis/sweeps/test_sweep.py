@@ -28,19 +28,27 @@ LAWS = """
 import os, signal
 from pathlib import Path
 
+# A law is tried before the run: what fails later is another matter.
+CALLS = {"nan": 0, "deadly": 0, "mortal": 0}
+
+def tried(law):
+    CALLS[law] += 1
+    return CALLS[law] > 30
+
 def nan(c, s, repulsion):
-    return c * float("nan")
+    return c * float("nan") if tried("nan") else 0.0
 
 def deadly(c, s, repulsion):
-    if c == c:
+    if tried("deadly"):
         os.kill(os.getpid(), signal.SIGKILL)
+    return 0.0
 
 def mortal(c, s, repulsion):
     mark = Path(__file__).with_name("died")
-    if not mark.exists():
+    if tried("mortal") and not mark.exists():
         mark.touch()
         os.kill(os.getpid(), signal.SIGKILL)
-    return 0.0 * c
+    return 0.0
 """
 
 
@@ -201,7 +209,7 @@ def test_full_disk_keeps_what_is_done(tmp_path, undisturbed):
 def test_full_disk_is_noticed_before_anything_runs(tmp_path):
     with (
         files_of_at_most(100),
-        pytest.raises(ValueError, match=r"out: .* cannot be written"),
+        pytest.raises(StoreError, match=r"out cannot be written"),
     ):
         prepared(tmp_path / "out")
     assert not (tmp_path / "out").exists()
@@ -224,8 +232,7 @@ def test_a_run_that_fails_is_recorded_and_the_rest_goes_on(tmp_path, laws):
         tmp_path / "out", grid={"law": ["sweep_laws:nan", "active"]}, runs=2
     ).run()
     assert list(table["cause"]) == ["failed", "completed"] * 2
-    assert table["error"][0].startswith("ValueError: ")
-    assert "not finite" in table["error"][0]
+    assert "'sweep_laws:nan' returns nan at c = " in table["error"][0]
     assert pd.isna(table["minimum_clearance_m"][0])
     assert table["seed"][0] == table["seed"][1]
 
@@ -308,7 +315,7 @@ def test_used_directories_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("options", "hint"),
     [
-        ({"workers": 0}, "workers: 0 must be at least 1"),
+        ({"workers": 0}, "workers: 0 must lie between 1 and 256"),
         ({"resume": True}, "out: --resume needs the directory"),
         ({"scheduler": "tcp://h:1", "workers": 2}, "leave out --workers"),
     ],

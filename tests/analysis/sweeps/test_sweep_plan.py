@@ -11,8 +11,9 @@ from hypothesis import strategies as st
 
 from analysis.sweeps.sweep import reproducing_command
 from analysis.sweeps.sweep_plan import SweepPlan, dump_plan, load_sweep
-from diagrams import ScenarioError, dump_scenario, load_scenario
+from diagrams import dump_scenario, load_scenario
 from diagrams.loading import scenario_from_mapping
+from systems.input_error import InputError
 
 SPEED = "obstacles.0.speed_m_s"
 X = ("obstacles.0.waypoints_m.0.0", "obstacles.0.waypoints_m.1.0")
@@ -219,7 +220,7 @@ def test_plan_survives_its_file(tmp_path):
 )  # fmt: skip
 def test_bad_plan_is_refused(tmp_path, changes, field, hint):
     file = written(tmp_path / "sweep.yaml", json.dumps({**PLAN, **changes}))
-    with pytest.raises(ScenarioError) as caught:
+    with pytest.raises(InputError) as caught:
         load_sweep(file).points()
     assert caught.value.field.startswith(field)
     assert hint in caught.value.message
@@ -237,7 +238,7 @@ def test_bad_plan_is_refused(tmp_path, changes, field, hint):
     ],
 )
 def test_unreadable_file_is_refused(tmp_path, text, hint):
-    with pytest.raises(ScenarioError, match=hint):
+    with pytest.raises(InputError, match=hint):
         load_sweep(written(tmp_path / "sweep.yaml", text))
-    with pytest.raises(ScenarioError, match="check the path"):
+    with pytest.raises(InputError, match="check the path"):
         load_sweep(tmp_path / "missing.yaml")

@@ -1,0 +1,60 @@
+"""Failures that are no bad input, and how a command tells of them."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import traceback
+from collections.abc import Iterator
+from pathlib import Path
+
+from systems.input_error import LONGEST_MESSAGE, shortened
+
+__all__ = ["RunError", "failure_text", "no_exit"]
+
+_ROOT = Path(__file__).resolve().parents[1]
+_OURS = ("systems", "diagrams", "analysis", "phonotaxis.py")
+
+
+class RunError(Exception):
+    """A run that began and could not go on, in one line."""
+
+
+@contextlib.contextmanager
+def no_exit() -> Iterator[None]:
+    """Within it, what calls ``sys.exit`` has failed.
+
+    Raises:
+        RunError: Something did, a user's law or Drake.
+    """
+    try:
+        yield
+    except SystemExit as error:
+        text = f"the command was ended from within, by {_where(error)}"
+        raise RunError(text) from error
+
+
+def failure_text(error: Exception) -> str:
+    """One line about an exception that is no complaint about input."""
+    if isinstance(error, RunError):
+        text = str(error)
+    elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
+        where = f" {error.filename}" if error.filename else ""
+        text = f"cannot write{where} ({error.strerror}); make room, and try again"
+    else:
+        text = f"{type(error).__name__} in {_where(error)}: {error}"
+        text = f"{shortened(text, LONGEST_MESSAGE - 60)} (--debug prints the traceback)"
+    return shortened(text, LONGEST_MESSAGE)
+
+
+def _where(error: BaseException) -> str:
+    """File and line that raised; the last of ours, where there is one."""
+    frames = traceback.extract_tb(error.__traceback__)
+    named = [(_inside(Path(frame.filename)), frame.lineno) for frame in frames]
+    ours = [at for at in named if at[0].parts[0] in _OURS]
+    path, line = (ours or named or [(Path("unknown"), 0)])[-1]
+    return f"{path}:{line}"
+
+
+def _inside(path: Path) -> Path:
+    return path.relative_to(_ROOT) if _ROOT in path.parents else path

@@ -1,0 +1,99 @@
+"""YAML of whatever origin: read within limits, or refused in a line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import (
+    AliasEvent,
+    CollectionEndEvent,
+    CollectionStartEvent,
+    Event,
+    ScalarEvent,
+)
+from ruamel.yaml.parser import Parser
+
+from systems.input_error import InputError
+
+__all__ = ["LARGEST_BYTES", "parse_yaml"]
+
+#: The parser takes some seconds for so much.
+LARGEST_BYTES = 100_000
+DEEPEST = 20
+#: With every alias written out: a few lines of aliases can stand for gigabytes.
+LARGEST_MEANING = 1_000_000
+
+
+def parse_yaml(text: str | bytes, field: str) -> Any:
+    """The plain value that a YAML text stands for.
+
+    Args:
+        text: One document.
+        field: Begins the message of an error.
+
+    Raises:
+        InputError: It is not YAML, has more than 100 kB, is nested more than 20
+            deep, or its aliases stand for more than a million characters.
+    """
+    if len(text) > LARGEST_BYTES:
+        raise InputError(
+            field,
+            f"has more than {LARGEST_BYTES // 1000} kB of YAML; shorten or split it",
+        )
+    yaml = YAML(typ="safe", pure=True)
+    yaml.Parser = _BoundedParser
+    try:
+        return yaml.load(text)
+    except InputError as error:
+        raise InputError(field, error.message) from None
+    except MarkedYAMLError as error:
+        mark = error.problem_mark
+        where = f" in line {mark.line + 1}, column {mark.column + 1}" if mark else ""
+        what = error.problem or error.context or "it cannot be parsed"
+        raise InputError(field, f"is not valid YAML{where}: {what}; mend it") from None
+    # What the parser's constructors raise for values that are none of their tag,
+    # as !!int x, 2024-13-45, !!bool x.
+    except (YAMLError, ValueError, ArithmeticError, LookupError, TypeError) as error:
+        text = f"is not valid YAML: {type(error).__name__}: {error}; mend it"
+        raise InputError(field, text) from None
+
+
+class _BoundedParser(Parser):
+    """Refuses nesting and aliases that nobody means, as they come."""
+
+    def __init__(self, loader: Any) -> None:
+        super().__init__(loader)
+        self._anchors: dict[str, int] = {}
+        # One for each collection that is open: its anchor, and its size so far.
+        self._open: list[tuple[str | None, int]] = [(None, 0)]
+
+    def get_event(self) -> Event:
+        event = super().get_event()
+        if isinstance(event, CollectionStartEvent):
+            self._open.append((event.anchor, 1))
+            if len(self._open) > DEEPEST + 1:
+                raise InputError("", f"is nested more than {DEEPEST} deep; flatten it")
+        elif isinstance(event, CollectionEndEvent):
+            self._add(*self._open.pop())
+        elif isinstance(event, AliasEvent):
+            if any(anchor == event.anchor for anchor, _ in self._open):
+                raise InputError("", f"*{event.anchor} stands within itself; mend it")
+            self._add(None, self._anchors.get(event.anchor, 1))
+        elif isinstance(event, ScalarEvent):
+            self._add(event.anchor, 1 + len(event.value))
+        return event
+
+    def _add(self, anchor: str | None, size: int) -> None:
+        """A node is complete: part of what is open, and of what names it."""
+        if anchor is not None:
+            self._anchors[anchor] = size
+        around, total = self._open[-1]
+        if total + size > LARGEST_MEANING:
+            raise InputError(
+                "",
+                "has aliases (*name) that stand for more than "
+                f"{LARGEST_MEANING:,} characters; write out what is meant",
+            )
+        self._open[-1] = (around, total + size)

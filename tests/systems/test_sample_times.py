@@ -1,0 +1,48 @@
+"""When blocks act: all sampled ones every 25 ms, from the start on (Han 2019, 4.1)."""
+
+from __future__ import annotations
+
+import inspect
+
+import pytest
+from pydrake.systems.framework import LeafSystem
+
+import systems
+from systems.ultrasonic_array import UltrasonicParameters
+
+IN_TURN = UltrasonicParameters(firing="sequential")
+SAMPLED = {
+    "CollisionVector": {"sensors": IN_TURN},
+    "IdealSourceSensor": {},
+    "MicArray": {},
+    "SoundEmitter": {},
+    "SourceTracker": {},
+    "TDOAEstimator": {},
+    "UltrasonicArray": {"parameters": IN_TURN},
+    "WheelOdometry": {},
+    "WheelSpeedCommand": {},
+}
+LAWS = {
+    name
+    for name in systems.__all__
+    if name.endswith("Controller") and inspect.isclass(getattr(systems, name))
+}
+
+
+@pytest.mark.parametrize("name", sorted(SAMPLED.keys() | LAWS))
+def test_sampled_every_frame_from_the_start_on(name):
+    block = getattr(systems, name)(**SAMPLED.get(name, {}))
+    timing = block.GetUniquePeriodicDiscreteUpdateAttribute()
+    assert timing is not None
+    assert (timing.period_sec(), timing.offset_sec()) == (0.025, 0.0)
+
+
+def test_other_blocks_are_functions_of_now():
+    sampled = {
+        name
+        for name in systems.__all__
+        if inspect.isclass(block := getattr(systems, name))
+        and issubclass(block, LeafSystem)
+        and block(**SAMPLED.get(name, {})).GetUniquePeriodicDiscreteUpdateAttribute()
+    }
+    assert sampled == SAMPLED.keys() | LAWS

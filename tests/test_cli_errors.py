@@ -1,0 +1,234 @@
+"""What is bad input, what is a failure, and that neither looks like success."""
+
+from __future__ import annotations
+
+import errno
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import phonotaxis
+
+ROOT = Path(phonotaxis.__file__).parent
+SHORT = ("--set", "duration_s=0.05", "--set", "hearing=ideal")
+FIVE_LAWS = """
+import functools, math, sys
+def two(c, s): return 1.0
+def none(c, s, repulsion): pass
+def nan(c, s, repulsion): return float("nan")
+def text(c, s, repulsion): return "1"
+def imaginary(c, s, repulsion): return 1j
+def listed(c, s, repulsion): return [1.0]
+def raises(c, s, repulsion): raise KeyError("k" * 1000)
+def leaves(c, s, repulsion): sys.exit(0)
+def late(c, s, repulsion): return math.sqrt(-1.0) if 1.6 < c < 2.9 else 0.0
+class Plain: pass
+def scaled(k, c, s, repulsion): return k / c
+partial = functools.partial(scaled, 2.0)
+"""
+
+
+def call(capsys, *words: str) -> tuple[int, str, str]:
+    status = phonotaxis.main(words)
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+@pytest.fixture
+def laws(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "five_laws.py").write_text(FIVE_LAWS)
+    return tmp_path
+
+
+def fail(*_args, **_options):
+    raise KeyError("a bug")
+
+
+@pytest.mark.parametrize(
+    ("words", "place"),
+    [
+        (["design"], "analysis.gains.design_study.study_design"),
+        (["simulate", *SHORT], "diagrams.simulate"),
+        (["stability"], "analysis.stability.stability.analyse_law"),
+        (["localization"], "analysis.hearing.localization.prepare_localization"),
+        (["locate", "x.wav"], "analysis.hearing.locate.locate"),
+        (["scenarios"], "diagrams.library_scenarios"),
+        (["compare", "wall"], "analysis.sweeps.compare.prepare_comparison"),
+    ],
+)
+def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
+    """One line with kind and place, status 1; --debug prints the traceback."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(place, fail)
+    status, printed, complaint = call(capsys, *words)
+    assert (status, printed) == (1, "")
+    assert complaint.count("\n") == 1
+    assert complaint.startswith("phonotaxis: KeyError in ")
+    assert "--debug" in complaint
+    status, _, complaint = call(capsys, *words, "--debug")
+    assert status == 1
+    assert "Traceback" in complaint
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
+    """What numpy and scipy raise is no complaint about the user's input."""
+
+    def wrong(*_args, **_options):
+        raise ValueError("operands: could not be broadcast together")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("analysis.gains.design_study.study_design", wrong)
+    assert call(capsys, "design")[0] == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "message"),
+    [
+        ("two", "takes 2 positional arguments"),
+        ("none", "returns None"),
+        ("nan", "returns nan"),
+        ("text", "returns '1' (str)"),
+        ("imaginary", "returns 1j"),
+        ("listed", "returns [1.0]"),
+        ("raises", "raises KeyError"),
+        ("leaves", "raises SystemExit"),
+        ("Plain", "no LeafSystem"),
+    ],
+)
+@pytest.mark.parametrize("module", ["five_laws", "./five_laws.py"])
+def test_a_law_that_is_none(capsys, laws, module, name, message):
+    words = ["simulate", *SHORT, "--law", f"{module}:{name}"]
+    status, printed, complaint = call(capsys, *words)
+    assert (status, printed) == (2, "")
+    assert complaint.count("\n") == 1
+    assert len(complaint) <= 300
+    assert complaint.startswith("phonotaxis: law: ")
+    assert message in complaint
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("def f(:", "SyntaxError"),
+        ("import sys\nsys.exit(0)", "SystemExit"),
+        ("raise RuntimeError('no')", "RuntimeError: no in line 1 of"),
+        ("import nothing_of_that_name", "ModuleNotFoundError"),
+    ],
+)
+def test_a_module_that_cannot_be_imported(capsys, laws, text, message):
+    name = f"module_{abs(hash(text))}"
+    (laws / f"{name}.py").write_text(text)
+    for law in (f"{name}:f", f"{laws}/{name}.py:f"):
+        status, printed, complaint = call(capsys, "simulate", "--law", law)
+        assert (status, printed) == (2, "")
+        assert complaint.count("\n") == 1
+        assert message in complaint
+
+
+def test_a_law_that_fails_in_the_run(capsys, laws):
+    """The trial before the run does not meet every distance."""
+    obstacle = 'obstacles=[{"waypoints_m": [[2.3, 0.0]]}]'
+    words = ["simulate", *SHORT, "--set", "source.waypoints_m=[[4, 0]]"]
+    words += ["--set", "obstacle_sensing=ideal", "--set", obstacle]
+    status, printed, complaint = call(capsys, *words, "--law", "five_laws.py:late")
+    assert (status, printed) == (1, "")
+    assert complaint.count("\n") == 1
+    assert "'five_laws.py:late' raises ValueError" in complaint
+    assert " m, s = 0 m/s" in complaint
+    assert not (laws / "results").exists()
+
+
+def test_a_partial_is_a_law(capsys, laws):
+    assert call(capsys, "simulate", *SHORT, "--law", "five_laws.py:partial")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("command", "written"),
+    [
+        (["simulate", *SHORT], "analysis.runs.run_report.dump_scenario"),
+        (["design", "--json"], "analysis.gains.design_text.write_design"),
+    ],
+)
+def test_a_full_disk_is_one_line_and_leaves_nothing(
+    capsys, tmp_path, monkeypatch, command, written
+):
+    def no_space(*_args, **_options):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), "summary.json")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(written, no_space)
+    monkeypatch.setattr(
+        "analysis.gains.design_study.study_design", lambda *_a, **_k: None
+    )
+    monkeypatch.setattr("analysis.gains.design_text.design_summary", lambda *_: {})
+    status, printed, complaint = call(capsys, *command)
+    said = complaint or json.loads(printed)["error"]["message"]
+    assert status == 1
+    assert "No space left on device" in said
+    assert "make room" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_json_has_no_infinity(capsys, tmp_path, monkeypatch):
+    from analysis.runs.metrics import run_metrics
+
+    def with_infinity(result):
+        return run_metrics(result) | {"least_time_to_contact_s": float("inf")}
+
+    monkeypatch.setattr("analysis.runs.run_report.run_metrics", with_infinity)
+    out = tmp_path / "out"
+    status, printed, _ = call(capsys, "simulate", *SHORT, "--json", "--out", str(out))
+    assert status == 0
+    assert "Infinity" not in printed
+    assert "Infinity" not in (out / "summary.json").read_text()
+    assert json.loads(printed)["metrics"]["least_time_to_contact_s"] is None
+
+
+def test_messages_are_short_whatever_was_in_the_file(capsys, tmp_path):
+    file = tmp_path / "scene.yaml"
+    file.write_text(f"robot: {{mass_kg: {'x' * 90_000}}}\n")
+    status, _, complaint = call(capsys, "simulate", str(file))
+    assert status == 2
+    assert complaint.count("\n") == 1
+    assert len(complaint) <= 300
+    assert complaint.startswith("phonotaxis: robot.mass_kg: is 'xxx")
+    assert complaint.rstrip().endswith("valid number")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("shell", "environment", "status"),
+    [
+        ("simulate nothing 2>&-", {}, 2),
+        ("scenarios >&-", {}, 0),
+        ("scenarios >/dev/full", {}, 1),
+        (
+            "scenarios",
+            {"LC_ALL": "C", "PYTHONIOENCODING": "ascii"},
+            0,
+        ),
+        (
+            f"simulate {' '.join(SHORT)} --set description=\u03bb",
+            {"PYTHONIOENCODING": "ascii", "MPLBACKEND": "module://matplotlib_inline.x"},
+            0,
+        ),
+    ],
+)
+def test_terminals_and_notebooks(tmp_path, shell, environment, status):
+    process = subprocess.run(
+        ["/bin/sh", "-c", f"'{sys.executable}' -m phonotaxis {shell}"],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert process.returncode == status, process.stderr
+    assert "Traceback" not in process.stderr
+    assert process.stderr.count("\n") <= 1
