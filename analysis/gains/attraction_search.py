@@ -73,11 +73,25 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
         )
         scenario = scenario.model_copy(update={"attraction": attraction})
         metres_to_go(scenario, requirements)
-        repulsion = search_gains(scenario, requirements)
-        designed = scenario.model_copy(update={"repulsion": repulsion})
-        if all(check_law(designed, x, requirements).met for x in _FOLLOWING_LAWS):
-            return designed
+        within = _with_reserve(scenario, requirements)
+        repulsion = search_gains(within, requirements)
+        within = within.model_copy(update={"repulsion": repulsion})
+        if all(check_law(within, x, requirements).met for x in _FOLLOWING_LAWS):
+            return scenario.model_copy(update={"repulsion": repulsion})
         follow += _STEP_M
+
+
+def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
+    """The scenario with a goal that is smaller by the reserve."""
+    margin = scenario.stop.goal_margin_m - requirements.offset_reserve_m
+    if margin <= 0.0:
+        raise InputError(
+            "stop.goal_margin_m",
+            f"{scenario.stop.goal_margin_m} m leave nothing but the reserve of "
+            f"{requirements.offset_reserve_m} m for where P comes to rest; raise it",
+        )
+    stop = scenario.stop.model_copy(update={"goal_margin_m": margin})
+    return scenario.model_copy(update={"stop": stop})
 
 
 def damping_ratio(scenario: Scenario) -> float:
