@@ -14,6 +14,7 @@ import math
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import matplotlib as mpl
 from matplotlib.figure import Figure
@@ -23,6 +24,7 @@ from matplotlib.mathtext import math_to_image
 __all__ = [
     "ZERO",
     "Cell",
+    "Judged",
     "bullets",
     "definitions",
     "equation",
@@ -39,8 +41,16 @@ __all__ = [
 
 _CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
 
+
+class Judged(NamedTuple):
+    """A number above the verdict on it, in one cell."""
+
+    value: complex | None
+    verdict: str
+
+
 #: Text, or a number; none is a dash.
-Cell = str | complex | None
+Cell = str | complex | Judged | None
 
 #: Stands for a zero among numbers, so that the others are seen.
 ZERO = "\u00b7"
@@ -126,6 +136,10 @@ def _row(cells: Sequence[Cell], columns: int) -> str:
 
 
 def _cell(value: Cell) -> str:
+    if isinstance(value, Judged):
+        colour = _VERDICT_CLASSES.get(value.verdict.lower(), "")
+        text = f"{number(value.value)}<br>{_inline(value.verdict)}"
+        return f'<td class="number {colour}">{text}</td>'
     if not isinstance(value, str):
         return f'<td class="number">{number(value)}</td>'
     if value == ZERO:

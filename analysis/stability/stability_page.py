@@ -9,6 +9,7 @@ from typing import Any
 from analysis.run_error import failure_text
 from analysis.runs.html_page import (
     Cell,
+    Judged,
     bullets,
     definitions,
     equation,
@@ -77,16 +78,16 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
 
 
 def _verdict_table(rows: Sequence[Comparison], laws: Sequence[str]) -> str:
-    headings = ["criterion", "threshold"]
-    for law in laws:
-        headings += [law, ""]
-    body: list[list[Cell]] = []
-    for row in rows:
-        cells: list[Cell] = [row.name, row.threshold]
-        for law in laws:
-            cells += [row.values[law], row.verdicts[law]]
-        body.append([*cells, row.text])
-    return table([*headings, "in plain words"], body)
+    body: list[list[Cell]] = [
+        [
+            row.name,
+            row.threshold,
+            *(Judged(row.values[law], row.verdicts[law]) for law in laws),
+            row.text,
+        ]
+        for row in rows
+    ]
+    return table(["criterion", "threshold", *laws, "in plain words"], body)
 
 
 def _law_parts(analysis: LawAnalysis, prefix: str) -> list[str]:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as ET
 from matplotlib.figure import Figure
 
 from analysis.runs.html_page import (
+    Judged,
     definitions,
     equation,
     figure_html,
@@ -117,6 +118,8 @@ def test_verdicts_have_colours_and_numbers_stand_right() -> None:
     assert '<td class="pass">pass</td>' in cells
     assert '<td class="none">Not applicable</td>' in cells
     assert '<td class="number">2</td>' in cells
+    both = table(["a"], [[Judged(-2.5, "fail")]])
+    assert '<td class="number fail">\u22122.5<br>fail</td>' in both
 
 
 def test_numbers() -> None:
