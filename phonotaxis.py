@@ -92,7 +92,7 @@ def _report(error: Exception, words: Sequence[str]) -> int:
         field, message, status = "", text, FAILED
     else:
         from analysis.run_error import failure_text
-        from systems.input_error import InputError
+        from systems.framework.input_error import InputError
 
         if isinstance(error, InputError):
             field, message, status = error.field, error.message, BAD_INPUT
@@ -104,7 +104,7 @@ def _report(error: Exception, words: Sequence[str]) -> int:
 
 def _complain(field: str, message: str, *, as_json: bool) -> None:
     if len(message) > 250 or not message.isprintable():
-        from systems.input_error import LONGEST_MESSAGE, shortened
+        from systems.framework.input_error import LONGEST_MESSAGE, shortened
 
         message = shortened(message, LONGEST_MESSAGE - len(field) - 2)
     if as_json:
@@ -318,7 +318,7 @@ def _overrides(options: argparse.Namespace) -> list[str]:
 
 
 def _simulate(options: argparse.Namespace) -> None:
-    from analysis.runs.result_directory import whole_directory
+    from analysis.reporting.result_directory import whole_directory
     from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import build_sound_follower, load_scenario
 
@@ -348,7 +348,7 @@ def _run(scenario: Any, follower: Any) -> Any:
     """Simulates; what stops the run midway becomes one line."""
     from analysis.run_error import RunError
     from diagrams import simulate
-    from systems.input_error import InputError
+    from systems.framework.input_error import InputError
 
     with _Progress(scenario.duration_s, "s simulated") as progress:
         try:
@@ -417,9 +417,9 @@ def _scenarios(options: argparse.Namespace) -> None:
 
 
 def _locate(options: argparse.Namespace) -> None:
-    from analysis.hearing.locate import load_geometry, locate
-    from analysis.hearing.locate_text import locate_text
-    from analysis.runs.result_directory import whole_directory
+    from analysis.recordings.locate import load_geometry, locate
+    from analysis.recordings.locate_text import locate_text
+    from analysis.reporting.result_directory import whole_directory
 
     with ExitStack() as stack:
         geometry = load_geometry(Path(options.geometry)) if options.geometry else None
@@ -428,7 +428,7 @@ def _locate(options: argparse.Namespace) -> None:
         result = locate(Path(options.recording), geometry)
         document = result.to_dict()
         if options.out is not None:
-            from analysis.hearing.locate_plots import write_locate
+            from analysis.recordings.locate_plots import write_locate
 
             document["out"] = str(out)
             write_locate(result, document, directory)
@@ -449,7 +449,7 @@ def _localization(options: argparse.Namespace) -> None:
         localization_text,
         write_localization,
     )
-    from analysis.runs.result_directory import whole_directory
+    from analysis.reporting.result_directory import whole_directory
 
     with ExitStack() as stack:
         out, directory = stack.enter_context(whole_directory(options.out))
@@ -470,15 +470,15 @@ def _localization(options: argparse.Namespace) -> None:
 
 
 def _stability(options: argparse.Namespace) -> None:
+    from analysis.reporting.result_directory import whole_directory
     from analysis.run_error import RunError
-    from analysis.runs.result_directory import whole_directory
-    from analysis.stability.stability import analyse_law, chosen_laws
-    from analysis.stability.stability_parts import parts
-    from analysis.stability.stability_report import (
+    from analysis.stability.law_analysis import analyse_law, chosen_laws
+    from analysis.stability.report_files import (
         stability_document,
         stability_text,
         write_stability,
     )
+    from analysis.stability.report_parts import parts
     from diagrams import load_scenario
 
     with ExitStack() as stack:
@@ -508,11 +508,11 @@ def _stability(options: argparse.Namespace) -> None:
 
 def _sweep(options: argparse.Namespace) -> None:
     from analysis.run_error import RunError
+    from analysis.sweeps.one_run import require_runs
+    from analysis.sweeps.page import write_sweep
+    from analysis.sweeps.plan import load_sweep
+    from analysis.sweeps.summary import sweep_summary, sweep_text
     from analysis.sweeps.sweep import prepare_sweep
-    from analysis.sweeps.sweep_page import write_sweep
-    from analysis.sweeps.sweep_plan import load_sweep
-    from analysis.sweeps.sweep_run import require_runs
-    from analysis.sweeps.sweep_summary import sweep_summary, sweep_text
 
     plan = load_sweep(options.sweep)
     sweep = prepare_sweep(
@@ -542,14 +542,14 @@ def _sweep(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
-    from analysis.run_error import RunError
-    from analysis.sweeps.compare import prepare_comparison
-    from analysis.sweeps.compare_options import comparison_plans
-    from analysis.sweeps.compare_report import (
+    from analysis.comparison.compare import prepare_comparison
+    from analysis.comparison.options import comparison_plans
+    from analysis.comparison.report import (
         compare_summary,
         compare_text,
         write_comparison,
     )
+    from analysis.run_error import RunError
 
     plans = comparison_plans(
         options.scenario,
@@ -581,9 +581,9 @@ def _compare(options: argparse.Namespace) -> None:
 
 
 def _design(options: argparse.Namespace) -> None:
-    from analysis.gains.design_study import STUDY_RUNS, study_design
-    from analysis.gains.design_text import design_summary, design_text, write_design
-    from analysis.runs.result_directory import whole_directory
+    from analysis.design.design_study import STUDY_RUNS, study_design
+    from analysis.design.design_text import design_summary, design_text, write_design
+    from analysis.reporting.result_directory import whole_directory
     from diagrams import load_scenario
 
     with ExitStack() as stack:

@@ -8,7 +8,7 @@ import traceback
 from collections.abc import Iterator
 from pathlib import Path
 
-from systems.input_error import LONGEST_MESSAGE, shortened
+from systems.framework.input_error import LONGEST_MESSAGE, shortened
 
 __all__ = ["RunError", "failure_text", "no_exit"]
 

@@ -56,14 +56,14 @@ def attack(case: Case, *, seconds: float = 60.0) -> str:
 def _load() -> None:
     """Imports once what commands import: the cases run in forked processes."""
     for name in (
-        "analysis.gains.design_text",
+        "analysis.design.design_text",
         "analysis.hearing.localization_report",
-        "analysis.hearing.locate_text",
+        "analysis.recordings.locate_text",
         "analysis.runs.run_report",
-        "analysis.stability.stability_parts",
-        "analysis.sweeps.compare_report",
-        "analysis.sweeps.sweep_dask",
-        "analysis.sweeps.sweep_page",
+        "analysis.stability.report_parts",
+        "analysis.comparison.report",
+        "analysis.sweeps.dask_cluster",
+        "analysis.sweeps.page",
         "matplotlib.figure",
         "soundfile",
     ):

@@ -21,9 +21,9 @@ from analysis.hearing.free_field import (
     total_consistency,
 )
 from analysis.hearing.paper_tables import PAPER_CELLS
-from systems.array_shape import ArrayShape
-from systems.localise import TDOAParameters
-from systems.robot import RobotParameters
+from systems.base.robot import RobotParameters
+from systems.hearing.localise import TDOAParameters
+from systems.sound.array_shape import ArrayShape
 
 C = 340.0
 METHODS = ("gcc", "ml")

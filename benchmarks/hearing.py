@@ -24,10 +24,10 @@ from analysis.hearing.detection import (
 from analysis.hearing.detection_plots import plot_detection
 from analysis.hearing.free_field import Loudspeaker
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
-from systems.array_shape import ArrayShape
-from systems.localise import HearingMemory, Localiser, TDOAParameters
-from systems.mic_array import FRAME_SAMPLES
-from systems.robot import RobotParameters
+from systems.base.robot import RobotParameters
+from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.sound.array_shape import ArrayShape
+from systems.sound.mic_array import FRAME_SAMPLES
 
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)

@@ -36,29 +36,29 @@ ROOT = Path(__file__).parents[1]
 #: What is mutated unless modules are named: the blocks, and what computes verdicts,
 #: metrics, statistics and claims.
 MODULES = (
-    "systems/*.py",
+    "systems/*/*.py",
     "diagrams/stop_rules.py",
-    "analysis/runs/intervals.py",
+    "analysis/reporting/intervals.py",
     "analysis/runs/metrics.py",
     "analysis/runs/proximity.py",
     "analysis/runs/shortest_path.py",
     "analysis/runs/smoothness.py",
-    "analysis/stability/loop_margins.py",
+    "analysis/linear/loop_margins.py",
     "analysis/stability/verdict_readings.py",
     "analysis/stability/verdicts.py",
-    "analysis/sweeps/claim_judges.py",
-    "analysis/sweeps/claims.py",
-    "analysis/sweeps/comparison.py",
-    "analysis/sweeps/comparison_cells.py",
-    "analysis/sweeps/mechanisms.py",
-    "analysis/sweeps/paired_statistics.py",
+    "analysis/comparison/claim_judges.py",
+    "analysis/comparison/claims.py",
+    "analysis/comparison/laws_in_pairs.py",
+    "analysis/comparison/cells.py",
+    "analysis/comparison/mechanisms.py",
+    "analysis/comparison/paired_statistics.py",
 )
 #: Operators whose mutants do not run, or mean the same.
 LEFT_OUT = ("NoOp", "Variable", "RemoveDecorator", "ExceptionReplacer")
 #: What holds ranges and defaults of all parameters.
 PARAMETER_TESTS = (
-    Path("tests/systems/test_parameter_ranges.py"),
-    Path("tests/systems/test_parameters.py"),
+    Path("tests/systems/framework/test_parameter_ranges.py"),
+    Path("tests/systems/framework/test_parameters.py"),
     Path("tests/test_docs.py"),
 )
 #: Loaded once, so that the forks that test have them.
@@ -179,7 +179,7 @@ def _stages(module: str, *, evals: bool) -> dict[str, list[str]]:
     mirror = Path("tests") / path.parent / f"test_{path.name}"
     dotted = module.removesuffix(".py").replace("/", ".")
     names = re.compile(rf"\b{re.escape(dotted)}\b")
-    package = path.parent == Path("systems") and path.stem.replace("_", "")
+    package = path.parts[0] == "systems" and path.stem.replace("_", "")
     code = path.read_text("utf-8")
     importers = []
     for test in sorted(Path("tests").rglob("test_*.py")):
@@ -297,10 +297,12 @@ def _write(path: Path, code: str) -> None:
         for compiled in (module.parent / "__pycache__").glob(f"{module.stem}.*"):
             compiled.unlink()
         if "@njit" in module.read_text("utf-8"):
-            callers = re.compile(rf"from {module.parent}\.{module.stem} import")
+            dotted = ".".join(module.with_suffix("").parts)
+            callers = re.compile(rf"from {re.escape(dotted)} import")
             changed += [
                 other
-                for other in module.parent.glob("*.py")
+                for room in ("systems", "analysis")
+                for other in Path(room).rglob("*.py")
                 if other not in changed and callers.search(other.read_text("utf-8"))
             ]
 

@@ -11,11 +11,11 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 
 from analysis.hearing.free_field import frame_estimator
-from systems.array_shape import ArrayShape
-from systems.localise import TDOAParameters
-from systems.multilateration import locate_source
-from systems.robot import RobotParameters
-from systems.signals import SAMPLE_RATE_HZ
+from systems.base.robot import RobotParameters
+from systems.framework.signals import SAMPLE_RATE_HZ
+from systems.hearing.localise import TDOAParameters
+from systems.hearing.multilateration import locate_source
+from systems.sound.array_shape import ArrayShape
 
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)

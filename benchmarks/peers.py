@@ -25,7 +25,7 @@ from analysis.hearing.free_field import Loudspeaker
 from analysis.hearing.paper_tables import PAPER_CELLS
 from benchmarks.figures import stay_on_one_core
 from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 
 SNR_DB = 20.0
 

@@ -14,32 +14,32 @@ from numpy.typing import NDArray
 
 from diagrams import Scenario
 from diagrams.builder import block_seed
-from systems.active_impedance_controller import active_force
-from systems.array_tolerances import draw_tolerances, real_array
-from systems.collision_vector import collision_vectors, echo_points
-from systems.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
-from systems.geometry import control_point, rotate
-from systems.impedance import attraction_force, repulsion_force
-from systems.mic_array import microphones_B, record_frame
-from systems.noise import BEFORE_THE_RUN, standard_normals, tick_generator
-from systems.signals import FRAME_PERIOD_S
-from systems.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
-from systems.source_fix import SourceFix
-from systems.tdoa_estimator import port_values, robot_localiser
-from systems.tracker_model import Estimate, Track, TrackerModel
-from systems.ultrasonic_array import (
+from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
+from systems.base.wheel_odometry import advance_pose, encoder_angle
+from systems.base.wheel_speed_command import (
+    hand_position_twist,
+    integrate_velocity,
+    limited_wheel_speeds,
+)
+from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_generator
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.hearing.source_fix import SourceFix
+from systems.hearing.tdoa_estimator import port_values, robot_localiser
+from systems.hearing.tracker_model import Estimate, Track, TrackerModel
+from systems.laws.active_impedance_controller import active_force
+from systems.laws.impedance import attraction_force, repulsion_force
+from systems.ranging.collision_vector import collision_vectors, echo_points
+from systems.ranging.ultrasonic_array import (
     SENSORS,
     cone_ranges,
     measured_ranges,
     world_rectangles,
 )
-from systems.waveforms import make_waveform
-from systems.wheel_odometry import advance_pose, encoder_angle
-from systems.wheel_speed_command import (
-    hand_position_twist,
-    integrate_velocity,
-    limited_wheel_speeds,
-)
+from systems.sound.array_tolerances import draw_tolerances, real_array
+from systems.sound.mic_array import microphones_B, record_frame
+from systems.sound.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
+from systems.sound.waveforms import make_waveform
+from systems.world.geometry import control_point, rotate
 
 __all__ = ["PlainLoop"]
 

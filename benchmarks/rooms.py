@@ -13,9 +13,9 @@ import numpy as np
 
 from analysis.hearing.room_trials import RoomResult, draw_layouts, locate_bursts
 from benchmarks.figures import Figure, print_figures
-from systems.room import RoomParameters
-from systems.tdoa_estimator import TDOAParameters
-from systems.waveforms import SoundParameters
+from systems.hearing.tdoa_estimator import TDOAParameters
+from systems.sound.room import RoomParameters
+from systems.sound.waveforms import SoundParameters
 
 __all__ = ["ROOMS", "SOUNDS", "RoomTask", "run_task"]
 

@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import run_sweep
-from analysis.sweeps.sweep_plan import SweepPlan
 from benchmarks.figures import Figure, print_figures
 from benchmarks.process_tree import tree_usage
 from diagrams import simulate

@@ -13,7 +13,7 @@ from diagrams.simulation import (
     make_simulator,
     simulate,
 )
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 __all__ = [
     "InputError",

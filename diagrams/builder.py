@@ -28,9 +28,9 @@ from systems import (
     WheelOdometry,
     WheelSpeedCommand,
 )
-from systems.input_error import InputError
-from systems.signals import FRAME_PERIOD_S
-from systems.waveforms import SoundParameters
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.waveforms import SoundParameters
 
 __all__ = ["SoundFollower", "block_seed", "build_sound_follower"]
 

@@ -16,7 +16,7 @@ from systems import (
     ConventionalImpedanceController,
     RadialLawController,
 )
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 __all__ = ["LAWS", "law_files", "make_controller"]
 

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, parse_yaml
-from systems.input_error import InputError, shortened
+from systems.framework.input_error import InputError, shortened
 
 __all__ = [
     "dump_scenario",

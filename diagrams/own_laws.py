@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
-from systems.input_error import InputError, shortened
-from systems.repulsion import RepulsionParameters
+from systems.framework.input_error import InputError, shortened
+from systems.laws.repulsion import RepulsionParameters
 
 __all__ = ["checked_law", "import_law", "law_files", "try_law"]
 

@@ -13,19 +13,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, channel_skew
-from systems.carrier import DrivenPath
-from systems.collision_vector import CollisionVectorParameters
-from systems.diff_drive_plant import PlantParameters
-from systems.geometry import rectangle_clearance, rotate
-from systems.ideal_source_sensor import IdealHearingParameters
-from systems.impedance import AttractionParameters
-from systems.input_error import InputError
-from systems.interferers import InterfererParameters
-from systems.mic_array import microphones_B
-from systems.obstacles import ObstacleParameters
-from systems.parameters import (
+from systems.base.carrier import DrivenPath
+from systems.base.diff_drive_plant import PlantParameters
+from systems.base.robot import RobotParameters
+from systems.base.source_robot import SourceRobotParameters
+from systems.base.wheel_odometry import OdometryParameters
+from systems.framework.input_error import InputError
+from systems.framework.parameters import (
     Angle,
     Duration,
     Fraction,
@@ -36,16 +30,22 @@ from systems.parameters import (
     Size,
     Speed,
 )
-from systems.paths import WaypointPath
-from systems.repulsion import RepulsionParameters
-from systems.robot import RobotParameters
-from systems.room import RoomParameters
-from systems.source_robot import SourceRobotParameters
-from systems.tdoa_estimator import TDOAParameters
-from systems.tracker_model import TrackerParameters
-from systems.ultrasonic_array import UltrasonicParameters
-from systems.waveforms import SoundParameters
-from systems.wheel_odometry import OdometryParameters
+from systems.hearing.ideal_source_sensor import IdealHearingParameters
+from systems.hearing.tdoa_estimator import TDOAParameters
+from systems.hearing.tracker_model import TrackerParameters
+from systems.laws.impedance import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.ranging.collision_vector import CollisionVectorParameters
+from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.adc import MicArrayParameters, channel_skew
+from systems.sound.interferers import InterfererParameters
+from systems.sound.mic_array import microphones_B
+from systems.sound.room import RoomParameters
+from systems.sound.waveforms import SoundParameters
+from systems.world.geometry import rectangle_clearance, rotate
+from systems.world.obstacles import ObstacleParameters
+from systems.world.paths import WaypointPath
 
 __all__ = ["Body", "Scenario", "StartParameters", "StopParameters"]
 

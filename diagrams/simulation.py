@@ -20,7 +20,7 @@ from pydrake.systems.analysis import (
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import Collision, StopRules
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -12,12 +12,12 @@ from pydrake.systems.framework import EventStatus
 
 from diagrams.builder import SoundFollower
 from diagrams.scenario import Body, robot_rectangle
-from systems.geometry import (
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.world.geometry import (
     control_point,
     control_point_velocity,
     rectangle_clearance,
 )
-from systems.signals import FRAME_PERIOD_S
 
 __all__ = ["ROUNDING_S", "SUCCESSFUL", "Collision", "StopRules"]
 

@@ -15,7 +15,7 @@ from ruamel.yaml.events import (
 )
 from ruamel.yaml.parser import Parser
 
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 __all__ = ["LARGEST_BYTES", "parse_yaml"]
 

@@ -4,37 +4,40 @@ Templated blocks (float, AutoDiffXd) also have a name that ends in an
 underscore, as in Drake: ``DiffDrivePlant`` is ``DiffDrivePlant_[float]``.
 """
 
-import systems.compiling  # noqa: F401  # before anything is compiled
-from systems.active_impedance_2017_controller import (
+import systems.framework.compiling  # noqa: F401  # before anything is compiled
+from systems.base.diff_drive_plant import DiffDrivePlant, DiffDrivePlant_
+from systems.base.source_robot import SourceRobot, SourceRobot_
+from systems.base.wheel_odometry import WheelOdometry, WheelOdometry_
+from systems.base.wheel_speed_command import WheelSpeedCommand, WheelSpeedCommand_
+from systems.hearing.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
+from systems.hearing.source_tracker import SourceTracker, SourceTracker_
+from systems.hearing.tdoa_estimator import TDOAEstimator
+from systems.laws.active_impedance_2017_controller import (
     ActiveImpedance2017Controller,
     ActiveImpedance2017Controller_,
 )
-from systems.active_impedance_controller import (
+from systems.laws.active_impedance_controller import (
     ActiveImpedanceController,
     ActiveImpedanceController_,
 )
-from systems.collision_vector import CollisionVector, CollisionVector_
-from systems.conventional_impedance_2017_controller import (
+from systems.laws.conventional_impedance_2017_controller import (
     ConventionalImpedance2017Controller,
     ConventionalImpedance2017Controller_,
 )
-from systems.conventional_impedance_controller import (
+from systems.laws.conventional_impedance_controller import (
     ConventionalImpedanceController,
     ConventionalImpedanceController_,
 )
-from systems.diff_drive_plant import DiffDrivePlant, DiffDrivePlant_
-from systems.ideal_obstacle_sensor import IdealObstacleSensor, IdealObstacleSensor_
-from systems.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
-from systems.mic_array import MicArray
-from systems.obstacles import Obstacles, Obstacles_
-from systems.radial_law_controller import RadialLawController, RadialLawController_
-from systems.sound_emitter import SoundEmitter
-from systems.source_robot import SourceRobot, SourceRobot_
-from systems.source_tracker import SourceTracker, SourceTracker_
-from systems.tdoa_estimator import TDOAEstimator
-from systems.ultrasonic_array import UltrasonicArray
-from systems.wheel_odometry import WheelOdometry, WheelOdometry_
-from systems.wheel_speed_command import WheelSpeedCommand, WheelSpeedCommand_
+from systems.laws.radial_law_controller import RadialLawController, RadialLawController_
+from systems.ranging.collision_vector import CollisionVector, CollisionVector_
+from systems.ranging.ideal_obstacle_sensor import (
+    IdealObstacleSensor,
+    IdealObstacleSensor_,
+)
+from systems.ranging.ultrasonic_array import UltrasonicArray
+from systems.sound.mic_array import MicArray
+from systems.sound.sound_emitter import SoundEmitter
+from systems.world.obstacles import Obstacles, Obstacles_
 
 __all__ = [
     "ActiveImpedance2017Controller",

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from analysis.stability.stability import analyse_law
-from analysis.stability.stability_page import stability_page
-from analysis.stability.stability_parts import parts
+from analysis.stability.law_analysis import analyse_law
+from analysis.stability.report_page import stability_page
+from analysis.stability.report_parts import parts
 from diagrams import load_scenario
 
 pytestmark = [pytest.mark.browser, pytest.mark.slow]

@@ -52,13 +52,13 @@ def fail(*_args, **_options):
 @pytest.mark.parametrize(
     ("words", "place"),
     [
-        (["design"], "analysis.gains.design_study.study_design"),
+        (["design"], "analysis.design.design_study.study_design"),
         (["simulate", *SHORT], "diagrams.simulate"),
-        (["stability"], "analysis.stability.stability.analyse_law"),
+        (["stability"], "analysis.stability.law_analysis.analyse_law"),
         (["localization"], "analysis.hearing.localization.prepare_localization"),
-        (["locate", "x.wav"], "analysis.hearing.locate.locate"),
+        (["locate", "x.wav"], "analysis.recordings.locate.locate"),
         (["scenarios"], "diagrams.library_scenarios"),
-        (["compare", "wall"], "analysis.sweeps.compare.prepare_comparison"),
+        (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
     ],
 )
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
@@ -83,7 +83,7 @@ def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
         raise ValueError("operands: could not be broadcast together")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("analysis.gains.design_study.study_design", wrong)
+    monkeypatch.setattr("analysis.design.design_study.study_design", wrong)
     assert call(capsys, "design")[0] == 1
 
 
@@ -152,7 +152,7 @@ def test_a_partial_is_a_law(capsys, laws):
     ("command", "written"),
     [
         (["simulate", *SHORT], "analysis.runs.run_report.dump_scenario"),
-        (["design", "--json"], "analysis.gains.design_text.write_design"),
+        (["design", "--json"], "analysis.design.design_text.write_design"),
     ],
 )
 def test_a_full_disk_is_one_line_and_leaves_nothing(
@@ -164,9 +164,9 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(written, no_space)
     monkeypatch.setattr(
-        "analysis.gains.design_study.study_design", lambda *_a, **_k: None
+        "analysis.design.design_study.study_design", lambda *_a, **_k: None
     )
-    monkeypatch.setattr("analysis.gains.design_text.design_summary", lambda *_: {})
+    monkeypatch.setattr("analysis.design.design_text.design_summary", lambda *_: {})
     status, printed, complaint = call(capsys, *command)
     said = complaint or json.loads(printed)["error"]["message"]
     assert status == 1

@@ -7,12 +7,12 @@ import json
 import pytest
 
 import phonotaxis
-from analysis.runs.html_page import paragraph
-from analysis.stability import stability_parts
-from analysis.stability.stability import Part
+from analysis.reporting.html_page import paragraph
+from analysis.stability import report_parts as stability_parts
+from analysis.stability.law_analysis import Part
 from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
 

@@ -11,7 +11,7 @@ from typing import Any
 from ruamel.yaml import YAML
 
 from diagrams import Scenario
-from systems.parameters import Parameters
+from systems.framework.parameters import Parameters
 
 ROOT = Path(__file__).resolve().parents[1]
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -110,7 +110,7 @@ def test_links_lead_somewhere() -> None:
 
 
 def test_files_that_are_named_exist() -> None:
-    """`systems/robot.py`, `tests/` and `systems/robot.py: RobotParameters`."""
+    """`systems/base/robot.py`, `tests/`, `systems/base/robot.py: RobotParameters`."""
     named = [
         match
         for path in DOCUMENTS

@@ -13,21 +13,21 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.active_impedance_2017_controller import active_2017_force
-from systems.active_impedance_controller import active_force
-from systems.collision_vector import echo_point, foot_on_segment
-from systems.conventional_impedance_2017_controller import conventional_2017_force
-from systems.conventional_impedance_controller import conventional_force
-from systems.geometry import rotate
-from systems.impedance import repulsion_force
-from systems.repulsion import (
+from systems.base.robot import RobotParameters
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.laws.active_impedance_2017_controller import active_2017_force
+from systems.laws.active_impedance_controller import active_force
+from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
+from systems.laws.conventional_impedance_controller import conventional_force
+from systems.laws.impedance import repulsion_force
+from systems.laws.repulsion import (
     Active2017Parameters,
     ActiveParameters,
     Conventional2017Parameters,
     ConventionalParameters,
 )
-from systems.robot import RobotParameters
-from systems.signals import FRAME_PERIOD_S
+from systems.ranging.collision_vector import echo_point, foot_on_segment
+from systems.world.geometry import rotate
 
 #: K_0 = 16 N/m, k_ref = 64 N/m, rho_0 = 0.8 m: alpha = 0.4 / ln 4 m.
 LAW = ActiveParameters(

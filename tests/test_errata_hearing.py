@@ -14,10 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from systems.delay_search import amdf
-from systems.near_field import source_from_delays
-from systems.propagation import propagate
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.delays.delay_search import amdf
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.hearing.near_field import source_from_delays
+from systems.sound.propagation import propagate
 
 SPACING = 0.4
 SPEED = 340.0

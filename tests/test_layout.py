@@ -6,6 +6,7 @@ Imports are read from the source: what a function imports counts as well.
 from __future__ import annotations
 
 import ast
+import graphlib
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -15,6 +16,9 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 OURS = {"systems", "diagrams", "analysis", "phonotaxis", "tests", "benchmarks"}
+FOLDERS = ("systems", "diagrams", "analysis")
+#: A room with more is two.
+MOST_FILES = 20
 MAY_IMPORT = {
     "systems": {"systems"},
     "diagrams": {"systems", "diagrams"},
@@ -143,8 +147,57 @@ def test_every_folder_with_code_is_a_package() -> None:
     """A folder without `__init__.py` would be left out of the installation."""
     bare = [
         path.parent.relative_to(ROOT)
-        for package in ("systems", "diagrams", "analysis")
+        for package in FOLDERS
         for path in sources(package)
         if not (path.parent / "__init__.py").is_file()
     ]
     assert not bare
+
+
+def rooms() -> list[Path]:
+    """Every folder of product code."""
+    return sorted({path.parent for package in FOLDERS for path in sources(package)})
+
+
+def test_rooms_are_small_and_say_what_they_are_for() -> None:
+    for room in rooms():
+        files = [path for path in room.glob("*.py") if path.name != "__init__.py"]
+        assert len(files) <= MOST_FILES, room
+        told = ast.get_docstring(ast.parse((room / "__init__.py").read_text("utf-8")))
+        assert told, room
+
+
+def neighbours(folder: Path) -> dict[str, set[str]]:
+    """What the files and rooms right below a folder import of one another."""
+    prefix = ".".join(folder.relative_to(ROOT).parts) + "."
+    found: dict[str, set[str]] = {}
+    for path in folder.rglob("*.py"):
+        below = path.relative_to(folder).with_suffix("").parts
+        if below == ("__init__",):
+            continue
+        names = imported(ast.parse(path.read_text("utf-8")))
+        parts = {n.removeprefix(prefix) for n in names if n.startswith(prefix)}
+        others = {top(name) for name in parts} - {below[0]}
+        found.setdefault(below[0], set()).update(others)
+    return {name: others & found.keys() for name, others in found.items()}
+
+
+@pytest.mark.parametrize("folder", rooms(), ids=lambda p: str(p.relative_to(ROOT)))
+def test_no_rooms_and_no_files_import_one_another_in_a_circle(folder: Path) -> None:
+    graph = graphlib.TopologicalSorter(neighbours(folder))
+    graph.prepare()
+
+
+def test_a_circle_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "ROOT", tmp_path)
+    for name, text in (
+        ("a/x.py", "from house.b import y"),
+        ("b/y.py", "def f():\n    import house.c.z"),
+        ("c/z.py", "from house.a.x import g"),
+    ):
+        path = tmp_path / "house" / name
+        path.parent.mkdir(parents=True)
+        path.write_text(text, "utf-8")
+    assert neighbours(tmp_path / "house") == {"a": {"b"}, "b": {"c"}, "c": {"a"}}
+    with pytest.raises(graphlib.CycleError):
+        test_no_rooms_and_no_files_import_one_another_in_a_circle(tmp_path / "house")

@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 import phonotaxis
-from analysis.sweeps.sweep_plan import SweepPlan, load_sweep
+from analysis.sweeps.plan import SweepPlan, load_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = (ROOT / "docs" / "sweeps.md").read_text("utf-8")

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from analysis.hearing.free_field import Loudspeaker
-from systems.array_shape import ArrayShape
-from systems.localise import HearingMemory, Localiser, TDOAParameters
-from systems.mic_array import FRAME_SAMPLES
-from systems.noise import tick_generator
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.noise import tick_generator
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.sound.array_shape import ArrayShape
+from systems.sound.mic_array import FRAME_SAMPLES
 
 __all__ = ["DetectionPoint", "FalseAlarms", "detection_curve", "false_alarms"]
 

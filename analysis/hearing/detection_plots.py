@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import PercentFormatter
 
 from analysis.hearing.detection import DetectionPoint, FalseAlarms
-from analysis.runs.intervals import wilson_interval
-from analysis.runs.scene import COLOURS
+from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.palette import COLOURS
 
 __all__ = ["plot_detection"]
 

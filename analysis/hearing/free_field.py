@@ -22,14 +22,14 @@ from analysis.hearing.estimation_errors import (
     rms_ratio,
     stated_ratio,
 )
-from systems.adc import MicArrayParameters, convert
-from systems.array_shape import ArrayShape
-from systems.localise import Localiser, TDOAParameters
-from systems.mic_array import FRAME_SAMPLES
-from systems.propagation import propagate
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
-from systems.source_fix import SourceFix
-from systems.waveforms import EDGE_S, SoundParameters, make_waveform
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.hearing.localise import Localiser, TDOAParameters
+from systems.hearing.source_fix import SourceFix
+from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.array_shape import ArrayShape
+from systems.sound.mic_array import FRAME_SAMPLES
+from systems.sound.propagation import propagate
+from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
 
 __all__ = [
     "FreeFieldCell",

@@ -13,13 +13,13 @@ from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position
 from diagrams import Scenario, build_sound_follower, make_simulator
 from diagrams.builder import block_seed
 from systems import MicArray
-from systems.array_shape import ArrayShape
-from systems.array_tolerances import draw_tolerances
-from systems.mic_array import microphones_B
-from systems.noise import tick_generator
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
-from systems.sound_emitter import emitted_samples
-from systems.waveforms import make_waveform
+from systems.framework.noise import tick_generator
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.sound.array_shape import ArrayShape
+from systems.sound.array_tolerances import draw_tolerances
+from systems.sound.mic_array import microphones_B
+from systems.sound.sound_emitter import emitted_samples
+from systems.sound.waveforms import make_waveform
 
 __all__ = ["Heard", "Listener"]
 

@@ -20,8 +20,8 @@ from analysis.hearing.listening import Heard, Listener
 from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
 from diagrams import Scenario, load_scenario
-from systems.array_shape import ArrayShape
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
+from systems.sound.array_shape import ArrayShape
 
 __all__ = [
     "ESTIMATORS",

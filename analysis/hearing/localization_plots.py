@@ -12,7 +12,7 @@ from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
 from analysis.hearing.localization import LocalizationCell
-from analysis.runs.scene import COLOURS
+from analysis.reporting.palette import COLOURS
 
 __all__ = ["plot_localization"]
 

@@ -11,7 +11,7 @@ from typing import Any
 from analysis.hearing.free_field import frame_estimator
 from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
 from analysis.hearing.sensitivity import sensitivity_table
-from analysis.runs.run_report import SCHEMA_VERSION, versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
 __all__ = ["localization_summary", "localization_text", "write_localization"]

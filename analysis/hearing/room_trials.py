@@ -1,7 +1,7 @@
 """How well a burst is located in reverberant rooms, over random layouts.
 
 Robot and source rest. A burst reaches the microphones through the room's
-response, frames go through the converter, ``systems.localise`` and the tracker,
+response, frames go through the converter, ``systems.hearing.localise`` and the tracker,
 as they do in the diagram, and what the tracker holds when the burst is over is
 compared with the truth. No diagram is built, so that a layout costs little more
 than its response.
@@ -17,19 +17,19 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import oaconvolve
 
-from analysis.runs.intervals import Interval, wilson_interval
-from systems.acoustics import AcousticParameters
-from systems.adc import MicArrayParameters, convert
-from systems.geometry import rotate
-from systems.localise import Localiser
-from systems.mic_array import FRAME_SAMPLES, microphones_B
-from systems.noise import frame_noise, tick_generator
-from systems.robot import RobotParameters
-from systems.room import RoomParameters, room_images, room_impulse_responses
-from systems.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
-from systems.tdoa_estimator import TDOAParameters, port_values, robot_localiser
-from systems.tracker_model import Estimate, TrackerModel, TrackerParameters
-from systems.waveforms import SoundParameters, make_waveform
+from analysis.reporting.intervals import Interval, wilson_interval
+from systems.base.robot import RobotParameters
+from systems.framework.noise import frame_noise, tick_generator
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.hearing.localise import Localiser
+from systems.hearing.tdoa_estimator import TDOAParameters, port_values, robot_localiser
+from systems.hearing.tracker_model import Estimate, TrackerModel, TrackerParameters
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.mic_array import FRAME_SAMPLES, microphones_B
+from systems.sound.room import RoomParameters, room_images, room_impulse_responses
+from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.world.geometry import rotate
 
 __all__ = ["Layout", "RoomResult", "draw_layouts", "locate_bursts"]
 

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from analysis.hearing.cramer_rao import polar_gradients
 from analysis.hearing.free_field import Estimator, Loudspeaker
 from analysis.hearing.paper_tables import PaperCell
-from systems.array_shape import ArrayShape
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.array_shape import ArrayShape
 
 __all__ = [
     "UNIT_ERRORS",

@@ -1,1 +1,1 @@
-"""What a run did: metrics, pictures, replay, result directories."""
+"""What a run did: metrics, pictures, replay, its files."""

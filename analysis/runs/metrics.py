@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.sightings import sightings
 from analysis.runs.proximity import Proximity
 from analysis.runs.shortest_path import shortest_path_length
+from analysis.runs.sightings import sightings
 from analysis.runs.smoothness import (
     jerk,
     log_dimensionless_jerk,
@@ -19,8 +19,8 @@ from analysis.runs.smoothness import (
 )
 from diagrams.simulation import RunResult
 from diagrams.stop_rules import ROUNDING_S
-from systems.geometry import control_point_velocity
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.world.geometry import control_point_velocity
 
 __all__ = ["following_error", "frames_with_sound", "run_metrics"]
 

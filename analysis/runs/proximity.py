@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.simulation import RunResult
-from systems.geometry import contact_time, rectangle_clearance
+from systems.world.geometry import contact_time, rectangle_clearance
 
 __all__ = ["Proximity"]
 

@@ -18,7 +18,7 @@ from analysis.runs import replay_scene
 from analysis.runs.replay_scene import upright
 from analysis.runs.scene import moving_and_static, sound_bursts
 from diagrams import RunResult
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
 

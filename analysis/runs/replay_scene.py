@@ -16,9 +16,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from analysis.runs.scene import COLOURS, bounds, sensor_pose
+from analysis.reporting.palette import COLOURS
+from analysis.runs.scene import bounds, sensor_pose
 from diagrams import RunResult, Scenario
-from systems.mic_array import microphones_B
+from systems.sound.mic_array import microphones_B
 
 __all__ = [
     "RINGS",

@@ -8,7 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.runs.scene import COLOURS, bounds, sound_bursts
+from analysis.reporting.palette import COLOURS
+from analysis.runs.scene import bounds, sound_bursts
 from analysis.runs.trajectory_artists import (
     draw_collision,
     draw_cones,
@@ -19,7 +20,7 @@ from analysis.runs.trajectory_artists import (
     times_apart,
 )
 from diagrams import RunResult
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 __all__ = ["plot_time_series", "plot_trajectory"]
 

@@ -3,33 +3,16 @@
 from __future__ import annotations
 
 import json
-import platform
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from analysis.reporting.plain_values import plain
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.metrics import run_metrics
-from analysis.runs.plain_values import plain
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
 
-__all__ = ["run_summary", "summary_text", "versions", "write_run"]
-
-#: Raised when a key of the JSON documents changes its meaning.
-SCHEMA_VERSION = 1
-#: Packages that can change a result.
-_PACKAGES = ("phonotaxis", "drake", "numpy", "scipy", "numba", "soxr", "soundfile")
-
-
-def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that can change a result."""
-    found = {"python": platform.python_version()}
-    for package in _PACKAGES:
-        try:
-            found[package] = version(package)
-        except PackageNotFoundError:
-            found[package] = "not installed"
-    return found
+__all__ = ["run_summary", "summary_text", "write_run"]
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Where things are at a time, and their colours: shared by all pictures."""
+"""Where things are at a time: shared by all pictures."""
 
 from __future__ import annotations
 
@@ -9,12 +9,11 @@ from numpy.typing import NDArray
 
 from diagrams import RunResult, Scenario
 from diagrams.scenario import robot_rectangle
-from systems.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
-from systems.input_error import InputError
-from systems.obstacles import ObstacleParameters
+from systems.framework.input_error import InputError
+from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
+from systems.world.obstacles import ObstacleParameters
 
 __all__ = [
-    "COLOURS",
     "bounds",
     "compose",
     "contact_point",
@@ -25,21 +24,6 @@ __all__ = [
     "tick_at",
     "touching_point",
 ]
-
-#: Okabe and Ito's palette: told apart with any colour vision.
-COLOURS = {
-    "robot": "#0072B2",
-    "source": "#D55E00",
-    "estimate": "#CC79A7",
-    "obstacle": "#4D4D4D",
-    "echo": "#E69F00",
-    "empty": "#999999",
-    "attraction": "#D55E00",
-    "repulsion": "#4D4D4D",
-    "sound": "#F0E442",
-    "left": "#56B4E9",
-    "right": "#E69F00",
-}
 
 #: Spacings of instants that a reader can count in, s.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)

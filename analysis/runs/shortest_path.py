@@ -34,7 +34,7 @@ def shortest_path_length(
         start: (2,) m.
         goal: (2,) m.
         goal_radius: The way ends at this distance from the goal, m.
-        boxes: (n, 5) rectangles at rest, see ``systems.geometry``.
+        boxes: (n, 5) rectangles at rest, see ``systems.world.geometry``.
         radius: Of the disc, m.
 
     Returns:

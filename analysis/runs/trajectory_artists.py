@@ -11,8 +11,8 @@ from matplotlib.patches import Polygon, Wedge
 from matplotlib.patheffects import withStroke
 from numpy.typing import NDArray
 
+from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import (
-    COLOURS,
     compose,
     contact_point,
     moving_and_static,
@@ -22,8 +22,8 @@ from analysis.runs.scene import (
 )
 from diagrams import RunResult
 from diagrams.scenario import robot_rectangle
-from systems.geometry import rectangle_corners, rotate
-from systems.mic_array import microphones_B
+from systems.sound.mic_array import microphones_B
+from systems.world.geometry import rectangle_corners, rotate
 
 __all__ = [
     "draw_collision",

@@ -1,1 +1,1 @@
-"""Stability of the loop: models, margins, maps, certificates, the report."""
+"""The stability report, which gathers models, margins, certificates and verdicts."""

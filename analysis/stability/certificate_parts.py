@@ -5,18 +5,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.runs.fact_tables import fact_table
-from analysis.runs.html_page import figure_html, paragraph
-from analysis.stability.certificate_trials import CertificateTrials, try_certificate
-from analysis.stability.diagram_trials import DiagramTrials, try_diagram
-from analysis.stability.energy_certificate import EnergyCertificate, certify_energy
-from analysis.stability.energy_certificate_plots import (
+from analysis.certificates.certificate_trials import CertificateTrials, try_certificate
+from analysis.certificates.diagram_trials import DiagramTrials, try_diagram
+from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
+from analysis.certificates.energy_certificate_plots import (
     plot_certificate_trials,
     plot_energy_balance,
     plot_energy_certificate,
 )
-from analysis.stability.stability import Part, Study
-from analysis.stability.velocity_passivity import EnergyBalance, energy_balance
+from analysis.nonlinear.velocity_passivity import EnergyBalance, energy_balance
+from analysis.reporting.fact_tables import fact_table
+from analysis.reporting.html_page import figure_html, paragraph
+from analysis.stability.law_analysis import Part, Study
 
 __all__ = ["certificate_parts"]
 

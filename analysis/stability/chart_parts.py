@@ -5,15 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
-from analysis.runs.plain_values import plain
-from analysis.stability.chart_plots import (
-    plot_chart,
-    plot_poles_against_period,
-    plot_root_loci,
-)
-from analysis.stability.root_locus import RootLocus, root_loci
-from analysis.stability.sampled_stability import (
+from analysis.linear.root_locus import RootLocus, root_loci
+from analysis.linear.sampled_stability import (
     ConditionCheck,
     PolesAgainstPeriod,
     StabilityChart,
@@ -22,7 +15,14 @@ from analysis.stability.sampled_stability import (
     gain_delay_chart,
     poles_against_period,
 )
-from analysis.stability.stability import Part, Study
+from analysis.reporting.html_page import Cell, figure_html, paragraph, table
+from analysis.reporting.plain_values import plain
+from analysis.stability.chart_plots import (
+    plot_chart,
+    plot_poles_against_period,
+    plot_root_loci,
+)
+from analysis.stability.law_analysis import Part, Study
 
 __all__ = ["SamplingCharts", "chart_parts"]
 

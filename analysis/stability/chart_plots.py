@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from matplotlib.colors import TwoSlopeNorm
 from matplotlib.figure import Figure
 
-from analysis.runs.scene import COLOURS
-from analysis.stability.burst_gaps import GapChart
-from analysis.stability.contact_mode import ContactLimits
-from analysis.stability.delayed_run import DelayCheck
-from analysis.stability.root_locus import RootLocus
-from analysis.stability.sampled_stability import PolesAgainstPeriod, StabilityChart
-from systems.signals import FRAME_PERIOD_S
+from analysis.linear.burst_gaps import GapChart
+from analysis.linear.contact_mode import ContactLimits
+from analysis.linear.delayed_run import DelayCheck
+from analysis.linear.root_locus import RootLocus
+from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
+from analysis.reporting.palette import COLOURS
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "plot_chart",

@@ -7,27 +7,27 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from analysis.runs.fact_tables import fact_table, row_table
-from analysis.runs.html_page import Cell, figure_html, number, paragraph, table
-from analysis.runs.plain_values import plain
-from analysis.stability.disturbance_bound_plots import plot_disturbance_bounds
-from analysis.stability.disturbance_bounds import disturbance_bounds
-from analysis.stability.equilibrium_map_plots import (
+from analysis.certificates.disturbance_bound_plots import plot_disturbance_bounds
+from analysis.certificates.disturbance_bounds import disturbance_bounds
+from analysis.certificates.sos_region import sos_region
+from analysis.certificates.sos_region_plots import plot_sos_region
+from analysis.nonlinear.equilibrium_map_plots import (
     plot_equilibrium_maps,
     plot_ratio_map,
 )
-from analysis.stability.equilibrium_maps import (
+from analysis.nonlinear.equilibrium_maps import (
     EquilibriumMap,
     gap_map,
     offset_map,
 )
-from analysis.stability.phase_portrait import phase_portrait
-from analysis.stability.phase_portrait_plots import plot_phase_portrait
-from analysis.stability.sos_region import sos_region
-from analysis.stability.sos_region_plots import plot_sos_region
-from analysis.stability.stability import Part, Study
-from analysis.stability.stiffness_ratio import RatioMap, stiffness_ratio_map
-from systems.input_error import InputError
+from analysis.nonlinear.phase_portrait import phase_portrait
+from analysis.nonlinear.phase_portrait_plots import plot_phase_portrait
+from analysis.nonlinear.stiffness_ratio import RatioMap, stiffness_ratio_map
+from analysis.reporting.fact_tables import fact_table, row_table
+from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.reporting.plain_values import plain
+from analysis.stability.law_analysis import Part, Study
+from systems.framework.input_error import InputError
 
 __all__ = ["extended_parts"]
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from analysis.runs.html_page import Cell, figure_html, number, paragraph, table
+from analysis.linear.contact_mode import ContactLimits, contact_limits
+from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
 from analysis.stability.chart_plots import plot_contact_limits
-from analysis.stability.contact_mode import ContactLimits, contact_limits
+from analysis.stability.law_analysis import Part
 from analysis.stability.recommended_gains import (
     GainFigures,
     RecommendedGains,
     recommend_gains,
 )
-from analysis.stability.stability import Part
 
 __all__ = ["contact_parts", "gain_parts"]
 

@@ -8,7 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from analysis.runs.html_page import (
+from analysis.linear.operating_point_plots import plot_equilibria
+from analysis.models.equilibria import EquilibriumSearch, find_equilibria
+from analysis.models.linear_models import LinearModel, Mode
+from analysis.models.linearisation import (
+    GradientCheck,
+    RouteComparison,
+    check_gradient,
+    compare_routes,
+    continuous_model,
+    sampled_model,
+)
+from analysis.models.operating_points import OperatingPoint, moving_equilibrium
+from analysis.reporting.html_page import (
     ZERO,
     Cell,
     figure_html,
@@ -17,20 +29,8 @@ from analysis.runs.html_page import (
     paragraph,
     table,
 )
-from analysis.stability.equilibria import EquilibriumSearch, find_equilibria
-from analysis.stability.linear_models import LinearModel, Mode
-from analysis.stability.linearisation import (
-    GradientCheck,
-    RouteComparison,
-    check_gradient,
-    compare_routes,
-    continuous_model,
-    sampled_model,
-)
-from analysis.stability.operating_point_plots import plot_equilibria
-from analysis.stability.operating_points import OperatingPoint, moving_equilibrium
-from analysis.stability.stability import Part, Study
-from systems.input_error import InputError
+from analysis.stability.law_analysis import Part, Study
+from systems.framework.input_error import InputError
 
 __all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
 

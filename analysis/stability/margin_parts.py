@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.runs.html_page import Cell, figure_html, number, paragraph, table
-from analysis.stability.gang_of_four import GangOfFour, gang_of_four
-from analysis.stability.linear_models import LinearModel
-from analysis.stability.loop_margins import (
+from analysis.linear.gang_of_four import GangOfFour, gang_of_four
+from analysis.linear.loop_margins import (
     DiskMargin,
     LoopMargins,
     PointMargins,
     all_margins,
     loop_margins,
 )
-from analysis.stability.margin_plots import (
+from analysis.linear.margin_plots import (
     plot_bode,
     plot_gang_of_four,
     plot_nichols,
     plot_nyquist,
 )
-from analysis.stability.open_loops import BREAK_POINTS, target_loop
-from analysis.stability.operating_points import OperatingPoint
-from analysis.stability.stability import Part, Study
+from analysis.models.linear_models import LinearModel
+from analysis.models.open_loops import BREAK_POINTS, target_loop
+from analysis.models.operating_points import OperatingPoint
+from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.stability.law_analysis import Part, Study
 
 __all__ = ["Margins", "least_damped", "margin_parts"]
 

@@ -11,11 +11,11 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.runs.run_report import versions
+from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
 from diagrams.laws import LAWS
-from systems.parameters import Parameters
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.parameters import Parameters
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["Equation", "Latency", "Limit", "ModelSheet", "ParameterRow", "model_sheet"]
 

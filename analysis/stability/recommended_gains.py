@@ -13,21 +13,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.gains.attraction_search import damping_ratio, following_lag
-from analysis.stability.contact_mode import (
+from analysis.design.attraction_search import damping_ratio, following_lag
+from analysis.linear.contact_mode import (
     contact_matrix,
     contact_spectral_radius,
     largest_contact_stiffness,
     motion_chain,
 )
-from analysis.stability.equilibria import follow_equilibrium
-from analysis.stability.linear_models import LinearModel
-from analysis.stability.loop_margins import all_margins, loop_margins
-from analysis.stability.loop_uncertainty import law_stiffness, with_values
-from analysis.stability.open_loops import BreakPoint
+from analysis.linear.loop_margins import all_margins, loop_margins
+from analysis.linear.loop_uncertainty import law_stiffness, with_values
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.linear_models import LinearModel
+from analysis.models.open_loops import BreakPoint
 from diagrams import Scenario
-from systems.input_error import InputError
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "GainChoice",

@@ -5,14 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.loop_uncertainty import (
+from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
     following_poles,
     following_uncertainty,
 )
-from analysis.stability.robustness import (
+from analysis.linear.robustness import (
     PoleCloud,
     PoleFunction,
     PoleSensitivity,
@@ -23,9 +22,10 @@ from analysis.stability.robustness import (
     pole_sensitivities,
     slowest_pole,
 )
-from analysis.stability.stability import Part, Study
+from analysis.reporting.html_page import Cell, figure_html, paragraph, table
+from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
 
@@ -126,7 +126,7 @@ def _contact(study: Study, samples: int) -> LoopRobustness:
 
 
 def _render(data: LoopRobustness, name: str) -> list[str]:
-    from analysis.stability.robustness_plots import plot_pole_cloud, plot_sensitivities
+    from analysis.linear.robustness_plots import plot_pole_cloud, plot_sensitivities
 
     cloud = data.cloud
     slowest = slowest_pole(cloud.worst_poles)

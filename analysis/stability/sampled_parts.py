@@ -9,22 +9,22 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.burst_cycle import (
+from analysis.linear.burst_cycle import (
     HOLDS,
     BurstCycle,
     BurstRun,
     burst_cycle,
     simulate_burst_cycle,
 )
-from analysis.stability.burst_gaps import GapChart, gap_chart
+from analysis.linear.burst_gaps import GapChart, gap_chart
+from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
+from analysis.linear.delayed_run import DelayCheck, check_delay_margin
+from analysis.models.open_loops import DIRECTIONS
+from analysis.models.operating_points import OperatingPoint
+from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.chart_plots import plot_delay_check, plot_gap_chart
-from analysis.stability.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
-from analysis.stability.delayed_run import DelayCheck, check_delay_margin
-from analysis.stability.open_loops import DIRECTIONS
-from analysis.stability.operating_points import OperatingPoint
-from analysis.stability.stability import Part, Study
-from systems.signals import FRAME_PERIOD_S
+from analysis.stability.law_analysis import Part, Study
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["BurstCycles", "SampledLoop", "sampled_parts"]
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.operating_point_plots import plot_step
-from analysis.stability.stability import Part
-from analysis.stability.step_response import Oscillation, StepCheck, check_step
+from analysis.linear.operating_point_plots import plot_step
+from analysis.linear.step_response import Oscillation, StepCheck, check_step
+from analysis.reporting.html_page import Cell, figure_html, paragraph, table
+from analysis.stability.law_analysis import Part
 
 __all__ = ["step_parts"]
 

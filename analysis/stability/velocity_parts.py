@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from analysis.runs.fact_tables import fact_table, row_table
-from analysis.runs.html_page import Cell, figure_html, paragraph, table
-from analysis.runs.plain_values import plain
-from analysis.stability.contact_oscillation import (
+from analysis.nonlinear.contact_oscillation import (
     ContactOscillation,
     contact_oscillation,
 )
-from analysis.stability.stability import Part
-from analysis.stability.velocity_term_plots import (
+from analysis.nonlinear.velocity_term_plots import (
     plot_contact_oscillation,
     plot_velocity_terms,
 )
-from analysis.stability.velocity_terms import (
+from analysis.nonlinear.velocity_terms import (
     VelocityTermAnalysis,
     velocity_term_analysis,
 )
+from analysis.reporting.fact_tables import fact_table, row_table
+from analysis.reporting.html_page import Cell, figure_html, paragraph, table
+from analysis.reporting.plain_values import plain
+from analysis.stability.law_analysis import Part
 
 __all__ = ["velocity_parts"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from analysis.runs.html_page import Cell, table
-from analysis.stability.stability import Part, Study
+from analysis.reporting.html_page import Cell, table
+from analysis.stability.law_analysis import Part, Study
 from analysis.stability.verdict_readings import (
     Reading,
     read_contact,

@@ -9,11 +9,11 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-from analysis.stability.contact_mode import contact_spectral_radius
-from analysis.stability.loop_uncertainty import law_stiffness
+from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.linear.loop_uncertainty import law_stiffness
+from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
-from analysis.stability.stability import Study
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "Reading",

@@ -1,1 +1,1 @@
-"""Many runs: sweeps, comparisons of laws, the papers' claims."""
+"""Many scenarios, in many processes, into one table."""

@@ -8,8 +8,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import Field, Strict, model_validator
 
-from systems.input_error import InputError
-from systems.parameters import Parameters
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Parameters
 
 __all__ = ["Distribution"]
 

@@ -13,13 +13,13 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.runs.result_directory import check_directory
-from analysis.sweeps.sweep_plan import SweepPlan, SweepPoint
-from analysis.sweeps.sweep_processes import run_locally
-from analysis.sweeps.sweep_run import Outcome, Task
-from analysis.sweeps.sweep_store import StoreError, SweepStore, load_results
+from analysis.reporting.result_directory import check_directory
+from analysis.sweeps.one_run import Outcome, Task
+from analysis.sweeps.plan import SweepPlan, SweepPoint
+from analysis.sweeps.processes import run_locally
+from analysis.sweeps.store import StoreError, SweepStore, load_results
 from diagrams import build_sound_follower
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 __all__ = ["PreparedSweep", "prepare_sweep", "reproducing_command", "run_sweep"]
 
@@ -118,7 +118,7 @@ def prepare_sweep(
     if scheduler is None:
         runner = partial(run_locally, workers=workers or _cores())
     else:
-        from analysis.sweeps.sweep_dask import connect, run_on_cluster
+        from analysis.sweeps.dask_cluster import connect, run_on_cluster
 
         runner = partial(run_on_cluster, client=connect(scheduler))
     return PreparedSweep(plan, points, SweepStore(directory, plan), runner)

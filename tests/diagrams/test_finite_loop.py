@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from pydrake.common.value import Value
 
-import systems.mic_array
-import systems.noise
+import systems.framework.noise
+import systems.sound.mic_array
 from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
 from diagrams.builder import SoundFollower
-from systems.signals import FRAME_PERIOD_S, AudioFrame, Emission
+from systems.framework.signals import FRAME_PERIOD_S, AudioFrame, Emission
 
 BUILDS = {
     "audio": (),
@@ -87,7 +87,7 @@ def test_noise_of_the_microphones_that_goes_bad_stops_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     follower = built("audio")
-    make = systems.noise.frame_noise
+    make = systems.framework.noise.frame_noise
 
     def broken(shape: tuple[int, int], seed: int, tick: int) -> Any:
         noise = make(shape, seed, tick)
@@ -95,6 +95,6 @@ def test_noise_of_the_microphones_that_goes_bad_stops_the_run(
         return noise
 
     simulate(follower.scenario.model_copy(update={"duration_s": 0.1}))
-    monkeypatch.setattr(systems.mic_array, "frame_noise", broken)
+    monkeypatch.setattr(systems.sound.mic_array, "frame_noise", broken)
     with pytest.raises(ValueError, match=r"^MicArray: noise\[1, 100\] is nan"):
         simulate(follower.scenario, follower=follower)

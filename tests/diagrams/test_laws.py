@@ -11,11 +11,11 @@ import pytest
 from diagrams import build_sound_follower
 from diagrams.laws import LAWS, make_controller
 from diagrams.scenario import Scenario
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
-from systems.repulsion import RepulsionParameters
+from systems.laws.repulsion import RepulsionParameters
 
 number = 5
 

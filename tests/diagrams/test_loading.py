@@ -19,9 +19,9 @@ from diagrams.loading import (
     scenario_from_mapping,
 )
 from diagrams.scenario import Scenario
-from systems.input_error import InputError
-from systems.parameters import Parameters
-from systems.room import RoomParameters
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Parameters
+from systems.sound.room import RoomParameters
 
 ONE_OF_EVERYTHING = """
 name: one of everything

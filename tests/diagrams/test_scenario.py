@@ -9,8 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from diagrams.scenario import Scenario, StartParameters, robot_rectangle
-from systems.geometry import rectangle_corners
-from systems.robot import RobotParameters
+from systems.base.robot import RobotParameters
+from systems.world.geometry import rectangle_corners
 
 
 def test_default_scenario_is_complete():

@@ -12,9 +12,9 @@ from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
 from diagrams.scenario import Scenario
-from systems.interferers import InterfererParameters
-from systems.obstacles import ObstacleParameters
-from systems.room import RoomParameters
+from systems.sound.interferers import InterfererParameters
+from systems.sound.room import RoomParameters
+from systems.world.obstacles import ObstacleParameters
 
 Number = tuple[str, type, list[Any]]
 

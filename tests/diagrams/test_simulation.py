@@ -14,7 +14,7 @@ from diagrams import (
     simulation,
 )
 from diagrams.scenario import Scenario
-from systems.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S
 
 
 def test_code_is_loaded_aside_and_once_for_a_kind_of_build(monkeypatch):

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from diagrams import RunResult, build_sound_follower, make_simulator, simulate
 from diagrams.scenario import Scenario, robot_rectangle
 from diagrams.stop_rules import StopRules
-from systems.geometry import rectangle_clearance
+from systems.world.geometry import rectangle_clearance
 
 BASE: dict[str, Any] = {
     "law": "none",

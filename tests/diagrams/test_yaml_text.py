@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from diagrams.yaml_text import DEEPEST, LARGEST_BYTES, parse_yaml
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 #: 9^10 x in 330 bytes.
 BOMB = "a0: &a0 [x, x, x, x, x, x, x, x, x]\n" + "\n".join(

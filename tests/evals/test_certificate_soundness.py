@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.stability.certificate_trials import try_certificate
-from analysis.stability.energy_certificate import certify_energy
+from analysis.certificates.certificate_trials import try_certificate
+from analysis.certificates.energy_certificate import certify_energy
 from diagrams import Scenario, load_scenario
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 LAWS = ("conventional", "active", "active2017")
 

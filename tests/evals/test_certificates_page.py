@@ -9,25 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.runs.intervals import wilson_interval
-from analysis.stability.certificate_table import LAWS
-from analysis.stability.certificate_trials import try_certificate
-from analysis.stability.contact_oscillation import contact_oscillation
-from analysis.stability.diagram_trials import try_diagram
-from analysis.stability.disturbance_bounds import disturbance_bounds, source_bound
-from analysis.stability.energy_certificate import certify_energy
-from analysis.stability.equilibrium_maps import gap_map
-from analysis.stability.phase_portrait import phase_portrait
-from analysis.stability.point_mass import point_mass
-from analysis.stability.radial_law import radial_law
-from analysis.stability.sos_region import sos_region
-from analysis.stability.trap_stiffness import trap_stiffness
-from analysis.stability.velocity_passivity import (
+from analysis.certificates.certificate_trials import try_certificate
+from analysis.certificates.diagram_trials import try_diagram
+from analysis.certificates.disturbance_bounds import disturbance_bounds, source_bound
+from analysis.certificates.energy_certificate import certify_energy
+from analysis.certificates.sos_region import sos_region
+from analysis.laws.radial_law import radial_law
+from analysis.models.point_mass import point_mass
+from analysis.nonlinear.contact_oscillation import contact_oscillation
+from analysis.nonlinear.equilibrium_maps import gap_map
+from analysis.nonlinear.phase_portrait import phase_portrait
+from analysis.nonlinear.trap_stiffness import trap_stiffness
+from analysis.nonlinear.velocity_passivity import (
     energy_balance,
     velocity_term_passivity,
 )
-from analysis.stability.velocity_terms import velocity_term_analysis
+from analysis.nonlinear.velocity_terms import velocity_term_analysis
+from analysis.reporting.intervals import wilson_interval
 from diagrams import load_scenario
+from docs.tables.certificates import LAWS
 
 #: Laws by the names that the page gives them.
 NAMES = dict(zip(("conventional", "active 2019", "active 2017"), LAWS, strict=True))

@@ -16,11 +16,11 @@ pytestmark = pytest.mark.slow
 SCRIPT = """
 import hashlib
 import numpy as np
-from systems.array_shape import ArrayShape
-from systems.localise import Localiser, TDOAParameters
-from systems.noise import frame_noise
-from systems.propagation import propagate
-from systems.signals import Emission
+from systems.sound.array_shape import ArrayShape
+from systems.hearing.localise import Localiser, TDOAParameters
+from systems.framework.noise import frame_noise
+from systems.sound.propagation import propagate
+from systems.framework.signals import Emission
 
 knots = 0.025 * np.arange(8.0) - 0.05
 path = np.stack((2.0 + 0.3 * knots, 0.1 * knots), axis=1)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.gains.head_on import head_on
-from analysis.stability.contact_mode import contact_spectral_radius
-from analysis.stability.contact_oscillation import contact_oscillation
-from analysis.stability.harmonic_balance import predict_oscillation
+from analysis.laws.head_on import head_on
+from analysis.linear.contact_mode import contact_spectral_radius
+from analysis.nonlinear.contact_oscillation import contact_oscillation
+from analysis.nonlinear.harmonic_balance import predict_oscillation
 from diagrams import load_scenario
 
 GAINS = (

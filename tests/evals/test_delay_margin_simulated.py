@@ -6,9 +6,9 @@ import math
 
 import pytest
 
-from analysis.stability.delay_margin import DELAY_PLACES, DelayedLoop
-from analysis.stability.delayed_run import check_delay_margin, simulate_delayed
-from analysis.stability.equilibria import follow_equilibrium
+from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop
+from analysis.linear.delayed_run import check_delay_margin, simulate_delayed
+from analysis.models.equilibria import follow_equilibrium
 from diagrams.scenario import Scenario
 
 T = 0.025

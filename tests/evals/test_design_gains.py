@@ -7,9 +7,9 @@ import json
 import numpy as np
 import pytest
 
-from analysis.gains.design import DesignRequirements, metres_to_go
-from analysis.gains.push_and_pull import DESIGNED_LAWS
-from analysis.sweeps.compare import comparison_plan
+from analysis.comparison.compare import comparison_plan
+from analysis.design.requirements import DesignRequirements, metres_to_go
+from analysis.laws.push_and_pull import DESIGNED_LAWS
 from diagrams import load_scenario, simulate
 from diagrams.scenario import Scenario
 from phonotaxis import main

@@ -9,10 +9,10 @@ from scipy.stats import binomtest
 
 from analysis.hearing.detection import FalseAlarms, detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
-from systems.array_shape import ArrayShape
-from systems.localise import TDOAParameters
-from systems.robot import RobotParameters
-from systems.signals import FRAME_PERIOD_S
+from systems.base.robot import RobotParameters
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.hearing.localise import TDOAParameters
+from systems.sound.array_shape import ArrayShape
 
 pytestmark = pytest.mark.slow
 

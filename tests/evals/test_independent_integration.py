@@ -21,16 +21,16 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.active_impedance_2017_controller import active_2017_force
-from systems.active_impedance_controller import active_force
-from systems.conventional_impedance_2017_controller import conventional_2017_force
-from systems.conventional_impedance_controller import conventional_force
-from systems.impedance import (
+from systems.laws.active_impedance_2017_controller import active_2017_force
+from systems.laws.active_impedance_controller import active_force
+from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
+from systems.laws.conventional_impedance_controller import conventional_force
+from systems.laws.impedance import (
     AttractionParameters,
     attraction_force,
     repulsion_force,
 )
-from systems.repulsion import RepulsionParameters
+from systems.laws.repulsion import RepulsionParameters
 
 T = 0.025
 EPSILON, MASS, RADIUS, SEPARATION, TOP = 0.175, 3.94, 0.06, 0.41, 0.72

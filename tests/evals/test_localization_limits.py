@@ -19,9 +19,9 @@ from analysis.hearing.free_field import (
 from analysis.hearing.localization import prepare_localization
 from analysis.hearing.localization_report import localization_summary, localization_text
 from analysis.hearing.paper_tables import PAPER_CELLS
-from systems.array_shape import ArrayShape
-from systems.localise import TDOAParameters
-from systems.robot import RobotParameters
+from systems.base.robot import RobotParameters
+from systems.hearing.localise import TDOAParameters
+from systems.sound.array_shape import ArrayShape
 
 pytestmark = pytest.mark.slow
 

@@ -1,7 +1,7 @@
 """The numbers of README's "What to expect" are those of the runs it names.
 
 Runs are deterministic, so that every printed digit is held; ``python -m
-analysis.runs.readme_tables`` prints the tables anew.
+docs.tables.readme`` prints the tables anew.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from analysis.runs.readme_tables import (
+from docs.tables.readme import (
     SCENARIOS,
     ending_row,
     following_rows,

@@ -17,22 +17,22 @@ import pytest
 from scipy.ndimage import label
 from scipy.optimize import brentq
 
-from analysis.stability import linearisation
-from analysis.stability.burst_cycle import burst_cycle
-from analysis.stability.certificate_trials import try_certificate
-from analysis.stability.delay_margin import DELAY_PLACES, delay_margin
-from analysis.stability.energy_certificate import certify_energy
-from analysis.stability.equilibria import find_equilibria
-from analysis.stability.loop_uncertainty import (
+from analysis.certificates.certificate_trials import try_certificate
+from analysis.certificates.energy_certificate import certify_energy
+from analysis.linear.burst_cycle import burst_cycle
+from analysis.linear.delay_margin import DELAY_PLACES, delay_margin
+from analysis.linear.loop_uncertainty import (
     contact_poles,
     contact_uncertainty,
     following_poles,
     following_uncertainty,
 )
-from analysis.stability.open_loops import closed, cut_model
-from analysis.stability.robustness import pole_cloud
-from analysis.stability.stability import Study, analyse_law
-from analysis.stability.stability_parts import parts
+from analysis.linear.robustness import pole_cloud
+from analysis.models import linearisation
+from analysis.models.equilibria import find_equilibria
+from analysis.models.open_loops import closed, cut_model
+from analysis.stability.law_analysis import Study, analyse_law
+from analysis.stability.report_parts import parts
 from analysis.stability.verdict_readings import (
     read_contact,
     read_cycle,

@@ -8,7 +8,7 @@ import pytest
 from pydrake.systems.framework import LeafSystem
 
 import systems
-from systems.ultrasonic_array import UltrasonicParameters
+from systems.ranging.ultrasonic_array import UltrasonicParameters
 
 IN_TURN = UltrasonicParameters(firing="sequential")
 SAMPLED = {

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 from analysis.hearing.cramer_rao import SlopeEnergy, arrival_information, position_bound
-from systems.waveforms import SoundParameters, make_waveform
+from systems.sound.waveforms import SoundParameters, make_waveform
 
 RATE, C, FRAME_S = 100_000.0, 340.0, 0.025
 ROW = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])

@@ -8,12 +8,12 @@ import numpy as np
 
 from analysis.hearing.detection import detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
-from systems.array_shape import ArrayShape
-from systems.delays import look
-from systems.half_band import halve_rate
-from systems.localise import Localiser, TDOAParameters
-from systems.noise import tick_generator
-from systems.robot import RobotParameters
+from systems.base.robot import RobotParameters
+from systems.delays.delays import look
+from systems.delays.half_band import halve_rate
+from systems.framework.noise import tick_generator
+from systems.hearing.localise import Localiser, TDOAParameters
+from systems.sound.array_shape import ArrayShape
 
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)

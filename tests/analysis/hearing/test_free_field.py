@@ -15,10 +15,10 @@ from analysis.hearing.free_field import (
     run_cell,
     total_consistency,
 )
-from systems.array_shape import ArrayShape
-from systems.robot import RobotParameters
-from systems.source_fix import SourceFix
-from systems.tdoa_estimator import TDOAParameters
+from systems.base.robot import RobotParameters
+from systems.hearing.source_fix import SourceFix
+from systems.hearing.tdoa_estimator import TDOAParameters
+from systems.sound.array_shape import ArrayShape
 
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)

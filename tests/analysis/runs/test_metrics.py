@@ -17,7 +17,7 @@ from diagrams import load_scenario, simulate
 from diagrams.scenario import Scenario
 from diagrams.simulation import COLUMNS, RunResult
 from diagrams.stop_rules import Collision
-from systems.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.

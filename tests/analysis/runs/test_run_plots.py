@@ -9,8 +9,9 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle, Wedge
 
+from analysis.reporting.palette import COLOURS
 from analysis.runs.run_plots import plot_time_series, plot_trajectory
-from analysis.runs.scene import COLOURS, contact_point, sound_bursts
+from analysis.runs.scene import contact_point, sound_bursts
 
 PANELS = 5
 

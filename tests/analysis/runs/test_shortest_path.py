@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from analysis.runs.shortest_path import shortest_path_length
-from systems.geometry import nearest_point_on_rectangle
+from systems.world.geometry import nearest_point_on_rectangle
 
 RADIUS = 0.41
 SPECK = (0.0, 0.0, 0.3, 1e-9, 1e-9)

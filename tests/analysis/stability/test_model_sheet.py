@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from analysis.runs.html_page import equation
+from analysis.reporting.html_page import equation
 from analysis.stability.model_sheet import model_sheet
 from diagrams import load_scenario
 from diagrams.laws import LAWS

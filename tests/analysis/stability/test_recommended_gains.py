@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.stability.equilibria import follow_equilibrium
-from analysis.stability.open_loops import open_loop
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.open_loops import open_loop
 from analysis.stability.recommended_gains import (
     GainThresholds,
     attraction_loop,

@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from analysis.stability import chart_plots, margin_plots, operating_point_plots
-from analysis.stability.burst_gaps import GapChart
-from analysis.stability.contact_mode import contact_limits
-from analysis.stability.delayed_run import check_delay_margin
-from analysis.stability.equilibria import find_equilibria, follow_equilibrium
-from analysis.stability.gang_of_four import gang_of_four
-from analysis.stability.loop_margins import all_margins
-from analysis.stability.root_locus import root_loci
-from analysis.stability.sampled_stability import gain_chart, poles_against_period
-from analysis.stability.step_response import check_step
+from analysis.linear import margin_plots, operating_point_plots
+from analysis.linear.burst_gaps import GapChart
+from analysis.linear.contact_mode import contact_limits
+from analysis.linear.delayed_run import check_delay_margin
+from analysis.linear.gang_of_four import gang_of_four
+from analysis.linear.loop_margins import all_margins
+from analysis.linear.root_locus import root_loci
+from analysis.linear.sampled_stability import gain_chart, poles_against_period
+from analysis.linear.step_response import check_step
+from analysis.models.equilibria import find_equilibria, follow_equilibrium
+from analysis.stability import chart_plots
 from diagrams.scenario import Scenario
 
 

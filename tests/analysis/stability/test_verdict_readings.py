@@ -12,7 +12,7 @@ from types import SimpleNamespace as Made
 import numpy as np
 import pytest
 
-from analysis.stability.stability import Study
+from analysis.stability.law_analysis import Study
 from analysis.stability.verdict_parts import verdict_parts
 from analysis.stability.verdict_readings import (
     read_contact,

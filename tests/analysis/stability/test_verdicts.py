@@ -7,8 +7,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from analysis.stability.energy_certificate import certify_energy
-from analysis.stability.stability import Study
+from analysis.certificates.energy_certificate import certify_energy
+from analysis.stability.law_analysis import Study
 from analysis.stability.verdict_readings import read_start
 from analysis.stability.verdicts import Criterion, compare_verdicts, judge
 

@@ -15,11 +15,11 @@ import pandas as pd
 import pytest
 
 from analysis.runs.metrics import run_metrics
+from analysis.sweeps.one_run import Outcome, Task, run_task
+from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.processes import WorkerError, WorkerProcess
+from analysis.sweeps.store import StoreError, load_results
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep, run_sweep
-from analysis.sweeps.sweep_plan import SweepPlan
-from analysis.sweeps.sweep_processes import WorkerError, WorkerProcess
-from analysis.sweeps.sweep_run import Outcome, Task, run_task
-from analysis.sweeps.sweep_store import StoreError, load_results
 from diagrams import simulate
 
 SPEED = "source.speed_m_s"

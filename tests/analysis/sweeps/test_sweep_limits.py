@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 import soundfile
 
+from analysis.comparison.compare import comparison_plan, prepare_comparison
 from analysis.run_error import RunError
-from analysis.sweeps.compare import comparison_plan, prepare_comparison
+from analysis.sweeps.plan import MOST_RUNS, SweepPlan
 from analysis.sweeps.sweep import MOST_WORKERS, prepare_sweep
-from analysis.sweeps.sweep_plan import MOST_RUNS, SweepPlan
-from systems.input_error import InputError
+from systems.framework.input_error import InputError
 
 QUICK = {"hearing": "ideal", "duration_s": 0.1}
 

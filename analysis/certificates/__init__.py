@@ -1,0 +1,1 @@
+"""Starts from which no collision happens, with proofs."""

@@ -1,0 +1,156 @@
+"""Simulated starts inside and outside a certified set."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.certificates.energy_certificate import EnergyCertificate
+from analysis.models.point_mass import PointMassRuns
+from systems.framework.input_error import InputError
+
+__all__ = ["BATCH", "CertificateTrials", "draw_starts", "try_certificate"]
+
+#: Starts drawn at a time: the first batch depends on the seed alone.
+BATCH = 20_000
+#: Batches at most: where hardly any start lies outside, not all that were asked
+#: for are found.
+_MOST_BATCHES = 100
+
+
+@dataclass(frozen=True, eq=False)
+class CertificateTrials:
+    """Runs of the certificate's own model from random starts."""
+
+    certificate: EnergyCertificate
+    """What is tried."""
+    inside: PointMassRuns
+    """Runs from certified starts."""
+    outside: PointMassRuns
+    """Runs from starts that are not certified."""
+    drawn: int
+    """Starts drawn for the shares."""
+    certified_share: float
+    """Share of the drawn starts that is certified."""
+    energy_share: float
+    """Share that the energy alone certifies, without the clamp."""
+
+    @property
+    def inside_collisions(self) -> int:
+        """Must be 0."""
+        return int(np.count_nonzero(self.inside.collided))
+
+    @property
+    def outside_collisions(self) -> int:
+        """Above 0 the certificate says something."""
+        return int(np.count_nonzero(self.outside.collided))
+
+    @property
+    def safe_share(self) -> float:
+        """Share of all starts that do not collide, by simulation."""
+        tried = len(self.outside.starts)
+        hit = self.outside_collisions / tried if tried else 0.0
+        return 1.0 - (1.0 - self.certified_share) * hit
+
+    @property
+    def ratio(self) -> float:
+        """Certified starts by starts that do not collide."""
+        return self.certified_share / self.safe_share
+
+    @property
+    def example(self) -> NDArray[np.float64] | None:
+        """(4,) the slowest start that collides, m and m/s; none: none does."""
+        hit = self.outside.starts[self.outside.collided]
+        return hit[np.argmin(np.hypot(*hit[:, 2:].T))] if len(hit) else None
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON document."""
+        example = self.example
+        rises = np.append(self.inside.energy_rises_j, self.outside.energy_rises_j)
+        return {
+            "inside_starts": len(self.inside.starts),
+            "inside_collisions": self.inside_collisions,
+            "outside_starts": len(self.outside.starts),
+            "outside_collisions": self.outside_collisions,
+            "certified_share": self.certified_share,
+            "energy_alone_share": self.energy_share,
+            "safe_share": self.safe_share,
+            "ratio": self.ratio,
+            "closest_inside_m": float(self.inside.closest_m.min(initial=np.inf))
+            if len(self.inside.starts)
+            else None,
+            "largest_energy_rise_j": float(rises.max(initial=0.0)),
+            "colliding_start": example.tolist() if example is not None else None,
+        }
+
+
+def draw_starts(
+    certificate: EnergyCertificate, count: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """(n, 4) starts: places uniform on the free floor, velocities in the disc.
+
+    Args:
+        certificate: Gives the floor and the top speed.
+        count: Places drawn; those in contact are dropped.
+        rng: Source of random numbers.
+    """
+    half = 0.5 * certificate.cell_m
+    x, y = certificate.x_m, certificate.y_m
+    low = [x[0] - half, y[0] - half]
+    high = [x[-1] + half, y[-1] + half]
+    points = rng.uniform(low, high, (count, 2))
+    angle = rng.uniform(0.0, 2.0 * np.pi, count)
+    speed = certificate.model.top_speed_m_s * np.sqrt(rng.uniform(size=count))
+    velocity = speed * np.array([np.cos(angle), np.sin(angle)])
+    states = np.column_stack([points, velocity.T])
+    return states[certificate.model.clearances(points) > certificate.contact_m]
+
+
+def try_certificate(
+    certificate: EnergyCertificate, *, starts: int = 300, duration_s: float = 40.0
+) -> CertificateTrials:
+    """Simulates starts inside the certified set, and as many outside of it.
+
+    Args:
+        certificate: What to try.
+        starts: Starts inside, and outside as far as some are found.
+        duration_s: Simulated time of each, s.
+
+    Raises:
+        InputError: There is nothing to try.
+    """
+    if starts < 1:
+        raise InputError("starts", f"{starts} must be at least 1")
+    rng = np.random.default_rng(certificate.scenario.seed)
+    inside: list[NDArray[np.float64]] = []
+    outside: list[NDArray[np.float64]] = []
+    drawn = certified = by_energy = 0
+    for _ in range(_MOST_BATCHES):
+        states = draw_starts(certificate, BATCH, rng)
+        safe = certificate.certified(states)
+        drawn, certified = drawn + len(states), certified + int(safe.sum())
+        by_energy += int(certificate.certified(states, clamp=False).sum())
+        inside.append(states[safe][:starts])
+        outside.append(states[~safe][:starts])
+        if min(sum(map(len, part)) for part in (inside, outside)) >= starts:
+            break
+    runs = [
+        certificate.model.run(
+            np.concatenate(part)[:starts],
+            contact_m=certificate.contact_m,
+            duration_s=duration_s,
+            term=certificate.term,
+        )
+        for part in (inside, outside)
+    ]
+    return CertificateTrials(
+        certificate=certificate,
+        inside=runs[0],
+        outside=runs[1],
+        drawn=drawn,
+        certified_share=certified / drawn,
+        energy_share=by_energy / drawn,
+    )

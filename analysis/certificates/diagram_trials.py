@@ -1,0 +1,198 @@
+"""Certified starts in the full diagram, which the certificate is not about.
+
+The robot there is a rectangle 0.82 m wide that sees by cones, hears in bursts,
+ticks each 25 ms and has motor lag.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.certificates.certificate_trials import BATCH, draw_starts
+from analysis.certificates.energy_certificate import EnergyCertificate
+from analysis.models.diagram_state import set_discrete_state
+from analysis.models.ideal_scenarios import frozen_scenario, require_rolling
+from analysis.reporting.intervals import Interval, wilson_interval
+from analysis.runs.scene import touching_point
+from diagrams import (
+    Scenario,
+    SoundFollower,
+    build_sound_follower,
+    make_simulator,
+)
+from diagrams.scenario import robot_rectangle
+from diagrams.stop_rules import Collision, StopRules
+from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_speeds
+from systems.framework.input_error import InputError
+from systems.world.geometry import control_point, rectangle_clearance, rotate
+
+__all__ = ["DiagramTrials", "try_diagram"]
+
+
+@dataclass(frozen=True, eq=False)
+class DiagramTrials:
+    """What the full diagram does from certified starts."""
+
+    starts: NDArray[np.float64]
+    """(n, 4) x, y of P in m, vx, vy in m/s; the robot looks along its velocity."""
+    causes: tuple[str, ...]
+    """How each run ended."""
+    mechanisms: tuple[str, ...]
+    """Where a collision came from: ahead, beside or behind; empty without."""
+    skipped: int
+    """Certified starts at which the rectangle stands on a body already."""
+
+    @property
+    def collisions(self) -> int:
+        """Runs that ended in a collision."""
+        return self.causes.count("collision")
+
+    @property
+    def interval(self) -> Interval:
+        """Of the collision rate, 95 %."""
+        return wilson_interval(self.collisions, len(self.causes))
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON document."""
+        low, high = self.interval
+        return {
+            "runs": len(self.causes),
+            "collisions": self.collisions,
+            "collision_rate": {
+                "estimate": self.collisions / len(self.causes),
+                "low": low,
+                "high": high,
+            },
+            "causes": dict(Counter(self.causes)),
+            "mechanisms": dict(Counter(m for m in self.mechanisms if m)),
+            "skipped": self.skipped,
+        }
+
+
+def try_diagram(
+    certificate: EnergyCertificate,
+    *,
+    starts: int = 24,
+    hearing: str = "ideal",
+    progress: Callable[[float], None] | None = None,
+) -> DiagramTrials:
+    """Runs the scenario's diagram from random certified starts.
+
+    Source and obstacles rest where they are at 0 s, as in the certificate. The
+    same random starts as of ``try_certificate``, less those at which the
+    rectangle stands on a body.
+
+    Args:
+        certificate: Where to start from.
+        starts: Runs.
+        hearing: ``ideal`` (bursts of exact positions), or ``audio`` at about a
+            second a run.
+        progress: Called with the share that is done.
+
+    Raises:
+        InputError: No start is certified, the wheels can slip, or ``starts`` is
+            wrong.
+    """
+    require_rolling(certificate.scenario.plant)
+    if starts < 1:
+        raise InputError("starts", f"{starts} must be at least 1")
+    scenario = frozen_scenario(certificate.scenario)
+    scenario = scenario.model_copy(update={"hearing": hearing})
+    follower = build_sound_follower(scenario)
+    states, poses, skipped = _certified_starts(certificate, scenario, starts)
+    causes, mechanisms = [], []
+    for k, (state, pose) in enumerate(zip(states, poses, strict=True)):
+        cause, mechanism = _run(follower, state, pose)
+        causes.append(cause)
+        mechanisms.append(mechanism)
+        if progress is not None:
+            progress((k + 1) / starts)
+    return DiagramTrials(states, tuple(causes), tuple(mechanisms), skipped)
+
+
+def _certified_starts(
+    certificate: EnergyCertificate, scenario: Scenario, count: int
+) -> tuple[NDArray[np.float64], NDArray[np.float64], int]:
+    """(n, 4) starts, (n, 3) poses, and how many were skipped."""
+    rng = np.random.default_rng(scenario.seed)
+    states = draw_starts(certificate, BATCH, rng)
+    states = states[certificate.certified(states)]
+    bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+    kept, poses, skipped = [], [], 0
+    for state in states:
+        pose = _pose(state, scenario)
+        footprint = robot_rectangle(pose, scenario.robot)
+        if min(rectangle_clearance(footprint, body) for body in bodies) <= 0.0:
+            skipped += 1
+            continue
+        kept.append(state)
+        poses.append(pose)
+        if len(kept) == count:
+            break
+    if len(kept) < count:
+        raise InputError(
+            "starts",
+            f"only {len(kept)} of {BATCH} random starts are certified and "
+            f"clear of all bodies; ask for fewer than {count}",
+        )
+    return np.array(kept), np.array(poses), skipped
+
+
+def _pose(state: NDArray[np.float64], scenario: Scenario) -> NDArray[np.float64]:
+    """Pose of a robot whose P is at the start and which looks along its velocity."""
+    theta = math.atan2(state[3], state[2])
+    offset = scenario.robot.control_point_m
+    x, y = state[:2] - offset * np.array([math.cos(theta), math.sin(theta)])
+    return np.array([x, y, theta])
+
+
+def _run(
+    follower: SoundFollower, state: NDArray[np.float64], pose: NDArray[np.float64]
+) -> tuple[str, str]:
+    """Cause, and the mechanism of a collision."""
+    scenario, robot = follower.scenario, follower.scenario.robot
+    simulator = make_simulator(follower)
+    rules = StopRules(follower)
+    simulator.set_monitor(rules)
+    contexts = {
+        role: follower.blocks[role].GetMyMutableContextFromRoot(
+            simulator.get_mutable_context()
+        )
+        for role in ("plant", "odometry", "command")
+    }
+    velocity = state[2:].tolist()
+    v, omega = hand_position_twist(velocity, pose[2], robot.control_point_m)
+    wheels = limited_wheel_speeds(v, omega, robot)
+    contexts["plant"].SetContinuousState([*pose, 0.0, 0.0, *wheels])
+    contexts["odometry"].SetDiscreteState([*pose, 0.0, 0.0])
+    set_discrete_state(contexts["command"], [*velocity, *wheels])
+    simulator.Initialize()
+    simulator.AdvanceTo(scenario.duration_s)
+    if rules.collision is None:
+        return rules.final_cause(), ""
+    end = contexts["plant"].get_continuous_state_vector().CopyToVector()[:3]
+    return "collision", _mechanism(scenario, end, rules.collision)
+
+
+def _mechanism(
+    scenario: Scenario, pose: NDArray[np.float64], collision: Collision
+) -> str:
+    """Where the contact lies: in the cones' fan before P, beside it, or behind."""
+    body = scenario.bodies()[collision.object].rectangle(collision.time)
+    point = touching_point(robot_rectangle(pose, scenario.robot), body)
+    p_WP = control_point(pose, scenario.robot.control_point_m)
+    x, y = rotate(-pose[2], point[0] - p_WP[0], point[1] - p_WP[1])
+    fan = max(map(abs, scenario.ultrasonic.axes_deg))
+    fan += scenario.ultrasonic.beam_half_angle_deg
+    if abs(math.degrees(math.atan2(y, x))) <= fan:
+        return "ahead"
+    x_B = x + scenario.robot.control_point_m
+    at_an_end = abs(y) / scenario.robot.width_m >= -x_B / scenario.robot.length_m
+    return "beside" if at_an_end else "behind"

@@ -1,0 +1,251 @@
+"""The sum-of-squares programs of ``analysis.certificates.sos_region``, and their proof.
+
+For both signs of the error of h, with y the scaled state and V = y' P y,
+
+    -V' - sigma (1 - V) is a sum of squares, sigma a sum of squares.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.solvers import (
+    ClarabelSolver,
+    MathematicalProgram,
+    MathematicalProgramResult,
+    SolverInterface,
+)
+from pydrake.symbolic import Expression
+from pydrake.symbolic import Polynomial as SymbolicPolynomial
+from scipy.linalg import solve_continuous_lyapunov
+
+from analysis.certificates.exact_polynomials import (
+    Monomial,
+    Polynomial,
+    gram_polynomial,
+    is_positive_definite,
+    match_gram,
+)
+from analysis.certificates.lag_model import LagModel
+from systems.framework.input_error import InputError
+
+__all__ = [
+    "Feasibility",
+    "box",
+    "feasibility",
+    "find_multipliers",
+    "first_region",
+    "is_proved",
+    "larger_region",
+    "solve",
+]
+
+#: The first region is the largest of the linear model's, shrunk by the least of
+#: these that has multipliers.
+_SHRINKINGS = (4.0, 16.0, 64.0, 256.0, 1024.0)
+#: V' is to fall at least by this share of |y|^2, 1/s.
+_DECAY = 1e-4
+#: The multipliers' monomials, degrees 1 and 2; those of the sum, 1 to 3.
+_MULTIPLIER_BASIS = [m for m in product(range(3), repeat=3) if 1 <= sum(m) <= 2]
+_SUM_BASIS = [m for m in product(range(4), repeat=3) if 1 <= sum(m) <= 3]
+
+
+def box(model: LagModel) -> list[tuple[float, float]]:
+    """Bounds of y: the domain, the clamp of v, and the top speed of w."""
+    a = model.scales[0]
+    return [(model.domain_m[0] / a, model.domain_m[1] / a), (-1.0, 1.0), (-1.0, 1.0)]
+
+
+def faces(model: LagModel) -> list[NDArray[np.float64]]:
+    """n with n . y <= 1 where the model holds: on the domain, below the clamp.
+
+    w follows v, and needs no bound.
+    """
+    (low, high), *_ = box(model)
+    eye = np.eye(3)
+    return [eye[0] / high, eye[0] / low, eye[1], -eye[1]]
+
+
+def first_region(
+    model: LagModel,
+) -> tuple[NDArray[np.float64], list[NDArray[np.float64]]]:
+    """P of the linear model, scaled until a region is found, and its multipliers."""
+    A = np.zeros((3, 3))
+    for i, rate in enumerate(model.rates(0.0)):
+        for monomial, value in rate.terms.items():
+            if sum(monomial) == 1:
+                A[i, monomial.index(1)] = float(value)
+    if np.linalg.eigvals(A).real.max() < 0.0:
+        P = solve_continuous_lyapunov(A.T, -np.eye(3))
+        P = 0.5 * (P + P.T)
+        reach = max(float(n @ np.linalg.solve(P, n)) for n in faces(model))
+        for shrink in _SHRINKINGS:
+            multipliers = find_multipliers(model, shrink * reach * P)
+            if multipliers is not None:
+                return shrink * reach * P, multipliers
+    raise InputError(
+        "law",
+        f"{model.contact.law.name!r} has no region of attraction of this form "
+        f"with {model.lag_s} s of motor lag; lower its stiffness or "
+        "plant.motor_lag_s, or raise attraction.damping_n_s_m",
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Feasibility:
+    """A program in the multipliers for a fixed P, and its Gram matrices."""
+
+    program: MathematicalProgram
+    multipliers: list[Any]
+    sums: list[Any]
+
+
+def _symbolic(polynomial: Polynomial, y: NDArray[Any]) -> Expression:
+    total = Expression(0.0)
+    for monomial, value in polynomial.terms.items():
+        term = Expression(float(value))
+        for variable, exponent in zip(y, monomial, strict=True):
+            if exponent:
+                term = term * variable**exponent
+        total = total + term
+    return total
+
+
+def _monomials(basis: list[Monomial], y: NDArray[Any]) -> NDArray[Any]:
+    return np.array([_symbolic(Polynomial({m: 1}), y) for m in basis])
+
+
+def _form(matrix: Any, vector: Any) -> Any:
+    """z' G z; numpy's own product warns of values in arrays of symbols."""
+    size = range(len(vector))
+    return sum(matrix[i, j] * vector[i] * vector[j] for i in size for j in size)
+
+
+def _falling(model: LagModel, P: NDArray[Any], y: NDArray[Any], sign: float) -> Any:
+    """-V' - decay |y|^2."""
+    rates = [_symbolic(rate, y) for rate in model.rates(sign)]
+    dot = sum(2.0 * P[i, j] * y[j] * rates[i] for i in range(3) for j in range(3))
+    return -dot - _DECAY * sum(v * v for v in y)
+
+
+def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
+    """The program that looks for multipliers of the region of P."""
+    program = MathematicalProgram()
+    y: Any = program.NewIndeterminates(3, "y")
+    z, s = _monomials(_SUM_BASIS, y), _monomials(_MULTIPLIER_BASIS, y)
+    multipliers, sums = [], []
+    for sign in (-1.0, 1.0):
+        S = program.NewSymmetricContinuousVariables(len(s))
+        G = program.NewSymmetricContinuousVariables(len(z))
+        program.AddPositiveSemidefiniteConstraint(S)
+        program.AddPositiveSemidefiniteConstraint(G)
+        gap = _falling(model, P, y, sign) - _form(S, s) * (1.0 - _form(P, y))
+        program.AddEqualityConstraintBetweenPolynomials(
+            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
+        )
+        multipliers.append(S)
+        sums.append(G)
+    return Feasibility(program, multipliers, sums)
+
+
+def solve(
+    solver: SolverInterface, program: MathematicalProgram
+) -> MathematicalProgramResult | None:
+    """What the solver finds; none: it says that there is no solution."""
+    result = solver.Solve(program)
+    return result if result.is_success() else None
+
+
+def find_multipliers(
+    model: LagModel, P: NDArray[np.float64]
+) -> list[NDArray[np.float64]] | None:
+    """Multipliers for the region as it is; none: V does not fall all over it."""
+    problem = feasibility(model, P)
+    result = solve(ClarabelSolver(), problem.program)
+    if result is None:
+        return None
+    return [result.GetSolution(S) for S in problem.multipliers]
+
+
+def larger_region(
+    model: LagModel, P: NDArray[np.float64], multipliers: list[NDArray[np.float64]]
+) -> NDArray[np.float64]:
+    """P of a larger region inside the box, the multipliers held."""
+    program = MathematicalProgram()
+    y: Any = program.NewIndeterminates(3, "y")
+    new: Any = program.NewSymmetricContinuousVariables(3, "P")
+    z, s = _monomials(_SUM_BASIS, y), _monomials(_MULTIPLIER_BASIS, y)
+    for sign, S in zip((-1.0, 1.0), multipliers, strict=True):
+        G = program.NewSymmetricContinuousVariables(len(z))
+        program.AddPositiveSemidefiniteConstraint(G)
+        gap = _falling(model, new, y, sign) - _form(S, s) * (1.0 - _form(new, y))
+        program.AddEqualityConstraintBetweenPolynomials(
+            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
+        )
+    for n in faces(model):
+        block = np.empty((4, 4), dtype=object)
+        block[:3, :3], block[:3, 3], block[3, :3], block[3, 3] = new, n, n, 1.0
+        program.AddPositiveSemidefiniteConstraint(
+            np.array([[Expression(v) for v in row] for row in block])
+        )
+    # The volume falls with log det P, here linearised about the last P.
+    slope = np.linalg.inv(P)
+    program.AddLinearCost(
+        sum(slope[i, j] * new[i, j] for i in range(3) for j in range(3))
+    )
+    result = solve(ClarabelSolver(), program)
+    if result is None:
+        return P
+    found: Any = result.GetSolution(new)
+    return np.asarray(0.5 * (found + found.T))
+
+
+def is_proved(
+    model: LagModel,
+    P: NDArray[np.float64],
+    problem: Feasibility,
+    result: MathematicalProgramResult | None,
+) -> bool:
+    """Proves the region in rational arithmetic, from the solver's numbers.
+
+    The multipliers are what the solver found, as rationals; the sum's Gram
+    matrix is moved until it makes -V' - sigma (1 - V) exactly, and then must be
+    positive definite. So must P and its blocks with the faces of the box.
+    """
+    if result is None:
+        return False
+    rows = [[Fraction(float(v)) for v in row] for row in 0.5 * (P + P.T)]
+    unit = [m for m in product(range(2), repeat=3) if sum(m) == 1][::-1]
+    V = gram_polynomial(unit, rows)
+    one = Polynomial({(0, 0, 0): 1})
+    for sign, S, G in zip((-1.0, 1.0), problem.multipliers, problem.sums, strict=True):
+        S_found = result.GetSolution(S)
+        multiplier = match_gram(
+            gram_polynomial(
+                _MULTIPLIER_BASIS,
+                [[Fraction(float(v)) for v in row] for row in S_found],
+            ),
+            _MULTIPLIER_BASIS,
+            S_found,
+        )
+        dot = Polynomial({})
+        for k, rate in enumerate(model.rates(sign)):
+            dot = dot + V.derivative(k) * rate
+        if multiplier is None or not is_positive_definite(multiplier):
+            return False
+        sigma = gram_polynomial(_MULTIPLIER_BASIS, multiplier)
+        gap = -dot - sigma * (one - V)
+        gram = match_gram(gap, _SUM_BASIS, result.GetSolution(G))
+        if gram is None or not is_positive_definite(gram):
+            return False
+    for n in faces(model):
+        face = [Fraction(float(v)) for v in n]
+        block = [[*row, value] for row, value in zip(rows, face, strict=True)]
+        if not is_positive_definite([*block, [*face, Fraction(1)]]):
+            return False
+    return True

@@ -1,0 +1,194 @@
+"""A sum-of-squares region of attraction, with the motor lag that energy cannot hold.
+
+Head-on before an obstacle, with x = c - c_eq, v of the virtual mass, w of P:
+
+    x' = w,   M v' = -h(x) x - D_r v,   lag w' = v - w
+
+h is the law's secant stiffness at rest, a polynomial within +-e of the law on
+the domain. A quadratic V = y' P y of the scaled state y falls on V <= 1, and that
+set lies clear of contact and of the clamp: starts inside never touch. For both
+signs of e
+
+    -V' - sigma (1 - V) is a sum of squares, sigma a sum of squares.
+
+Clarabel finds P and the multipliers in turn; CSDP repeats the last step, and
+rational arithmetic checks it without either
+(``analysis.certificates.exact_polynomials``).
+SCS is not used: its tolerance is too loose for a proof.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.solvers import ClarabelSolver, CsdpSolver
+
+from analysis.certificates.lag_model import LagModel, lag_model
+from analysis.certificates.sos_program import (
+    box,
+    feasibility,
+    find_multipliers,
+    first_region,
+    is_proved,
+    larger_region,
+    solve,
+)
+from analysis.nonlinear.phase_portrait import certified_speeds, head_on_model
+from diagrams import Scenario
+
+__all__ = ["SosRegion", "sos_region"]
+
+#: Rounds of finding P and multipliers in turn.
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class SosRegion:
+    """The region, its checks and its trials."""
+
+    model: LagModel
+    """What it is about."""
+    contact_m: float
+    """P nearer to the face is contact, m."""
+    P: NDArray[np.float64]
+    """(3, 3) V = y' P y; V <= 1 is the region."""
+    solvers: dict[str, bool]
+    """Whether each solver finds the last step feasible."""
+    exact: bool
+    """Whether rational arithmetic confirms it."""
+    region_share: float
+    """Share of the domain, |v| and |w| up to the top speed, that the region holds."""
+    safe_share: float
+    """Share of the domain's starts that do not touch, by simulation."""
+    starts: int
+    """Simulated starts inside the region."""
+    collisions: int
+    """Those that touch; must be 0."""
+    energy_starts: int
+    """Starts (w = v) that the energy certifies without motor lag."""
+    energy_collisions: int
+    """Those of them that touch with the lag: what energy does not see."""
+
+    @property
+    def certified(self) -> bool:
+        """Whether solvers and rational arithmetic agree."""
+        return self.exact and all(self.solvers.values())
+
+    def extent(self) -> NDArray[np.float64]:
+        """(3,) half extents of the region in x, v, w, m and m/s."""
+        return self.model.scales * np.sqrt(np.diag(np.linalg.inv(self.P)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``certificates`` in the JSON document."""
+        return {
+            "kind": "sum_of_squares",
+            "law": self.model.contact.law.name,
+            "model": "head-on, motor lag, continuous time, no velocity term",
+            "motor_lag_s": self.model.lag_s,
+            "equilibrium_m": self.model.contact.equilibrium_m,
+            "domain_m": list(self.model.domain_m),
+            "error_n_m": self.model.error_n_m,
+            "P": self.P.tolist(),
+            "scales": self.model.scales.tolist(),
+            "half_extents": self.extent().tolist(),
+            "solvers": self.solvers,
+            "exact": self.exact,
+            "certified": self.certified,
+            "region_share": self.region_share,
+            "safe_share": self.safe_share,
+            "ratio": self.region_share / self.safe_share,
+            "inside_starts": self.starts,
+            "inside_collisions": self.collisions,
+            "energy_starts": self.energy_starts,
+            "energy_collisions": self.energy_collisions,
+        }
+
+
+def sos_region(
+    scenario: Scenario, *, to_go_m: float | None = None, starts: int = 1000
+) -> SosRegion:
+    """Finds, checks and tries the region.
+
+    Args:
+        scenario: Law, gains and motor lag.
+        to_go_m: See ``head_on``.
+        starts: Simulated starts, inside the region and in the domain.
+
+    Raises:
+        InputError: The law is not known.
+        ValueError: There is no contact equilibrium, or it is unstable with the
+            motor lag.
+    """
+    model = lag_model(scenario, to_go_m=to_go_m)
+    P, multipliers = first_region(model)
+    for k in range(_ROUNDS):
+        P = larger_region(model, P, multipliers)
+        if k < _ROUNDS - 1:
+            multipliers = find_multipliers(model, P) or multipliers
+    # A step back from the rim leaves room for the exact check.
+    P = 1.02 * P
+    solved = feasibility(model, P)
+    results = {
+        name: solve(solver, solved.program)
+        for name, solver in (("clarabel", ClarabelSolver()), ("csdp", CsdpSolver()))
+    }
+    contact = scenario.ultrasonic.minimum_range_m
+    rng = np.random.default_rng(scenario.seed)
+    inside = _draw_inside(model, P, starts, rng)
+    low, high = np.array(box(model)).T
+    anywhere = rng.uniform(low, high, (starts, 3)) * model.scales
+    by_energy = _energy_starts(model, contact, starts, rng)
+    return SosRegion(
+        model=model,
+        contact_m=contact,
+        P=P,
+        solvers={name: result is not None for name, result in results.items()},
+        exact=is_proved(model, P, solved, results["clarabel"]),
+        region_share=float(np.mean(_inside(model, P, anywhere))),
+        safe_share=float(np.mean(~model.simulate(anywhere, contact_m=contact))),
+        starts=starts,
+        collisions=int(model.simulate(inside, contact_m=contact).sum()),
+        energy_starts=len(by_energy),
+        energy_collisions=int(model.simulate(by_energy, contact_m=contact).sum()),
+    )
+
+
+def _energy_starts(
+    model: LagModel, contact_m: float, count: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """(n, 3) random starts of the domain that the energy certifies, w = v."""
+    rest, top = model.contact.equilibrium_m, model.scales[1]
+    x = rng.uniform(*model.domain_m, count)
+    v = rng.uniform(-top, top, count)
+    order = np.argsort(x)
+    x, v = x[order], v[order]
+    limit = certified_speeds(head_on_model(model.contact), rest + x, contact_m)
+    safe = np.abs(v) < np.nan_to_num(limit, nan=-1.0)
+    return np.column_stack([x, v, v])[safe]
+
+
+def _inside(
+    model: LagModel, P: NDArray[np.float64], states: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(n,) whether V <= 1 at states (n, 3)."""
+    y = states / model.scales
+    return np.einsum("ni,ij,nj->n", y, P, y) <= 1.0
+
+
+def _draw_inside(
+    model: LagModel, P: NDArray[np.float64], count: int, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """(n, 3) x, v, w uniform in the region, w no faster than the top speed."""
+    # P = R R', so y = R^-T ball has y' P y = |ball|^2.
+    root = np.linalg.cholesky(P).T
+    kept = np.zeros((0, 3))
+    while len(kept) < count:
+        ball = rng.standard_normal((2 * count, 3))
+        radius = rng.uniform(size=2 * count) ** (1.0 / 3.0)
+        ball *= (radius / np.linalg.norm(ball, axis=1))[:, None]
+        y = np.linalg.solve(root, ball.T).T
+        kept = np.concatenate([kept, y[np.abs(y[:, 2]) <= 1.0]])
+    return kept[:count] * model.scales

@@ -1,0 +1,165 @@
+"""All runs of one law on one scenario's layouts, summarised."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.comparison.mechanisms import failure_mechanisms
+from analysis.reporting.intervals import bootstrap_interval, wilson_interval
+from analysis.runs.run_table import (
+    ALL_RUNS,
+    SUCCESSES,
+    collisions,
+    figure,
+    stream,
+    successes,
+)
+
+__all__ = ["Cell", "Estimate", "ExampleRun", "Median", "make_cell"]
+
+ExampleKind = Literal["worst", "typical", "best"]
+EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A rate or a mean with its interval."""
+
+    estimate: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Median:
+    """A median with its interval, over the runs that have the figure."""
+
+    median: float
+    low: float
+    high: float
+    runs: int
+
+
+@dataclass(frozen=True)
+class ExampleRun:
+    """A run to look at."""
+
+    kind: ExampleKind
+    """Its place among the cell's runs, ordered by success, then by clearance."""
+    index: int
+    """Its number in the sweep."""
+    cause: str
+
+
+@dataclass(frozen=True)
+class Cell:
+    """All runs of one law on one experiment's layouts."""
+
+    scenario: str
+    law: str
+    fields: dict[str, Any]
+    """Further fields of the grid, with their values."""
+    runs: int
+    causes: dict[str, int]
+    """How many runs ended so; collisions with whose fault it was in brackets."""
+    mechanisms: dict[str, int]
+    """How many runs failed so; see ``failure_mechanisms``."""
+    success: Estimate
+    collision: Estimate
+    spl: Estimate | None
+    """Success weighted by path length; none where the source moves."""
+    metrics: dict[str, Median]
+    examples: tuple[ExampleRun, ...]
+
+    @property
+    def label(self) -> str:
+        """The law, and what else sets the cell apart."""
+        return ", ".join([self.law, *(str(v) for v in self.fields.values())])
+
+
+def make_cell(
+    scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int
+) -> Cell:
+    """Summarises a cell of a sweep.
+
+    Args:
+        scenario: Its name.
+        fields: Values of the grid.
+        rows: Its runs, in the order of the layouts.
+        seed: Of the bootstraps.
+    """
+    others = {key: value for key, value in fields.items() if key != "law"}
+    success, collision = successes(rows), collisions(rows)
+    spl = figure(rows, "spl")
+    metrics = {}
+    for name in (*ALL_RUNS, *SUCCESSES):
+        values = figure(rows, name)
+        if name in SUCCESSES:
+            values = values[success]
+        values = values[np.isfinite(values)]
+        if len(values):
+            interval = bootstrap_interval(values, seed=stream(seed, name))
+            metrics[name] = Median(float(np.median(values)), *interval, len(values))
+    return Cell(
+        scenario=scenario,
+        law=str(fields["law"]),
+        fields=others,
+        runs=len(rows),
+        causes=_causes(rows),
+        mechanisms=_mechanisms(rows),
+        success=_rate(success),
+        collision=_rate(collision),
+        spl=_mean(spl[np.isfinite(spl)], stream(seed, "spl")),
+        metrics=metrics,
+        examples=_examples(rows, success),
+    )
+
+
+def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:
+    """First, middle and last of the runs by success, then by clearance."""
+    clearance = figure(rows, "minimum_clearance_m")
+    order = np.lexsort((clearance, success))
+    # A run that raised an error has no clearance, and nothing to look at.
+    order = order[np.isfinite(clearance[order])]
+    if len(order) == 0:
+        return ()
+    return tuple(
+        ExampleRun(kind, int(rows["index"].iloc[k]), str(rows["cause"].iloc[k]))
+        for kind, k in zip(
+            EXAMPLES, (order[0], order[len(order) // 2], order[-1]), strict=True
+        )
+    )
+
+
+def _causes(rows: pd.DataFrame) -> dict[str, int]:
+    fault = rows["collision_fault"]
+    names = rows["cause"].where(
+        rows["cause"] != "collision", "collision (" + fault.astype(str) + ")"
+    )
+    counts = names.value_counts()
+    return {str(name): int(count) for name, count in sorted(counts.items())}
+
+
+def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
+    """Commonest first; none with ideal sensing, which has no cones."""
+    if "contact_warning_s" not in rows:
+        return {}
+    counts = failure_mechanisms(rows).value_counts()
+    return {str(name): int(count) for name, count in counts.items()}
+
+
+def _rate(flags: NDArray[np.bool_]) -> Estimate:
+    interval = wilson_interval(int(np.sum(flags)), len(flags))
+    return Estimate(float(np.mean(flags)), *interval)
+
+
+def _mean(values: NDArray[np.float64], seed: int) -> Estimate | None:
+    if len(values) == 0:
+        return None
+    interval = bootstrap_interval(values, np.mean, seed=seed)
+    return Estimate(float(np.mean(values)), *interval)

@@ -1,0 +1,201 @@
+"""Runs laws side by side on the same random layouts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+import diagrams
+from analysis.comparison.laws_in_pairs import (
+    Comparison,
+    Pair,
+    compare_runs,
+    pooled_pairs,
+)
+from analysis.reporting.result_directory import ResultDirectory, take_directory
+from analysis.sweeps.one_run import require_runs
+from analysis.sweeps.plan import SweepPlan, load_sweep
+from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
+from diagrams import load_scenario
+from diagrams.laws import LAWS
+from diagrams.loading import explain, read_mapping
+from systems.framework.input_error import InputError
+
+__all__ = [
+    "EXPERIMENTS",
+    "PreparedComparison",
+    "comparison_plan",
+    "library_layouts",
+    "prepare_comparison",
+]
+
+#: The papers' experiments.
+EXPERIMENTS = (
+    "obstacle_free",
+    "two_static_obstacles",
+    "one_moving_obstacle",
+    "two_moving_obstacles",
+)
+_LIBRARY = Path(diagrams.__file__).parent / "layouts"
+#: Fields of a sweep that a comparison sets itself.
+_OURS = ("grid", "runs", "pair")
+
+
+@dataclass(frozen=True)
+class PreparedComparison:
+    """A comparison that has only to be run; see ``prepare_comparison``."""
+
+    out: Path
+    sweeps: dict[str, PreparedSweep]
+    """By name of the scenario."""
+
+    @property
+    def runs(self) -> int:
+        """Runs of all experiments and laws together."""
+        return sum(len(sweep.points) for sweep in self.sweeps.values())
+
+    @property
+    def done(self) -> int:
+        """Those of them that are done."""
+        return sum(len(sweep.store.done) for sweep in self.sweeps.values())
+
+    def run(
+        self, progress: Callable[[int], None] | None = None
+    ) -> tuple[dict[str, Comparison], list[Pair]]:
+        """Does the runs and summarises each scenario.
+
+        Args:
+            progress: Called a few times a second with the number of runs done.
+
+        Returns:
+            Comparisons by name of the scenario, and the pairs of all together.
+
+        Raises:
+            RunError: Every run failed.
+        """
+        tables: list[tuple[SweepPlan, Any]] = []
+        before = 0
+
+        def report(before: int, done: int) -> None:
+            if progress is not None:
+                progress(before + done)
+
+        for sweep in self.sweeps.values():
+            tables.append((sweep.plan, sweep.run(partial(report, before))))
+            before += len(sweep.points)
+        require_runs([table for _, table in tables], self.out)
+        comparisons = {
+            name: compare_runs(plan, table, name)
+            for name, (plan, table) in zip(self.sweeps, tables, strict=True)
+        }
+        return comparisons, pooled_pairs(tables)
+
+
+def library_layouts() -> dict[str, Path]:
+    """Names and files of the layouts that come with the package."""
+    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
+
+
+def comparison_plan(
+    scenario: str,
+    *,
+    laws: Sequence[str] = LAWS,
+    runs: int = 50,
+    seed: int = 1,
+    settings: dict[str, Any] | None = None,
+    grid: Mapping[str, Sequence[Any]] | None = None,
+) -> SweepPlan:
+    """The paired sweep that compares laws on one experiment's layouts.
+
+    Args:
+        scenario: A library name, whose layouts are those of the library; a YAML
+            file of layouts (a sweep without grid, runs and pair); or a YAML file
+            of a scenario, whose runs differ in noise alone.
+        laws: What to compare.
+        runs: Layouts, each met by every law.
+        seed: Of all layouts and noise.
+        settings: Further fields of the scenario, by dotted path.
+        grid: Further fields to compare, with their values.
+
+    Raises:
+        InputError: Something of that is unknown or no good; names the field.
+    """
+    plan = _layouts(scenario)
+    fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
+    fields |= {
+        "set": plan.set | (settings or {}),
+        "grid": {"law": tuple(laws), **{k: tuple(v) for k, v in (grid or {}).items()}},
+        "runs": runs,
+        "seed": seed,
+        "pair": True,
+    }
+    try:
+        return SweepPlan.model_validate(fields)
+    except ValidationError as error:
+        raise explain(error, SweepPlan, "a comparison") from None
+
+
+def prepare_comparison(
+    plans: dict[str, SweepPlan],
+    out: str | Path | None = None,
+    *,
+    workers: int | None = None,
+    resume: bool = False,
+) -> PreparedComparison:
+    """Draws and checks all layouts, and opens the directories of the runs.
+
+    Args:
+        plans: By name of the scenario; see ``comparison_plan``.
+        out: The directory; none: the next number under results/.
+        workers: Number of processes; none: one a core.
+        resume: Whether ``out`` may hold runs of the same comparison.
+
+    Raises:
+        InputError: Something of that is no good; says what, and the remedy.
+    """
+    if resume and out is None:
+        raise InputError("out", "--resume needs the directory to go on with; name it")
+    directory = Path(out).expanduser() if out is not None else None
+    taken: ResultDirectory | None = None
+    if directory is None or not (resume and directory.exists()):
+        taken = take_directory(out)
+        directory = directory or Path("results") / taken.path.name
+    sweeps: dict[str, PreparedSweep] = {}
+    try:
+        for name, plan in plans.items():
+            sweeps[name] = prepare_sweep(
+                plan, directory / name, workers=workers, resume=resume
+            )
+    except BaseException:
+        for sweep in sweeps.values():
+            sweep.store.close()
+        if taken is not None:
+            taken.undo(contents=True)
+        raise
+    if taken is not None:
+        taken.close()  # from now on the directories of the runs are locked
+    return PreparedComparison(directory, sweeps)
+
+
+def _layouts(scenario: str) -> SweepPlan:
+    library = library_layouts()
+    if scenario in library:
+        return load_sweep(library[scenario])
+    path = Path(scenario)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        data = read_mapping(path)
+        if "scenario" in data:
+            for key in _OURS:
+                if key in data:
+                    raise InputError(
+                        f"{scenario}: {key}",
+                        "is for the comparison to set; remove it, or use sweep",
+                    )
+            return load_sweep(path)
+    load_scenario(scenario)
+    return SweepPlan(name=path.stem, scenario=scenario)

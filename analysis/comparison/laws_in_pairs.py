@@ -1,0 +1,177 @@
+"""What a sweep over laws says: each law's figures, and the laws in pairs.
+
+Every law meets the same layouts with the same seeds, so that pairs of runs
+differ in nothing but the law.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.comparison.cells import Cell, make_cell
+from analysis.comparison.paired_statistics import (
+    PairedMedian,
+    PairedRate,
+    paired_median,
+    paired_rate,
+)
+from analysis.runs.run_table import (
+    ALL_RUNS,
+    SUCCESSES,
+    collisions,
+    figure,
+    stream,
+    successes,
+)
+from analysis.sweeps.plan import SweepPlan
+
+__all__ = ["Comparison", "Pair", "compare_runs", "pooled_pairs"]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Two cells that differ in one field, run by run."""
+
+    scenario: str
+    field: str
+    first: Any
+    """Value of the field in the first cell."""
+    second: Any
+    fields: dict[str, Any]
+    """What both cells have in common."""
+    success: PairedRate
+    collision: PairedRate
+    metrics: dict[str, PairedMedian]
+    encounters: dict[str, PairedMedian]
+    """Those of successful runs, of layouts on which both laws pushed back from an
+    obstacle: elsewhere nothing tells the laws apart but the source's own body."""
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """A sweep's cells and pairs."""
+
+    cells: list[Cell]
+    pairs: list[Pair]
+
+
+def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Comparison:
+    """Summarises a paired sweep over laws.
+
+    Rates have Wilson's intervals, medians bootstrapped ones (95 %). A run that
+    raised an error counts as no success.
+
+    Args:
+        plan: Its grid has ``law``, and perhaps more fields.
+        table: Its results; see ``analysis.sweeps.store.load_results``.
+        scenario: Name of the experiment.
+    """
+    cells = [
+        make_cell(scenario, fields, rows, plan.seed)
+        for fields, rows in zip(plan.cells(), _runs(plan, table), strict=True)
+    ]
+    pairs = [
+        _pair(scenario, neighbours, plan.seed)
+        for neighbours in _neighbours(plan, table)
+    ]
+    return Comparison(cells, pairs)
+
+
+def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]:
+    """Pairs that differ in one field, over all experiments and other fields."""
+    groups: dict[tuple[str, str, str], list[_Neighbours]] = {}
+    for plan, table in sweeps:
+        for one in _neighbours(plan, table):
+            key = (one.field, str(one.first), str(one.second))
+            groups.setdefault(key, []).append(one)
+    seed = sweeps[0][0].seed
+    return [_pair("all", _joined(group), seed) for group in groups.values()]
+
+
+@dataclass(frozen=True)
+class _Neighbours:
+    """Runs of two cells that differ in one field, layout by layout."""
+
+    field: str
+    first: Any
+    second: Any
+    fields: dict[str, Any]
+    first_rows: pd.DataFrame
+    second_rows: pd.DataFrame
+
+
+def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
+    """Each cell's rows in the order of the layouts."""
+    count = len(plan.cells())
+    return [table[table["cell"] == k].sort_values("run") for k in range(count)]
+
+
+def _neighbours(plan: SweepPlan, table: pd.DataFrame) -> Iterator[_Neighbours]:
+    rows = list(zip(plan.cells(), _runs(plan, table), strict=True))
+    for (one, ones), (other, others) in combinations(rows, 2):
+        apart = [key for key in one if one[key] != other[key]]
+        if len(apart) == 1:
+            field = apart[0]
+            common = {key: value for key, value in one.items() if key != field}
+            yield _Neighbours(field, one[field], other[field], common, ones, others)
+
+
+def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
+    return replace(
+        group[0],
+        fields={},
+        first_rows=pd.concat([one.first_rows for one in group]),
+        second_rows=pd.concat([one.second_rows for one in group]),
+    )
+
+
+def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
+    first, second = runs.first_rows, runs.second_rows
+    both = successes(first) & successes(second)
+    met = both & _pushed(first) & _pushed(second)
+    everywhere = np.ones(len(first), dtype=bool)
+    return Pair(
+        scenario=scenario,
+        field=runs.field,
+        first=runs.first,
+        second=runs.second,
+        fields=runs.fields,
+        success=paired_rate(successes(first), successes(second)),
+        collision=paired_rate(collisions(first), collisions(second)),
+        metrics={
+            **_medians(first, second, ALL_RUNS, everywhere, seed),
+            **_medians(first, second, SUCCESSES, both, seed),
+        },
+        encounters=_medians(first, second, SUCCESSES, met, seed),
+    )
+
+
+def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
+    """(n,) whether the law pushed back from an obstacle at all."""
+    return np.isfinite(figure(rows, "reaction_distance_m"))
+
+
+def _medians(
+    first: pd.DataFrame,
+    second: pd.DataFrame,
+    names: Sequence[str],
+    chosen: NDArray[np.bool_],
+    seed: int,
+) -> dict[str, PairedMedian]:
+    """Figures of the chosen pairs; those that no pair has are left out."""
+    medians = {
+        name: paired_median(
+            figure(first, name)[chosen],
+            figure(second, name)[chosen],
+            seed=stream(seed, name),
+        )
+        for name in names
+    }
+    return {name: median for name, median in medians.items() if median.pairs}

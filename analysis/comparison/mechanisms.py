@@ -1,0 +1,51 @@
+"""Why runs failed, from what the sensors knew: rules over a sweep's table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+
+from analysis.runs.run_table import figure
+from diagrams.stop_rules import SUCCESSFUL
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = ["failure_mechanisms"]
+
+#: A body without an echo for so long before the contact was out of sight, s: none
+#: at the last tick.
+OUT_OF_SIGHT_S = 1.5 * FRAME_PERIOD_S
+#: A body first heard of so shortly before the contact was heard late, s: from top
+#: speed at 0.72 m/s, less than 0.72 m.
+LATE_S = 1.0
+
+
+def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
+    """Mechanism of each failed run; missing where a run succeeded.
+
+    Of collisions, by the echoes of the body that was hit (docs/failures.md):
+
+    - ``never heard``: there was none, the body came from where no cone looks;
+    - ``out of sight``: there was none any more at the last tick, the body had left
+      the cones for the side of the bar;
+    - ``heard late``: the first one was less than 1 s before the contact;
+    - ``pushed too little``: heard in time and to the end.
+
+    Of the others: ``jam`` (stuck, or out of time, without ever having come into the
+    goal), ``held off`` (stuck after it came: the push off the source itself keeps
+    it outside), ``swings`` (unsettled: it came, and did not come to rest there),
+    ``lost``, ``astray`` and ``diverged`` (the source), ``failed`` (an error).
+
+    Args:
+        rows: Of ``analysis.sweeps.store.load_results``, with cones.
+    """
+    cause = rows["cause"].astype("object")
+    names = cause.where(~cause.isin(SUCCESSFUL))
+    names = names.replace({"stuck": "jam", "timeout": "jam", "unsettled": "swings"})
+    came = np.isfinite(figure(rows, "time_to_goal_s"))
+    names = names.mask((cause == "stuck") & came, "held off")
+    hits = cause == "collision"
+    warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]
+    names = names.mask(hits, "pushed too little")
+    names = names.mask(hits & (warning < LATE_S), "heard late")
+    names = names.mask(hits & (unseen >= OUT_OF_SIGHT_S), "out of sight")
+    return names.mask(hits & warning.isna(), "never heard")

@@ -1,0 +1,137 @@
+"""Pictures of a comparison: rates with their intervals, and runs to look at."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
+from matplotlib.ticker import MaxNLocator
+
+from analysis.comparison.cells import Cell, Estimate
+from analysis.comparison.laws_in_pairs import Comparison
+from analysis.reporting.palette import COLOURS
+from analysis.runs.scene import bounds
+from analysis.runs.trajectory_artists import (
+    draw_collision,
+    draw_obstacles,
+    draw_robot,
+    draw_source,
+)
+from diagrams import RunResult
+from systems.world.geometry import rectangle_corners
+
+__all__ = ["plot_examples", "plot_rates"]
+
+#: Metrics with a panel each, with their axis' title.
+_METRICS = {
+    "minimum_obstacle_clearance_m": "least clearance from obstacles (m), all runs",
+    "jerk_rms_m_s3": "rms jerk (m/s$^3$), successful runs",
+}
+
+
+def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
+    """Success, collision and two medians of every law, with 95 % intervals.
+
+    A row of panels an experiment.
+    """
+    rows, columns = len(comparisons), 2 + len(_METRICS)
+    tallest = max(len(comparison.cells) for comparison in comparisons)
+    figure = Figure(
+        figsize=(3.6 * columns, rows * (0.9 + 0.32 * tallest)), layout="constrained"
+    )
+    grid = figure.subplots(rows, columns, squeeze=False)
+    for axes, comparison in zip(grid, comparisons, strict=True):
+        cells = comparison.cells
+        _rate_panel(axes[0], cells, [cell.success for cell in cells], "robot")
+        _rate_panel(axes[1], cells, [cell.collision for cell in cells], "source")
+        for panel, name in zip(axes[2:], _METRICS, strict=True):
+            _median_panel(panel, cells, name)
+        for panel in axes[1:]:
+            panel.tick_params(labelleft=False)
+        axes[0].set_title(cells[0].scenario, loc="left", fontsize=10)
+    titles = ("success (%)", "collision (%)", *_METRICS.values())
+    for panel, title in zip(grid[-1], titles, strict=True):
+        panel.set_xlabel(title, fontsize=9)
+    return figure
+
+
+def _rate_panel(
+    axes: Axes, cells: Sequence[Cell], rates: Sequence[Estimate], colour: str
+) -> None:
+    places = np.arange(len(cells))
+    values = np.array([100.0 * rate.estimate for rate in rates])
+    low = values - [100.0 * rate.low for rate in rates]
+    high = [100.0 * rate.high for rate in rates] - values
+    axes.barh(places, values, color=COLOURS[colour], alpha=0.75, height=0.6)
+    axes.errorbar(
+        values, places, xerr=np.maximum([low, high], 0.0), fmt="none", ecolor="black"
+    )
+    axes.set_xlim(0.0, 100.0)
+    _label_laws(axes, cells)
+
+
+def _median_panel(axes: Axes, cells: Sequence[Cell], name: str) -> None:
+    for place, cell in enumerate(cells):
+        median = cell.metrics.get(name)
+        if median is not None:
+            axes.plot([median.low, median.high], [place, place], "k-")
+            axes.plot(median.median, place, "o", color=COLOURS["robot"])
+    axes.xaxis.set_major_locator(MaxNLocator(nbins=4))
+    _label_laws(axes, cells)
+
+
+def _label_laws(axes: Axes, cells: Sequence[Cell]) -> None:
+    axes.set_yticks(np.arange(len(cells)), [cell.label for cell in cells])
+    axes.set_ylim(len(cells) - 0.5, -0.5)
+    axes.grid(axis="x", color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def plot_examples(rows: Sequence[tuple[Cell, Sequence[RunResult]]]) -> Figure:
+    """Worst, typical and best run of each cell, seen from above, in W, m."""
+    results = [result for _, runs in rows for result in runs]
+    limits = np.array([bounds(result, margin=0.6) for result in results])
+    x_low, y_low = limits[:, 0].min(), limits[:, 2].min()
+    x_high, y_high = limits[:, 1].max(), limits[:, 3].max()
+    width = 4.2
+    height = width * (y_high - y_low) / (x_high - x_low) + 0.45
+    figure = Figure(figsize=(3 * width, len(rows) * height), layout="constrained")
+    grid = figure.subplots(len(rows), 3, squeeze=False, sharex=True, sharey=True)
+    for panels, (cell, runs) in zip(grid, rows, strict=True):
+        for panel in panels[len(runs) :]:
+            panel.set_axis_off()
+        for panel, example, result in zip(panels, cell.examples, runs, strict=False):
+            _example(panel, result)
+            panel.set_title(
+                f"{cell.label}, {example.kind}: {_ending(result)}", fontsize=9
+            )
+            panel.set_aspect("equal")
+            panel.set_xlim(x_low, x_high)
+            panel.set_ylim(y_low, y_high)
+    for panel in grid[-1]:
+        panel.set_xlabel("x in W (m)")
+    for panel in grid[:, 0]:
+        panel.set_ylabel("y in W (m)")
+    return figure
+
+
+def _example(axes: Axes, result: RunResult) -> None:
+    end = result.simulated_s
+    draw_obstacles(axes, result)
+    draw_source(axes, result, [end])
+    draw_robot(axes, result, [0.0, end])
+    draw_collision(axes, result)
+    for obstacle in result.scenario.obstacles:
+        path = obstacle.path()
+        if path.moves:
+            body = np.array([*path.pose(end), *obstacle.size_m])
+            axes.add_patch(Polygon(rectangle_corners(body), color=COLOURS["obstacle"]))
+
+
+def _ending(result: RunResult) -> str:
+    hit = result.collision
+    by = f" with {hit.object}" if hit else ""
+    return f"{result.cause}{by}, {result.simulated_s:.0f} s"

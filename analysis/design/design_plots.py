@@ -1,0 +1,88 @@
+"""Picture of the design: pushes against the pull, and barrier against contact."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.design.design_study import DesignStudy
+from analysis.laws.law_curves_plots import LAW_STYLES
+from analysis.laws.push_and_pull import DESIGNED_LAWS, spring, stiffest
+from analysis.linear.contact_mode import largest_contact_stiffness
+
+__all__ = ["plot_design"]
+
+#: Damping that is drawn, N s/m, and the stiffest push, N/m.
+_DAMPING_N_S_M = np.linspace(0.2, 2.0, 37)
+_STIFFNESS_N_M = 30.0
+#: Distances that are drawn, m.
+_DISTANCE_M = np.linspace(0.005, 1.2, 240)
+
+
+def plot_design(study: DesignStudy) -> Figure:
+    """Left: each push less the pull, shaded where it stops P. Right: the conflict.
+
+    Args:
+        study: See ``study_design``; drawn for its attraction as it is.
+    """
+    figure = Figure(figsize=(11.0, 4.4), layout="constrained")
+    balance, conflict = figure.subplots(1, 2)
+    _plot_balance(balance, study)
+    _plot_conflict(conflict, study)
+    return figure
+
+
+def _plot_balance(axes: Axes, study: DesignStudy) -> None:
+    scenario, to_go = study.today.scenario, study.today.metres_to_go
+    nearest = scenario.ultrasonic.minimum_range_m
+    pull = scenario.attraction.stiffness_n_m * (_DISTANCE_M + to_go)
+    for law in DESIGNED_LAWS:
+        colour, title = LAW_STYLES[law]
+        push = spring(law, scenario)
+        force = np.array([push(c) for c in _DISTANCE_M.tolist()])
+        axes.plot(_DISTANCE_M, force, color=colour, label=title)
+        stops = (force > pull) & (nearest <= _DISTANCE_M)
+        axes.fill_between(
+            _DISTANCE_M, pull, force, where=stops.tolist(), color=colour, alpha=0.15
+        )
+    axes.plot(_DISTANCE_M, pull, color="black", label="attraction's pull")
+    axes.axvline(nearest, color="black", linewidth=0.8, linestyle=":")
+    axes.set_xlim(0.0, _DISTANCE_M[-1])
+    axes.set_ylim(bottom=0.0)
+    axes.set_xlabel("distance c of an obstacle ahead (m)")
+    axes.set_ylabel("force (N)")
+    axes.set_title(
+        f"every shaded area holds {study.kinetic_energy_j:.2f} J; target {to_go:g} m on"
+    )
+    axes.legend()
+
+
+def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
+    scenario = study.today.scenario
+    attraction, spare = scenario.attraction, study.requirements.spare_latency_ticks
+    lines = dict.fromkeys((0, spare), "-") | {spare: "--"}
+    for ticks, line in lines.items():
+        limits = [
+            largest_contact_stiffness(scenario, damping_n_s_m=D_r, latency_ticks=ticks)
+            - attraction.stiffness_n_m
+            for D_r in _DAMPING_N_S_M.tolist()
+        ]
+        label = f"contact is stable below: echoes {25 * ticks} ms old"
+        axes.plot(_DAMPING_N_S_M, limits, f"k{line}", label=label)
+    for law in DESIGNED_LAWS:
+        colour, title = LAW_STYLES[law]
+        stiffness = stiffest(law, scenario)
+        if stiffness < _STIFFNESS_N_M:
+            label = f"{title}: {stiffness:.1f} N/m"
+            axes.axhline(stiffness, color=colour, label=label)
+        else:
+            label = f"{title}: {stiffness:.0f} N/m, off the scale"
+            axes.plot([], [], color=colour, label=label)
+    axes.axvline(attraction.damping_n_s_m, color="black", linewidth=0.8, linestyle=":")
+    axes.set_xlim(_DAMPING_N_S_M[0], _DAMPING_N_S_M[-1])
+    axes.set_ylim(0.0, _STIFFNESS_N_M)
+    axes.set_xlabel("damping of the attraction D_r (N s/m)")
+    axes.set_ylabel("stiffest slope of the push (N/m)")
+    axes.set_title("the stiffness that the barrier costs, and what contact allows")
+    axes.legend(fontsize=8, loc="lower right")

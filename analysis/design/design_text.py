@@ -1,0 +1,99 @@
+"""The design as tables on a terminal, and as files."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from analysis.design.design_study import Alternative, DesignStudy
+from analysis.design.requirements import Check
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from diagrams import dump_scenario
+
+__all__ = ["design_summary", "design_text", "write_design"]
+
+
+def design_text(study: DesignStudy) -> str:
+    """What was asked for, what was found, and what gives."""
+    lines = [
+        f"kinetic energy at top speed {study.kinetic_energy_j:.3f} J",
+        "",
+        "K_0 of the conventional law, N/m, that holds a target behind the obstacle:",
+    ]
+    lines += [
+        f"  {row.metres_to_go:3.1f} m behind  {row.stiffness_n_m:5.1f}   "
+        f"({row.stiffness_from_reach_n_m:.1f} without the limit of speed)"
+        for row in study.barriers
+    ]
+    limits = ", ".join(f"{limit:.1f}" for limit in study.contact_limits_n_m)
+    lines += [f"stable in contact with echoes 0, 1, 2, 4 periods old: up to {limits}"]
+    lines += ["", "Attraction as it is", *_alternative_lines(study.today)]
+    lines += ["", "Attraction as recommended", *_alternative_lines(study.recommended)]
+    return "\n".join(lines)
+
+
+def _alternative_lines(alternative: Alternative) -> list[str]:
+    attraction = alternative.scenario.attraction
+    gains = (
+        f"  K_r {attraction.stiffness_n_m:g} N/m, D_r {attraction.damping_n_s_m:g} "
+        f"N s/m, follow distance {attraction.follow_distance_m:g} m "
+        f"(at least {alternative.follow_distance_m:g} m)"
+    )
+    figures = (
+        f"  damping ratio {alternative.damping_ratio:.2f}, lag "
+        f"{alternative.following_lag_m:.2f} m, overshoot "
+        f"{alternative.overshoot_m:.2f} m, target {alternative.metres_to_go:.1f} m "
+        "behind the obstacle"
+    )
+    lines = [gains, figures]
+    for law, runs in zip(alternative.laws, alternative.jams, strict=True):
+        lines += [f"  {law.law}"]
+        lines += [f"    {name:<26}{value:8g}" for name, value in law.gains.items()]
+        lines += [f"    {_check_text(check)}" for check in law.checks]
+        lines += [f"    {'jams':<26}{runs.jams:8d} of {sum(runs.causes.values())} runs"]
+    return lines
+
+
+def _check_text(check: Check) -> str:
+    sign = ">=" if check.at_least else "<="
+    told = "" if check.met else "   not met"
+    unit = "" if check.unit == "1" else f" {check.unit}"
+    value = 0.0 if math.isclose(check.value, 0.0, abs_tol=5e-4) else check.value
+    return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"
+
+
+def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
+    """The JSON document of the study."""
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "scenario": study.today.scenario.name,
+        **study.to_dict(),
+        "versions": versions(),
+        "out": str(out),
+    }
+
+
+def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
+    """``summary.json``, both scenarios, ``design.png`` and ``law_curves.png``."""
+    from analysis.design.design_plots import plot_design
+    from analysis.laws.law_curves import law_curves
+    from analysis.laws.law_curves_plots import plot_law_curves
+    from analysis.laws.push_and_pull import DESIGNED_LAWS
+
+    (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    for name, alternative in (
+        ("scenario", study.today),
+        ("recommended", study.recommended),
+    ):
+        text = dump_scenario(alternative.scenario)
+        (directory / f"{name}.yaml").write_text(text, "utf-8")
+    plot_design(study).savefig(directory / "design.png", dpi=150)
+    curves = []
+    for term in ("printed", "closing"):
+        scenario = study.today.scenario
+        repulsion = scenario.repulsion.model_copy(update={"velocity_term": term})
+        changed = scenario.model_copy(update={"repulsion": repulsion})
+        curves += law_curves(changed, DESIGNED_LAWS)
+    plot_law_curves(curves).savefig(directory / "law_curves.png", dpi=150)

@@ -1,0 +1,184 @@
+"""From requirements to gains: K_0, k_ref, D_0, d_ref of each law, and K_r, D_r, d_f.
+
+Where requirements exclude each other, what comes first holds: the barrier
+before the contact, the contact before the offset. docs/design.md explains.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+from scipy.optimize import brentq
+
+from analysis.design.requirements import (
+    DesignRequirements,
+    allowed_stiffness,
+    metres_to_go,
+    with_gains,
+)
+from analysis.laws.push_and_pull import (
+    injected_share,
+    kinetic_energy,
+    largest_rise,
+    rest_offset,
+    sampled_push,
+    spring,
+    stiffest,
+)
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.laws.repulsion import RepulsionParameters
+
+__all__ = ["gain_for_barrier", "search_gains"]
+
+#: Gains are rounded to so many figures.
+_FIGURES = 3
+#: Springs that are tried, N/m or N m.
+_GAINS = (1e-3, 1e5)
+#: Decay lengths that are tried for the active law, m.
+_ALPHAS_M = (0.05, 1.0)
+
+
+def search_gains(
+    scenario: Scenario, requirements: DesignRequirements
+) -> RepulsionParameters:
+    """The gains that the requirements give to each law.
+
+    Reaches, limits of speed and saturations are the scenario's, as are the
+    attraction, the robot and the sensors.
+
+    Raises:
+        InputError: No gain meets a requirement that has to be met.
+    """
+    D_r = scenario.attraction.damping_n_s_m
+    # The secant of D_0 s is D_0: it puts back D_0/D_r.
+    damping = _rounded(requirements.injected_share * D_r)
+    for law, field in (
+        ("conventional", "stiffness_n_m"),
+        ("conventional2017", "distance_gain_j"),
+        ("active2017", "distance_gain_j"),
+    ):
+        gain = _rounded(gain_for_barrier(scenario, law, field, requirements), up=True)
+        scenario = with_gains(scenario, law, **{field: gain, "damping_n_s_m": damping})
+    # A far echo meets the spring's tail as well: the second round knows it.
+    for _ in range(2):
+        scenario = _active_damper(scenario, requirements)
+        scenario = _active_spring(scenario, requirements)
+    return RepulsionParameters.model_validate(scenario.repulsion.model_dump())
+
+
+def gain_for_barrier(
+    scenario: Scenario,
+    law: str,
+    field: str,
+    requirements: DesignRequirements,
+    **also: float,
+) -> float:
+    """The value of a gain with which the barrier is just met.
+
+    Args:
+        scenario: Everything else.
+        law: Whose gain.
+        field: The gain, N/m or N m; the push is proportional to it.
+        requirements: See ``DesignRequirements``.
+        also: Further gains as multiples of this one.
+
+    Raises:
+        InputError: No gain in a sensible range meets it.
+    """
+    to_go, energy = metres_to_go(scenario, requirements), kinetic_energy(scenario)
+
+    unit = with_gains(scenario, law, **{field: 1.0}, **also)
+    c, push = sampled_push(spring(law, unit), scenario)
+    pull = scenario.attraction.stiffness_n_m * (c + to_go)
+
+    def missing(gain: float) -> float:
+        return energy - largest_rise(gain * push - pull)
+
+    return _root(missing, *_GAINS, f"repulsion.{law}.{field}")
+
+
+def _active_damper(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
+    """d_ref from the offset by a far echo, D_0 from the energy put back."""
+    attraction, active = scenario.attraction, scenario.repulsion.active
+    tail = spring("active", scenario)(scenario.ultrasonic.maximum_range_m)
+    at_rest = requirements.far_offset_m * attraction.stiffness_n_m - tail
+    d_ref = _rounded(at_rest / active.speed_limit_m_s)
+
+    def excess(D_0: float) -> float:
+        changed = with_gains(
+            scenario,
+            "active",
+            reference_damping_n_s_m=d_ref,
+            matched_damping_n_s_m=D_0,
+        )
+        return injected_share("active", changed) - requirements.injected_share
+
+    # Below sqrt(e) d_ref the term never rises above its value at rest.
+    field = "repulsion.active.matched_damping_n_s_m"
+    D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
+    return with_gains(
+        scenario,
+        "active",
+        reference_damping_n_s_m=d_ref,
+        matched_damping_n_s_m=_rounded(D_0),
+    )
+
+
+def _active_spring(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
+    """k_ref from the barrier, alpha from offset and contact.
+
+    The longer alpha, the softer the push and the farther it reaches. Of those
+    that meet the offset the longest is taken; where even that is too stiff
+    for the contact, the shortest that is not.
+    """
+    reach = scenario.repulsion.active.reach_m
+
+    def with_alpha(alpha: float) -> Scenario:
+        inverse_ratio = math.exp(-reach / (2.0 * alpha))
+        k_ref = gain_for_barrier(
+            scenario,
+            "active",
+            "reference_stiffness_n_m",
+            requirements,
+            matched_stiffness_n_m=inverse_ratio,
+        )
+        return with_gains(
+            scenario,
+            "active",
+            reference_stiffness_n_m=_rounded(k_ref),
+            matched_stiffness_n_m=_rounded(k_ref * inverse_ratio),
+        )
+
+    def too_far(alpha: float) -> float:
+        return rest_offset("active", with_alpha(alpha)) - scenario.stop.goal_margin_m
+
+    def too_stiff(alpha: float) -> float:
+        allowed = allowed_stiffness(scenario, requirements)
+        return stiffest("active", with_alpha(alpha)) - allowed
+
+    field = "repulsion.active.reference_stiffness_n_m"
+    alpha = _root(too_far, *_ALPHAS_M, field)
+    if too_stiff(alpha) > 0.0:
+        alpha = _root(too_stiff, alpha, _ALPHAS_M[1], field)
+    return with_alpha(alpha)
+
+
+def _root(
+    function: Callable[[float], float], low: float, high: float, field: str
+) -> float:
+    if function(low) * function(high) > 0.0:
+        raise InputError(
+            f"{field}",
+            f"nothing from {low:g} to {high:g} meets the requirements; "
+            "change attraction or robot",
+        )
+    return float(brentq(function, low, high, rtol=1e-6))
+
+
+def _rounded(value: float, *, up: bool = False) -> float:
+    """To three significant figures."""
+    step = 10.0 ** (math.floor(math.log10(value)) + 1 - _FIGURES)
+    steps = math.ceil(value / step - 1e-9) if up else round(value / step)
+    return float(f"{steps * step:.12g}")

@@ -1,0 +1,192 @@
+"""What the laws' gains must achieve, and how far a set of gains does."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from analysis.laws.push_and_pull import (
+    far_offset,
+    injected_share,
+    kinetic_energy,
+    net_barrier,
+    rest_offset,
+    spring,
+    stiffest,
+)
+from analysis.linear.contact_mode import largest_contact_stiffness
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+
+__all__ = [
+    "Check",
+    "DesignRequirements",
+    "LawDesign",
+    "allowed_stiffness",
+    "check_law",
+    "metres_to_go",
+    "with_gains",
+]
+
+#: Gains are rounded; a bound holds to within the rounding.
+_ROUNDING = 0.01
+
+
+@dataclass(frozen=True)
+class DesignRequirements:
+    """Bounds that the scenario does not say itself."""
+
+    source_range_m: float = 4.0
+    """The source is this far away at most, m: Han 2019, tables 1 and 2."""
+    spare_latency_ticks: int = 1
+    """Periods by which echoes may be older than in the model, which leaves out
+    their travelling time, up to 18 ms."""
+    far_offset_m: float = 0.03
+    """An echo at the sensors' limit may push a resting robot so far, m: what
+    hearing errs by at 1 m (Han 2019, tables 1 and 2)."""
+    injected_share: float = 0.8
+    """Share of D_r's dissipation that the velocity term may put back."""
+    damping: float = 0.7
+    """Least damping ratio of the loop to the follow point."""
+    clearance_m: float = 0.25
+    """Room left to the master robot's body when P overshoots, m."""
+    offset_reserve_m: float = 0.1
+    """Left of the goal by an attraction of one's own, m: cones and an oblique
+    approach add up to 6 cm to the offset, hearing errs by 2 to 7 cm at 1 m."""
+
+
+@dataclass(frozen=True)
+class Check:
+    """One requirement, and what was achieved."""
+
+    name: str
+    value: float
+    bound: float
+    unit: str
+    at_least: bool
+    """Whether the bound is a lower one."""
+
+    @property
+    def ratio(self) -> float:
+        """How well it is met: 1 is just."""
+        good, bad = self.value, self.bound
+        if not self.at_least:
+            good, bad = bad, good
+        return good / bad if bad > 0.0 else math.inf
+
+    @property
+    def met(self) -> bool:
+        """Whether it is met, to the rounding of the gains."""
+        return self.ratio >= 1.0 - _ROUNDING
+
+
+@dataclass(frozen=True)
+class LawDesign:
+    """A law's gains held against the requirements."""
+
+    law: str
+    gains: dict[str, float]
+    """Fields of the law's parameters."""
+    checks: tuple[Check, ...]
+
+    def check(self, name: str) -> Check:
+        """One of the checks."""
+        return next(check for check in self.checks if check.name == name)
+
+    @property
+    def met(self) -> bool:
+        """Whether every requirement is."""
+        return all(check.met for check in self.checks)
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        checks = [
+            asdict(check)
+            | {
+                "ratio": check.ratio if math.isfinite(check.ratio) else None,
+                "met": check.met,
+            }
+            for check in self.checks
+        ]
+        return {"law": self.law, "gains": self.gains, "met": self.met, "checks": checks}
+
+
+def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
+    """The same scenario with some gains of a law changed, unchecked."""
+    parameters = getattr(scenario.repulsion, law).model_copy(update=gains)
+    repulsion = scenario.repulsion.model_copy(update={law: parameters})
+    return scenario.model_copy(update={"repulsion": repulsion})
+
+
+def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
+    """From an obstacle at rho_0 to where the attraction rests, m, at most.
+
+    Raises:
+        InputError: Nothing is left of the source's range.
+    """
+    follow = scenario.attraction.follow_distance_m
+    reach = scenario.repulsion.conventional.reach_m
+    left = requirements.source_range_m - follow - reach
+    if left <= 0.0:
+        raise InputError(
+            "attraction.follow_distance_m",
+            f"{follow} m and a reach of {reach} m leave "
+            f"nothing of the {requirements.source_range_m} m to the source; lower it",
+        )
+    return left
+
+
+def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> float:
+    """Stiffest push with which the motion before an obstacle is stable, N/m."""
+    total = largest_contact_stiffness(
+        scenario, latency_ticks=requirements.spare_latency_ticks
+    )
+    return total - scenario.attraction.stiffness_n_m
+
+
+def check_law(
+    scenario: Scenario, law: str, requirements: DesignRequirements
+) -> LawDesign:
+    """Holds a law's gains, as they stand in the scenario, against requirements.
+
+    Raises:
+        InputError: The law has no gains to choose, or see ``metres_to_go``.
+    """
+    push = spring(law, scenario)
+    to_go = metres_to_go(scenario, requirements)
+    barrier = net_barrier(push, scenario, to_go)
+    checks = [
+        Check("barrier", barrier, kinetic_energy(scenario), "J", at_least=True),
+        *(
+            Check(*row, at_least=False)
+            for row in (
+                (
+                    "contact stiffness",
+                    stiffest(law, scenario),
+                    allowed_stiffness(scenario, requirements),
+                    "N/m",
+                ),
+                (
+                    "offset behind the source",
+                    rest_offset(law, scenario),
+                    scenario.stop.goal_margin_m,
+                    "m",
+                ),
+                (
+                    "offset by a far echo",
+                    far_offset(law, scenario),
+                    requirements.far_offset_m,
+                    "m",
+                ),
+                (
+                    "energy put back",
+                    injected_share(law, scenario),
+                    requirements.injected_share,
+                    "1",
+                ),
+            )
+        ),
+    ]
+    gains = getattr(scenario.repulsion, law).model_dump()
+    return LawDesign(law, gains, tuple(checks))

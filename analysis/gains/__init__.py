@@ -1,1 +1,0 @@
-"""The laws' curves, and gains from stated requirements."""

@@ -1,0 +1,1 @@
+"""Laws as force over distance: curves, push and pull, the head-on approach."""

@@ -1,0 +1,122 @@
+"""How hard each law pushes, by distance and by speed.
+
+Han 2019 describes its figure 6 in words, and Kim 2017 its own; both pictures
+are missing. The forces here come from the blocks that simulate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from diagrams.laws import make_controller
+from diagrams.scenario import Scenario
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.ranging.collision_vector import SLOTS
+
+__all__ = ["LawCurves", "law_curves", "radial_forces"]
+
+#: Where curves are drawn, m and m/s (negative: the obstacle recedes).
+DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
+SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
+
+
+@dataclass(frozen=True)
+class LawCurves:
+    """Force away from an obstacle straight ahead, under one law."""
+
+    law: str
+    """As ``Scenario.law``."""
+    velocity_term: str
+    """``printed`` or ``closing``."""
+    distance_m: NDArray[np.float64]
+    """(n,) m."""
+    push_n: NDArray[np.float64]
+    """(n,) force at these distances, the obstacle at rest, N."""
+    at_distance_m: float
+    """Distance at which the speed varies, m."""
+    speed_m_s: NDArray[np.float64]
+    """(k,) speed of approach, negative for a receding obstacle, m/s."""
+    force_n: NDArray[np.float64]
+    """(k,) force at these speeds, N."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """For JSON: lists in place of arrays."""
+        values = vars(self).items()
+        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values}
+
+
+def law_curves(
+    scenario: Scenario,
+    laws: Sequence[str],
+    *,
+    distance_m: NDArray[np.float64] = DISTANCES_M,
+    speed_m_s: NDArray[np.float64] = SPEEDS_M_S,
+    at_distance_m: float = 0.4,
+) -> list[LawCurves]:
+    """Samples the laws with a scenario's gains.
+
+    Args:
+        scenario: Its ``repulsion`` and ``robot`` count.
+        laws: As ``Scenario.law``.
+        distance_m: (n,) where to sample the push at rest, m, above 0.
+        speed_m_s: (k,) where to sample the force against speed, m/s.
+        at_distance_m: Distance of the latter, m; half of rho_0.
+
+    Raises:
+        InputError: There is no such law.
+    """
+    curves = []
+    for law in laws:
+        controller = make_controller(scenario.model_copy(update={"law": law}))
+        curves.append(
+            LawCurves(
+                law=law,
+                velocity_term=scenario.repulsion.velocity_term,
+                distance_m=distance_m,
+                push_n=radial_forces(controller, distance_m, 0.0),
+                at_distance_m=at_distance_m,
+                speed_m_s=speed_m_s,
+                force_n=radial_forces(controller, at_distance_m, speed_m_s),
+            )
+        )
+    return curves
+
+
+def radial_forces(
+    controller: Any, c: ArrayLike, approach: ArrayLike
+) -> NDArray[np.float64]:
+    """Force away from an obstacle that one control period brought nearer, N.
+
+    Args:
+        controller: A block with the ports of ``RadialLawController``.
+        c: Distances now, m, above 0; broadcast with ``approach``.
+        approach: How fast they have shrunk over the last period, m/s.
+    """
+    context = controller.CreateDefaultContext()
+    for name, size in (("p_WS_estimated", 2), ("pose_WB_estimated", 3), ("v_WP", 2)):
+        controller.GetInputPort(name).FixValue(context, np.zeros(size))
+    controller.GetInputPort("target_valid").FixValue(context, np.zeros(1))
+    features = np.eye(SLOTS)[0]
+    controller.GetInputPort("features").FixValue(context, features)
+    forces = controller.GetOutputPort("forces_W")
+    distances, speeds = np.broadcast_arrays(c, approach)
+    found = []
+    for now, speed in zip(distances.ravel(), speeds.ravel(), strict=True):
+        _see(controller, context, now + speed * FRAME_PERIOD_S)
+        update = controller.EvalUniquePeriodicDiscreteUpdate(context)
+        context.SetDiscreteState(update)
+        _see(controller, context, now)
+        found.append(-forces.Eval(context)[2])
+    return np.array(found).reshape(distances.shape)
+
+
+def _see(controller: Any, context: Any, distance: float) -> None:
+    """An obstacle straight ahead, in the first slot."""
+    vectors = np.zeros(2 * SLOTS)
+    vectors[0] = distance
+    controller.GetInputPort("collision_vectors_B").FixValue(context, vectors)

@@ -1,0 +1,50 @@
+"""Picture of the laws: force against distance and against speed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from matplotlib.figure import Figure
+
+from analysis.laws.law_curves import LawCurves
+from analysis.reporting.palette import COLOURS
+
+__all__ = ["LAW_STYLES", "plot_law_curves"]
+
+#: (colour, title) of the laws of the package.
+LAW_STYLES = {
+    "none": (COLOURS["empty"], "no avoidance"),
+    "conventional": (COLOURS["source"], "conventional"),
+    "active": (COLOURS["robot"], "active 2019"),
+    "conventional2017": (COLOURS["echo"], "conventional 2017"),
+    "active2017": (COLOURS["estimate"], "active 2017"),
+}
+
+
+def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
+    """Left: the push at rest against distance. Right: the force against speed.
+
+    Args:
+        curves: One a law and velocity term; ``closing`` is dashed.
+    """
+    figure = Figure(figsize=(10.0, 4.0), layout="constrained")
+    by_distance, by_speed = figure.subplots(1, 2)
+    for curve in curves:
+        colour, title = LAW_STYLES.get(curve.law, (None, curve.law))
+        if curve.velocity_term == "printed":
+            by_distance.plot(curve.distance_m, curve.push_n, color=colour, label=title)
+            by_speed.plot(curve.speed_m_s, curve.force_n, color=colour, label=title)
+        else:
+            by_speed.plot(curve.speed_m_s, curve.force_n, "--", color=colour)
+    by_distance.set_xlabel("distance c (m)")
+    by_distance.set_ylabel("force away from the obstacle (N)")
+    by_distance.set_title("the obstacle at rest")
+    by_speed.set_xlabel("speed of approach (m/s); negative: receding")
+    by_speed.set_title(
+        f"at c = {curves[0].at_distance_m:g} m; dashed: s of the approach alone"
+    )
+    for axes in (by_distance, by_speed):
+        axes.set_ylim(bottom=0.0)
+        axes.grid(visible=True, alpha=0.3)
+    by_distance.legend()
+    return figure

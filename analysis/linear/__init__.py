@@ -1,0 +1,1 @@
+"""What linear models tell: margins, delay, sampling, bursts, contact, robustness."""

@@ -1,0 +1,113 @@
+"""Stability against the silence between bursts, for each hold of the target."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.operating_points import OperatingPoint, motion_model
+from diagrams.scenario import Scenario
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = ["GapChart", "gap_chart"]
+
+#: Multipliers nearer to 1 belong to a continuum of equilibria.
+_NEUTRAL = 1e-6
+
+
+@dataclass(frozen=True)
+class GapChart:
+    """How fast the motion decays, against the silence in each cycle."""
+
+    on_s: float
+    """Sound in each cycle, s."""
+    gaps_s: NDArray[np.float64]
+    """(n,) silence in each cycle, s."""
+    holds: tuple[Hold, ...]
+    """What the target does meanwhile."""
+    multiplier: NDArray[np.float64]
+    """(holds, n) largest |multiplier| of a cycle."""
+    today: tuple[float, Hold]
+    """Silence, s, and hold of the scenario."""
+
+    @property
+    def growth_per_s(self) -> NDArray[np.float64]:
+        """(holds, n) exponent of the slowest motion, 1/s; negative: decays."""
+        return np.asarray(np.log(self.multiplier) / (self.on_s + self.gaps_s))
+
+    def longest_stable_s(self, hold: Hold) -> float:
+        """Largest of the gaps up to which every one is stable, s."""
+        unstable = self.multiplier[self.holds.index(hold)] >= 1.0
+        count = int(np.argmax(unstable)) if unstable.any() else len(unstable)
+        return float(self.gaps_s[count - 1]) if count else 0.0
+
+
+def gap_chart(
+    scenario: Scenario,
+    *,
+    gaps_s: ArrayLike | None = None,
+    holds: Sequence[Hold] = HOLDS,
+    point: OperatingPoint | None = None,
+) -> GapChart:
+    """Largest multipliers for many gaps from the ticks of one long cycle.
+
+    A tick's matrix depends on how long ago the sound was heard, and not on how
+    long the silence will be, but for the tracker's memory of velocities, which
+    does not move P where hearing is exact.
+
+    Args:
+        scenario: Any, see ``analysis.linear.burst_cycle.burst_cycle``.
+        gaps_s: Multiples of the control period, s; by default 0 to 4 s.
+        holds: To compare.
+        point: The equilibrium, where it is known already.
+    """
+    point = point or follow_equilibrium(scenario)
+    gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)
+    ticks = np.rint(gaps / FRAME_PERIOD_S).astype(int)
+    on = scenario.sound.on_s
+    longest = int(ticks.max()) * FRAME_PERIOD_S
+    rows = []
+    for hold in holds:
+        cycle = burst_cycle(scenario, hold, on_s=on, gap_s=longest, point=point)
+        rows.append(
+            [
+                _largest(point, product)
+                for product in _products(cycle.matrices, on, ticks)
+            ]
+        )
+    return GapChart(
+        on_s=on,
+        gaps_s=ticks * FRAME_PERIOD_S,
+        holds=tuple(holds),
+        multiplier=np.array(rows),
+        today=(scenario.sound.period_s - on, scenario.tracker.hold),
+    )
+
+
+def _products(
+    matrices: NDArray[np.float64], on: float, ticks: NDArray[np.int_]
+) -> list[NDArray[np.float64]]:
+    """Over the sound and the first so many ticks of silence."""
+    product, products = np.eye(matrices.shape[1]), []
+    heard = round(on / FRAME_PERIOD_S)
+    for matrix in matrices[:heard]:
+        product = matrix @ product
+    wanted = dict.fromkeys(ticks.tolist())
+    for count in range(int(ticks.max()) + 1):
+        if count in wanted:
+            wanted[count] = product
+        if heard + count < len(matrices):
+            product = matrices[heard + count] @ product
+    products = [wanted[count] for count in ticks.tolist()]
+    return [product for product in products if product is not None]
+
+
+def _largest(point: OperatingPoint, product: NDArray[np.float64]) -> float:
+    poles = motion_model(point, product, 1.0).poles
+    poles = poles[np.abs(poles - 1.0) > _NEUTRAL]
+    return float(np.abs(poles).max(initial=0.0))

@@ -1,0 +1,221 @@
+"""How much more delay the sampled loop stands: exact, in fractions of a tick.
+
+A delay of n ticks and a part e of one makes a longer one-period map, whose
+spectral radius is bisected (the recipe of semi-discretisation, without its
+approximation: signals are constant between ticks, and the plant's motion
+within one is a matrix exponential).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import expm
+from scipy.optimize import brentq
+
+from analysis.linear.loop_margins import is_loop, loop_margins
+from analysis.models.linear_models import LinearModel
+from analysis.models.linearisation import plant_derivatives
+from analysis.models.model_reduction import minimal_model
+from analysis.models.open_loops import Direction, closed, cut_model, open_loop
+from analysis.models.operating_points import OperatingPoint
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "DELAY_PLACES",
+    "DelayMargin",
+    "DelayPlace",
+    "DelayedLoop",
+    "delay_margin",
+]
+
+DelayPlace = Literal["sensor", "wheels"]
+
+#: Where a delay can come in: estimates of the source come later than the tracker
+#: takes them to, or wheel commands reach the motors later.
+DELAY_PLACES: tuple[DelayPlace, ...] = ("sensor", "wheels")
+
+#: Poles nearer to z = 1 are neutral at every delay.
+_NEUTRAL = 1e-7
+#: No larger delay margin is looked for, s.
+_LONGEST_S = 10.0
+
+
+@dataclass(frozen=True)
+class DelayMargin:
+    """The delay at which a loop begins to oscillate."""
+
+    at: DelayPlace
+    """Where the delay comes in."""
+    direction: Direction
+    """Of the motion that oscillates; the other one is not delayed."""
+    delay_s: float
+    """Added to what the build has, s; infinite where none destabilises."""
+    frequency_rad_s: float
+    """Of the oscillation, rad/s; not a number where there is none."""
+
+    @property
+    def ticks(self) -> float:
+        """In control periods."""
+        return self.delay_s / FRAME_PERIOD_S
+
+
+class DelayedLoop:
+    """The sampled loop of one direction with any delay in it.
+
+    Args:
+        point: The operating point.
+        at: Where the delay comes in.
+        direction: Along the line to the source, or across it.
+    """
+
+    def __init__(
+        self,
+        point: OperatingPoint,
+        at: DelayPlace = "sensor",
+        direction: Direction = "along",
+    ) -> None:
+        own = f"{at}_{direction}"
+        whole = cut_model(point, at)
+        (other,) = [name for name in whole.input_names if name != own]
+        # The other direction's wire is closed; the model keeps all its states.
+        self._cut = closed(whole, (other,))
+        self._column = whole.input_names.index(own)
+        self._at = at
+        loop = point.loop
+        self._plant = loop.indices("plant")
+        self._A_plant, self._B_plant = plant_derivatives(point)
+        names = loop.state_names
+        self._wheels = [names.index(f"command.wheel_{s}") for s in ("left", "right")]
+        self._hearing = names.index(
+            "hearing.p_PS_B_x" if direction == "along" else "hearing.p_PS_B_y"
+        )
+        self._turn = np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
+
+    def _flow(self, seconds: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Plant state after some seconds: by its state, and by what the wheels hold."""
+        n, m = self._B_plant.shape
+        block = np.zeros((n + m, n + m))
+        block[:n, :n], block[:n, n:] = self._A_plant, self._B_plant
+        moved = expm(block * seconds)
+        return moved[:n, :n], moved[:n, n:]
+
+    def period_matrix(self, delay_s: float) -> NDArray[np.float64]:
+        """One-period map of the motion and of the signals under way."""
+        ticks, part = divmod(delay_s, FRAME_PERIOD_S)
+        late = int(ticks)
+        return (self._wheel_delay if self._at == "wheels" else self._sensor_delay)(
+            late, part
+        )
+
+    def _wheel_delay(self, late: int, part: float) -> NDArray[np.float64]:
+        """The wheels hold an older command until ``part`` of the period is over."""
+        cut, column = self._cut, self._column
+        rest, _ = self._flow(FRAME_PERIOD_S - part)
+        _, first = self._flow(part)
+        older = np.zeros(len(cut.A))
+        older[self._plant] = rest @ first @ self._turn[column]
+        newer = cut.B[:, column] - older
+        return _with_delays(cut, cut.C[column], [(newer, late), (older, late + 1)])
+
+    def _sensor_delay(self, late: int, part: float) -> NDArray[np.float64]:
+        """Hearing measures where the robot was, within an earlier period."""
+        cut, column = self._cut, self._column
+        state, held = self._flow(FRAME_PERIOD_S - part)
+        measured = np.zeros(len(cut.A))
+        by_plant = cut.A[self._hearing, self._plant]
+        measured[self._plant] = by_plant @ state
+        measured += by_plant @ held @ cut.A[self._wheels]
+        # Without delay the tracker reads at a tick what was measured one before.
+        return _with_delays(cut, measured, [(cut.B[:, column], late + 2)])
+
+    def spectral_radius(self, delay_s: float) -> float:
+        """Largest |z|, neutral poles apart."""
+        return self._largest(delay_s)[0]
+
+    def _largest(self, delay_s: float) -> tuple[float, complex]:
+        poles = np.linalg.eigvals(self.period_matrix(delay_s))
+        poles = poles[np.abs(poles - 1.0) > _NEUTRAL]
+        largest = complex(poles[np.abs(poles).argmax()])
+        return abs(largest), largest
+
+    def critical_frequency(self, delay_s: float) -> float:
+        """Frequency of the pole nearest to leaving, rad/s."""
+        return abs(float(np.angle(self._largest(delay_s)[1]))) / FRAME_PERIOD_S
+
+
+def _with_delays(
+    model: LinearModel,
+    row: NDArray[np.float64],
+    columns: list[tuple[NDArray[np.float64], int]],
+) -> NDArray[np.float64]:
+    """x+ = A x + sum of b y of some ticks ago, y = row x, as one matrix.
+
+    Only what the signal moves and shows is kept.
+    """
+    B = np.column_stack([column for column, _ in columns])
+    part = replace(
+        model,
+        B=B,
+        C=row[None],
+        D=np.zeros((1, len(columns))),
+        input_names=tuple(f"late_{lag}" for _, lag in columns),
+        output_names=("signal",),
+    )
+    small = minimal_model(part)
+    count, longest = len(small.A), max(lag for _, lag in columns)
+    matrix = np.zeros((count + longest, count + longest))
+    matrix[:count, :count] = small.A
+    for (_, lag), b in zip(columns, small.B.T, strict=True):
+        if lag == 0:
+            matrix[:count, :count] += np.outer(b, small.C[0])
+        else:
+            matrix[:count, count + lag - 1] += b
+    if longest:
+        matrix[count, :count] = small.C[0]
+        matrix[count + 1 :, count:-1] = np.eye(longest - 1)
+    return matrix
+
+
+def delay_margin(
+    point: OperatingPoint,
+    at: DelayPlace = "sensor",
+    direction: Direction = "along",
+) -> DelayMargin:
+    """The smallest delay at which the loop stops decaying.
+
+    Raises:
+        InputError: The loop oscillates without any delay already.
+    """
+    loop = DelayedLoop(point, at, direction)
+    if loop.spectral_radius(0.0) >= 1.0:
+        raise InputError(
+            f"{at}, {direction}",
+            "the loop is unstable without a delay, and has no "
+            "delay margin; take a stable operating point (follow_equilibrium)",
+        )
+    none = DelayMargin(at, direction, math.inf, math.nan)
+    opened = open_loop(point, at, direction)
+    if not is_loop(opened):
+        return none
+    guess = loop_margins(opened).delay_margin_s
+    if not guess < _LONGEST_S:
+        return none
+
+    def excess(delay_s: float) -> float:
+        return loop.spectral_radius(delay_s) - 1.0
+
+    low, high = guess, guess
+    while excess(low) >= 0.0:
+        low = max(0.0, low - FRAME_PERIOD_S)
+    while excess(high) < 0.0:
+        high += FRAME_PERIOD_S
+        if high > _LONGEST_S + FRAME_PERIOD_S:
+            return none
+    found = float(brentq(excess, low, high, xtol=1e-9))
+    return DelayMargin(at, direction, found, loop.critical_frequency(found))

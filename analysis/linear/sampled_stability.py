@@ -1,0 +1,259 @@
+"""Sampling: closed-form conditions, poles against period, stability charts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import control
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.linear.contact_mode import contact_matrix, delayed_output, motion_chain
+from analysis.models.linear_models import LinearModel
+from diagrams.scenario import Scenario
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "SCHEMES",
+    "ConditionCheck",
+    "PolesAgainstPeriod",
+    "StabilityChart",
+    "check_conditions",
+    "gain_chart",
+    "gain_delay_chart",
+    "poles_against_period",
+]
+
+Scheme = Literal["held acceleration", "held velocity", "held velocity, one tick late"]
+
+#: Ways to sample a double integrator; the second is the built one without lag.
+SCHEMES: tuple[Scheme, ...] = (
+    "held acceleration",
+    "held velocity",
+    "held velocity, one tick late",
+)
+_CONDITIONS: dict[Scheme, str] = {
+    "held acceleration": "K T / 2 < D < 2 / T",
+    "held velocity": "D > 0 and 2 D T + K T^2 < 4",
+    "held velocity, one tick late": "K T < D and 2 D T - K T^2 < 4",
+}
+#: A motor lag that counts as none, s; a shorter one costs the exponential digits.
+_NO_LAG_S = 1e-7
+#: Sample periods that are tried, s.
+_PERIODS_S = np.geomspace(0.002, 4.0, 160)
+
+
+@dataclass(frozen=True)
+class ConditionCheck:
+    """A closed-form condition against eigenvalues, at random gains."""
+
+    scheme: Scheme
+    """How the double integrator of unit mass is sampled."""
+    condition: str
+    """Stable exactly if this holds."""
+    pairs: int
+    """Random pairs (K, D)."""
+    stable: int
+    """Of them, stable by eigenvalues."""
+    mismatches: int
+    """Of them, in which the condition says otherwise."""
+
+
+def check_conditions(pairs: int = 10_000, seed: int = 1) -> tuple[ConditionCheck, ...]:
+    """Tests the three conditions on random pairs about their boundaries.
+
+    The matrices are those of the blocks at 25 ms (without motor lag), and of
+    ``control.sample_system`` for the held acceleration.
+
+    Args:
+        pairs: For each scheme.
+        seed: Of the pairs.
+    """
+    rng, T = np.random.default_rng(seed), FRAME_PERIOD_S
+    K = 10.0 ** rng.uniform(-1.0, math.log10(8.0 / T**2), pairs)
+    D = 10.0 ** rng.uniform(-3.0, math.log10(4.0 / T), pairs)
+    holds = {
+        "held acceleration": (K * T / 2 < D) & (D < 2 / T),
+        "held velocity": 2 * D * T + K * T**2 < 4,
+        "held velocity, one tick late": (K * T < D) & (2 * D * T - K * T**2 < 4),
+    }
+    checks = []
+    for scheme in SCHEMES:
+        chain = _chain(scheme)
+        law = -np.stack([K, D], axis=1)
+        matrices = chain.A + np.einsum("i,pj,jk->pik", chain.B[:, 0], law, chain.C)
+        stable = np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0
+        wrong = int(np.sum(stable != holds[scheme]))
+        checks.append(
+            ConditionCheck(scheme, _CONDITIONS[scheme], pairs, int(stable.sum()), wrong)
+        )
+    return tuple(checks)
+
+
+def _chain(scheme: Scheme) -> LinearModel:
+    """From the acceleration of a unit mass to what the law sees of it."""
+    built = motion_chain(Scenario(), motor_lag_s=_NO_LAG_S)
+    if scheme == "held velocity":
+        return built
+    if scheme == "held velocity, one tick late":
+        return delayed_output(built, "p_WP", 1)  # the velocity is the mass's own
+    double = control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), np.zeros((2, 1)))
+    A, B, C, D = control.ssdata(control.sample_system(double, FRAME_PERIOD_S))
+    names = built.input_names, built.output_names
+    return LinearModel(scheme, A, B, C, D, ("p", "v"), *names, FRAME_PERIOD_S)
+
+
+@dataclass(frozen=True)
+class PolesAgainstPeriod:
+    """Poles of the target loop for other sample periods."""
+
+    periods_s: NDArray[np.float64]
+    """(n,) s."""
+    poles: NDArray[np.complex128]
+    """(n, m) in the z plane."""
+    today_s: float
+    """The control period, s."""
+    longest_stable_s: float
+    """Largest of the periods below which all are stable, s."""
+
+    @property
+    def growth_per_s(self) -> NDArray[np.float64]:
+        """(n,) exponent of the slowest mode, 1/s; negative where it decays."""
+        radius = np.abs(self.poles).max(axis=1)
+        return np.asarray(np.log(radius) / self.periods_s, dtype=float)
+
+
+def poles_against_period(
+    scenario: Scenario,
+    *,
+    stiffness_n_m: float | None = None,
+    periods_s: ArrayLike = _PERIODS_S,
+) -> PolesAgainstPeriod:
+    """Poles along the line to the source, sampled at other periods.
+
+    Hearing's tick does not count in it, for the odometry makes up for it, and
+    an echo drives the wheels at once.
+
+    Args:
+        scenario: Attraction, robot and plant are used.
+        stiffness_n_m: In place of K_r, as with an obstacle's spring, N/m.
+        periods_s: Sample periods, s, ascending.
+    """
+    periods = np.asarray(periods_s, dtype=float)
+    stiffness = stiffness_n_m
+    if stiffness is None:
+        stiffness = scenario.attraction.stiffness_n_m
+    poles = np.zeros((len(periods), 3), dtype=complex)
+    for row, period in zip(poles, periods, strict=True):
+        matrix = contact_matrix(scenario, stiffness, period_s=float(period))
+        row[: len(matrix)] = np.linalg.eigvals(matrix)  # a lag may have gone by then
+    unstable = np.abs(poles).max(axis=1) >= 1.0
+    first = int(np.argmax(unstable)) if unstable.any() else len(periods)
+    return PolesAgainstPeriod(
+        periods_s=periods,
+        poles=poles,
+        today_s=FRAME_PERIOD_S,
+        longest_stable_s=float(periods[first - 1]) if first else 0.0,
+    )
+
+
+@dataclass(frozen=True)
+class StabilityChart:
+    """Exponent of the slowest mode over two parameters."""
+
+    title: str
+    """What is shown."""
+    x_name: str
+    """Name and unit of the horizontal parameter."""
+    y_name: str
+    """Name and unit of the vertical parameter."""
+    x: NDArray[np.float64]
+    """(nx,)"""
+    y: NDArray[np.float64]
+    """(ny,)"""
+    growth_per_s: NDArray[np.float64]
+    """(ny, nx) 1/s; negative where all decays."""
+    today: tuple[float, float]
+    """(x, y) of the scenario."""
+
+    @property
+    def stable_share(self) -> float:
+        """Part of the chart's points that is stable."""
+        return float(np.mean(self.growth_per_s < 0.0))
+
+
+def _growth(matrix: NDArray[np.float64]) -> float:
+    radius = float(np.abs(np.linalg.eigvals(matrix)).max())
+    return math.log(max(radius, 1e-12)) / FRAME_PERIOD_S
+
+
+def _filled(
+    x: NDArray[np.float64],
+    y: NDArray[np.float64],
+    function: Callable[[float, float], NDArray[np.float64]],
+) -> NDArray[np.float64]:
+    return np.array([[_growth(function(float(a), float(b))) for a in x] for b in y])
+
+
+def gain_chart(
+    scenario: Scenario,
+    *,
+    stiffnesses_n_m: ArrayLike | None = None,
+    dampings_n_s_m: ArrayLike | None = None,
+) -> StabilityChart:
+    """Over K_r and D_r: sampled, with the motors' lag, away from obstacles."""
+    K, D = scenario.attraction.stiffness_n_m, scenario.attraction.damping_n_s_m
+    x = _values(stiffnesses_n_m, np.geomspace(0.1, 400.0, 60))
+    y = _values(dampings_n_s_m, np.geomspace(0.05, 400.0, 60))
+    return StabilityChart(
+        title="attraction, with motor lag and 25 ms sampling",
+        x_name="K_r (N/m)",
+        y_name="D_r (N s/m)",
+        x=x,
+        y=y,
+        growth_per_s=_filled(
+            x, y, lambda k, d: contact_matrix(scenario, k, damping_n_s_m=d)
+        ),
+        today=(K, D),
+    )
+
+
+def gain_delay_chart(
+    scenario: Scenario,
+    *,
+    delays_s: ArrayLike | None = None,
+    stiffnesses_n_m: ArrayLike | None = None,
+) -> StabilityChart:
+    """Over the age of the position that the springs act on, and their stiffness.
+
+    Delays are taken in whole ticks.
+    """
+    longest = np.arange(0.0, 1.0, 2 * FRAME_PERIOD_S)
+    x = _values(delays_s, longest)
+    ticks = np.rint(x / FRAME_PERIOD_S).astype(int)
+    x = ticks * FRAME_PERIOD_S
+    y = _values(stiffnesses_n_m, np.geomspace(0.2, 100.0, 50))
+    growth = np.array(
+        [
+            [_growth(contact_matrix(scenario, k, latency_ticks=int(n))) for n in ticks]
+            for k in y
+        ]
+    )
+    return StabilityChart(
+        title="all springs together, on a position of some age",
+        x_name="delay (s)",
+        y_name="stiffness (N/m)",
+        x=x,
+        y=y,
+        growth_per_s=growth,
+        today=(0.0, scenario.attraction.stiffness_n_m),
+    )
+
+
+def _values(
+    given: ArrayLike | None, default: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return default if given is None else np.asarray(given, dtype=float)

@@ -1,0 +1,172 @@
+"""The linear prediction against runs: frequency and damping of a small step."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.ideal_loop import frozen_scenario
+from analysis.models.operating_points import OperatingPoint
+from diagrams import build_sound_follower, make_simulator
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.world.geometry import control_point
+
+__all__ = ["Oscillation", "StepCheck", "check_step", "fitted_step"]
+
+
+@dataclass(frozen=True)
+class Oscillation:
+    """A damped oscillation."""
+
+    frequency_rad_s: float
+    """Natural frequency, rad/s."""
+    damping_ratio: float
+    """Damping ratio."""
+
+
+@dataclass(frozen=True)
+class StepCheck:
+    """A step along the line to the source: predicted, and in two builds."""
+
+    predicted: Oscillation
+    """By the sampled linear model."""
+    ideal: Oscillation
+    """Of the all-ideal build."""
+    full: Oscillation | None
+    """Of the build as the scenario has it, where that was run."""
+    step_m: float
+    """Size of the step, m."""
+    time_s: NDArray[np.float64] = field(repr=False)
+    """(n,) s."""
+    ideal_m: NDArray[np.float64] = field(repr=False)
+    """(n,) distance of P from the source, m."""
+    full_m: NDArray[np.float64] | None = field(repr=False)
+    """The same in the full build, m."""
+
+    @property
+    def frequency_error(self) -> float:
+        """Of the prediction, relative to the ideal build."""
+        return self.predicted.frequency_rad_s / self.ideal.frequency_rad_s - 1.0
+
+    @property
+    def damping_error(self) -> float:
+        """Of the prediction, relative to the ideal build."""
+        return self.predicted.damping_ratio / self.ideal.damping_ratio - 1.0
+
+
+def check_step(
+    scenario: Scenario,
+    *,
+    step_m: float = 0.05,
+    duration_s: float = 25.0,
+    full: bool = False,
+) -> StepCheck:
+    """Starts the robot a small step away from the equilibrium, and fits its way.
+
+    Args:
+        scenario: Any; its bodies rest where they are at time zero.
+        step_m: Towards the source, m.
+        duration_s: To simulate, s.
+        full: Whether to run the scenario's own sensors too.
+
+    Raises:
+        InputError: There is no stable equilibrium, or nothing oscillates there.
+    """
+    point = follow_equilibrium(scenario)
+    modes = [mode for mode in point.modes if mode.eigenvalue.imag > 1e-6]
+    along = _along(point, modes)
+    ideal = _run(point.loop.scenario, point, step_m, duration_s)
+    own = None
+    if full:
+        own = _run(frozen_scenario(scenario), point, step_m, duration_s)
+    return StepCheck(
+        predicted=Oscillation(along.frequency_rad_s, along.damping_ratio),
+        ideal=fitted_step(*ideal, along.frequency_rad_s),
+        full=fitted_step(*own, along.frequency_rad_s) if own else None,
+        step_m=step_m,
+        time_s=ideal[0],
+        ideal_m=ideal[1],
+        full_m=own[1] if own else None,
+    )
+
+
+def _along(point: OperatingPoint, modes: list[Any]) -> Any:
+    """The oscillation along the line to the source: the stiffest."""
+    if not modes:
+        raise InputError(
+            "attraction",
+            "about the equilibrium nothing oscillates, so that there is "
+            "no frequency to compare; take a stiffness_n_m that is larger for the "
+            "damping_n_s_m",
+        )
+    return max(modes, key=lambda mode: mode.frequency_rad_s)
+
+
+def _run(
+    scenario: Scenario, point: OperatingPoint, step_m: float, duration_s: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Time, s, and distance of P from the source, m, after a start off the point."""
+    ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
+    epsilon = scenario.robot.control_point_m
+    x, y = control_point((*(point.p_WP + step_m * ahead), point.theta_WB), -epsilon)
+    data = scenario.model_dump()
+    data["start"] = {
+        "position_m": [x, y],
+        "heading_deg": math.degrees(point.theta_WB),
+    }
+    # No stop rules: a small step is slow enough to count as rest.
+    follower = build_sound_follower(Scenario.model_validate(data), log=True)
+    simulator = make_simulator(follower)
+    simulator.Initialize()
+    simulator.AdvanceTo(duration_s)
+    assert follower.log is not None
+    assert follower.logged[0] == ("plant", "pose_WB")
+    log = follower.log.FindLog(simulator.get_context())
+    x, y, theta = np.array(log.data())[:3]
+    p_WS = scenario.source.path().pose(0.0)
+    distance = np.hypot(
+        p_WS[0] - x - epsilon * np.cos(theta), p_WS[1] - y - epsilon * np.sin(theta)
+    )
+    return np.array(log.sample_times()), distance
+
+
+def fitted_step(
+    time_s: NDArray[np.float64], distance_m: NDArray[np.float64], guess_rad_s: float
+) -> Oscillation:
+    """Least squares of a damped oscillation about a constant.
+
+    A bias and a second harmonic that decay with it are fitted too: the norm of
+    a velocity, in the laws' velocity terms, makes both and no damping.
+
+    Args:
+        time_s: (n,) s; the first two seconds do not count.
+        distance_m: (n,) m.
+        guess_rad_s: Frequency to start from, rad/s.
+    """
+    later = time_s >= 2.0
+    t, x = time_s[later] - 2.0, distance_m[later]
+
+    def waves(rate: float, omega: float) -> NDArray[np.float64]:
+        """(n, 6) rest, bias, fundamental and second harmonic."""
+        fade = np.exp(-rate * t)
+        harmonics = [f(k * omega * t) * fade for k in (1, 2) for f in (np.cos, np.sin)]
+        return np.column_stack([np.ones_like(t), fade, *harmonics])
+
+    def left(guess: NDArray[np.float64]) -> NDArray[np.float64]:
+        basis = waves(*guess)
+        weights = np.linalg.lstsq(basis, x)[0]
+        return np.asarray(basis @ weights - x) / np.ptp(x)
+
+    found = least_squares(
+        left, (0.15 * guess_rad_s, guess_rad_s), xtol=1e-14, ftol=1e-14
+    )
+    rate, omega = (float(value) for value in found.x)
+    natural = math.hypot(rate, omega)
+    return Oscillation(natural, rate / natural)

@@ -1,0 +1,1 @@
+"""The loop as equations: operating points, linear models, point masses."""

@@ -1,0 +1,227 @@
+"""The closed loop put together from its blocks, each linearised alone.
+
+The second route to the one-period matrix, beside AutoDiff through the whole
+diagram: it shares the blocks with it, and neither the wiring, nor the order of
+updates, nor the integration of the joined system.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import DiscreteTimeApproximation, SimulatorConfig
+
+from analysis.models.autodiff import seed, value_and_gradient
+from analysis.models.diagram_state import set_discrete_state
+from analysis.models.ideal_loop import IdealLoop
+from analysis.models.linear_models import LinearModel
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = ["block_model", "join_blocks", "sampled_blocks", "sampled_twin"]
+
+#: Appended to the name of a signal as it is after the updates of its tick.
+AFTER = "_after"
+
+
+def sampled_blocks(
+    loop: IdealLoop, state: NDArray[np.float64], time_s: float = 0.0
+) -> tuple[LinearModel, ...]:
+    """Every block with inputs, linearised alone.
+
+    A block that holds its output over the period feeds continuous ones with
+    what it is after the tick's updates: it has such outputs beside those that
+    the other blocks read at the tick, before them.
+
+    Args:
+        loop: The all-ideal build.
+        state: (n,) operating point, just before the updates of a tick.
+        time_s: Its time, s.
+    """
+    after = loop.period_map(state, time_s)
+    continuous = [role for role in loop.follower.blocks if _is_continuous(loop, role)]
+    held = {
+        port.get_name()
+        for role in continuous
+        for port in _ports(loop.block(role), "input")
+    }
+    models = []
+    for role, block in loop.follower.blocks.items():
+        if block.num_input_ports() == 0:
+            continue
+        flows = role in continuous
+        model = block_model(
+            sampled_twin(loop, role) if flows else loop.block(role, twin=True),
+            state[loop.indices(role)],
+            # What a continuous block reads is held from after the tick's updates.
+            _input_values(loop, role, after if flows else state, time_s),
+            ports=block,
+            time_s=time_s,
+            held=held,
+            read_after=flows,
+        )
+        names = tuple(loop.state_names[k] for k in loop.indices(role))
+        models.append(replace(model, name=role, state_names=names))
+    return tuple(models)
+
+
+def _is_continuous(loop: IdealLoop, role: str) -> bool:
+    context = loop.block(role).CreateDefaultContext()
+    return bool(context.num_continuous_states())
+
+
+def _ports(block: Any, kind: str) -> list[Any]:
+    if kind == "input":
+        return [block.get_input_port(k) for k in range(block.num_input_ports())]
+    return [block.get_output_port(k) for k in range(block.num_output_ports())]
+
+
+def _input_values(
+    loop: IdealLoop, role: str, state: NDArray[np.float64], time_s: float
+) -> list[NDArray[np.float64]]:
+    """What a block's input ports read in the diagram at a state."""
+    block = loop.block(role)
+    own = block.GetMyContextFromRoot(loop.context(state, time_s))
+    return [port.Eval(own).copy() for port in _ports(block, "input")]
+
+
+def block_model(
+    twin: Any,
+    state: NDArray[np.float64],
+    values: Sequence[NDArray[np.float64]],
+    *,
+    ports: Any = None,
+    time_s: float = 0.0,
+    held: Collection[str] = (),
+    read_after: bool = False,
+) -> LinearModel:
+    """One sampled block about an operating point, by its AutoDiff twin alone.
+
+    Args:
+        twin: The block as LeafSystem_[AutoDiffXd].
+        state: Its state, just before its update.
+        values: Of its input ports, in order.
+        ports: The block whose ports have the names to use, if not ``twin``.
+        time_s: The time, s.
+        held: Output ports that continuous blocks read, after the update.
+        read_after: Whether it reads such signals itself.
+    """
+    ports = ports or twin
+    count = len(state)
+    seeded = seed(np.concatenate([state, *values]))
+    context = _context(twin, time_s, seeded[:count])
+    start = count
+    for port, value in zip(_ports(twin, "input"), values, strict=True):
+        port.FixValue(context, seeded[start : start + len(value)])
+        start += len(value)
+    outputs = [port.Eval(context) for port in _ports(twin, "output")]
+    names = [name for port in _ports(ports, "output") for name in _elements(port)]
+    updated = np.empty(0)
+    if count:
+        changed = twin.EvalUniquePeriodicDiscreteUpdate(context)
+        groups = range(changed.num_groups())
+        updated = np.concatenate([changed.get_vector(k).CopyToVector() for k in groups])
+    later = _context(twin, time_s, updated)
+    for index, port in enumerate(_ports(ports, "output")):
+        if port.get_name() in held:
+            outputs.append(twin.get_output_port(index).Eval(later))
+            names += [f"{name}{AFTER}" for name in _elements(port)]
+    suffix = AFTER if read_after else ""
+    heard = [name for port in _ports(ports, "input") for name in _elements(port)]
+    _, by_all = value_and_gradient(updated, start)
+    _, read = value_and_gradient(np.concatenate(outputs), start)
+    return LinearModel(
+        name=ports.get_name(),
+        A=by_all[:, :count],
+        B=by_all[:, count:],
+        C=read[:, :count],
+        D=read[:, count:],
+        state_names=tuple(f"{ports.get_name()}.{k}" for k in range(count)),
+        input_names=tuple(f"{name}{suffix}" for name in heard),
+        output_names=tuple(names),
+        period_s=FRAME_PERIOD_S,
+    )
+
+
+def _context(block: Any, time_s: float, state: Any) -> Any:
+    context = block.CreateDefaultContext()
+    context.SetTime(time_s)
+    if len(state):
+        set_discrete_state(context, state)
+    return context
+
+
+def sampled_twin(loop: IdealLoop, role: str) -> Any:
+    """A continuous block's AutoDiff twin as a map of one period, made once."""
+    if role not in loop.sampled_twins:
+        integrator = loop.scenario.integrator
+        config = SimulatorConfig(
+            integration_scheme=integrator.scheme,
+            max_step_size=integrator.step_s,
+            use_error_control=False,
+        )
+        sampled = DiscreteTimeApproximation(loop.block(role), FRAME_PERIOD_S, config)
+        loop.sampled_twins[role] = sampled.ToAutoDiffXd()
+    return loop.sampled_twins[role]
+
+
+def _elements(port: Any) -> list[str]:
+    return [f"{port.get_name()}[{k}]" for k in range(port.size())]
+
+
+def join_blocks(
+    models: tuple[LinearModel, ...],
+    state_names: tuple[str, ...],
+    *,
+    name: str,
+    cut: tuple[str, ...] = (),
+    inputs: tuple[str, ...] = (),
+    outputs: tuple[str, ...] = (),
+) -> LinearModel:
+    """Joins the outputs to the inputs of the same name, by ``control``.
+
+    Args:
+        models: Linearised blocks.
+        state_names: The order of states to return.
+        name: Of the joined model.
+        cut: Signals whose wires are left open, to be fed from outside.
+        inputs: Signals to feed from outside.
+        outputs: Signals to return.
+    """
+    import control
+
+    heard = [signal for model in models for signal in model.input_names]
+    said = [signal for model in models for signal in model.output_names]
+    wires = np.zeros((len(heard), len(said)))
+    for row, signal in enumerate(heard):
+        if signal in said and signal not in cut:
+            wires[row, said.index(signal)] = 1.0
+    feed = np.array([[float(a == b) for b in inputs] for a in heard])
+    feed = feed.reshape(len(heard), len(inputs))
+    read = np.array([[float(a == b) for b in said] for a in outputs])
+    read = read.reshape(len(outputs), len(said))
+    apart = control.append(*(_stateful(model) for model in models))
+    joined = control.feedback(apart, control.ss([], [], [], wires), sign=1)
+    states = [state for model in models for state in model.state_names]
+    order = [states.index(state) for state in state_names]
+    A, B, C, D = (np.asarray(part) for part in control.ssdata(joined))
+    return LinearModel(
+        name=name,
+        A=A[np.ix_(order, order)],
+        B=B[order] @ feed,
+        C=read @ C[:, order],
+        D=read @ D @ feed,
+        state_names=state_names,
+        input_names=inputs,
+        output_names=outputs,
+        period_s=FRAME_PERIOD_S,
+    )
+
+
+def _stateful(model: LinearModel) -> Any:
+    import control
+
+    return control.ss(model.A, model.B, model.C, model.D, dt=FRAME_PERIOD_S)

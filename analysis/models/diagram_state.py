@@ -1,0 +1,111 @@
+"""A diagram's whole state as one vector, and runs that begin from it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import InitializeParams
+
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "Port",
+    "Runner",
+    "begin",
+    "get_state",
+    "run_periods",
+    "set_discrete_state",
+    "set_state",
+]
+
+#: A port of a block: (role in ``SoundFollower.blocks``, name of the port).
+Port = tuple[str, str]
+
+
+class Runner:
+    """A simulation whose state and cut inputs can be changed between steps.
+
+    It shares its context with other uses of the same loop: finish one first.
+
+    Args:
+        simulator: Its context is used.
+        fix: ``fix(context, port, value)`` sets what a cut input reads.
+        state: (n,) just before the updates of the tick at ``time_s``.
+        time_s: A multiple of the period, s.
+    """
+
+    def __init__(
+        self,
+        simulator: Any,
+        fix: Callable[[Any, Port, Any], None],
+        state: NDArray[np.float64],
+        time_s: float,
+    ) -> None:
+        self._simulator, self._fix = simulator, fix
+        self._context = simulator.get_mutable_context()
+        begin(simulator, state, time_s)
+
+    def fix(self, port: Port, value: NDArray[np.float64]) -> None:
+        """What a cut input reads from now on."""
+        self._fix(self._context, port, value)
+
+    def advance(self, time_s: float) -> None:
+        """Simulates until then; a tick at that moment is still to come."""
+        if time_s > self._context.get_time():
+            self._simulator.AdvanceTo(time_s)
+
+    def state(self) -> NDArray[np.float64]:
+        """(n,) now."""
+        return np.asarray(get_state(self._context), dtype=float)
+
+    def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
+        """Replaces elements of the state."""
+        state = self.state()
+        state[list(indices)] = values
+        set_state(self._context, state)
+
+
+def run_periods(simulator: Any, state: Any, time_s: float, periods: int) -> None:
+    """Simulates whole periods from a state, to just before the next tick."""
+    begin(simulator, state, time_s)
+    # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
+    simulator.AdvanceTo((round(time_s / FRAME_PERIOD_S) + periods) * FRAME_PERIOD_S)
+
+
+def begin(simulator: Any, state: Any, time_s: float) -> None:
+    """Puts a simulator just before the updates of the tick at ``time_s``."""
+    context = simulator.get_mutable_context()
+    context.SetTime(round(time_s / FRAME_PERIOD_S) * FRAME_PERIOD_S)
+    set_state(context, state)
+    quiet = InitializeParams()
+    quiet.suppress_initialization_events = True
+    simulator.Initialize(quiet)
+
+
+def set_state(context: Any, state: Any) -> None:
+    """Sets the whole state: continuous first, then the discrete groups."""
+    start = context.num_continuous_states()
+    context.SetContinuousState(state[:start])
+    set_discrete_state(context, state[start:])
+
+
+def set_discrete_state(context: Any, state: Any) -> None:
+    """Sets the discrete groups from one vector."""
+    start = 0
+    for group in range(context.num_discrete_state_groups()):
+        size = context.get_discrete_state(group).size()
+        context.SetDiscreteState(group, state[start : start + size])
+        start += size
+
+
+def get_state(context: Any) -> Any:
+    """(n,) the whole state, in the order of ``set_state``."""
+    groups = [
+        context.get_discrete_state(k).CopyToVector()
+        for k in range(context.num_discrete_state_groups())
+    ]
+    continuous = context.get_continuous_state_vector().CopyToVector()
+    return np.concatenate([continuous, *groups])

@@ -1,0 +1,157 @@
+"""The force on P at rest, from the controller and the ideal obstacle sensor."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.models.autodiff import seed, value_and_gradient
+from analysis.models.ideal_loop import IdealLoop
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = ["ForceField"]
+
+
+class ForceField:
+    """Force against position, of a robot at rest.
+
+    With exact sensing it does not depend on the heading. An obstacle's speed is
+    zero, as the controller has it where a body is seen for the first time.
+
+    Args:
+        loop: The all-ideal build.
+        time_s: The moment, s, of a scenario in which bodies move.
+
+    Raises:
+        InputError: A body moves, and no moment is given.
+    """
+
+    def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
+        scenario = loop.scenario
+        moving = [o.name for o in scenario.obstacles if o.path().moves]
+        moving += ["source"] if scenario.source.path().moves else []
+        if moving and time_s is None:
+            raise InputError(
+                f"{', '.join(moving)}",
+                "moves, and equilibria are of bodies at rest; "
+                "use frozen_scenario(scenario, time_s), or moving_equilibrium for a "
+                "source at constant velocity",
+            )
+        self.loop = loop
+        self._time_s = time_s or 0.0
+        self._pose_WS = np.array(scenario.source.path().pose(self._time_s))
+        self._contexts: dict[tuple[str, bool], Any] = {}
+
+    @property
+    def p_WS(self) -> NDArray[np.float64]:
+        """(2,) the source in W, m."""
+        return self._pose_WS[:2]
+
+    def force(self, p_WP: ArrayLike) -> NDArray[np.float64]:
+        """(2,) attraction and repulsion together, in W, N."""
+        forces = self._forces(np.asarray(p_WP, dtype=float), twin=False)
+        return np.asarray(forces[:2] + forces[2:], dtype=float)
+
+    def gradient(
+        self, p_WP: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Force (2,), N, and its derivative by position (2, 2), N/m."""
+        forces = self._forces(seed(p_WP), twin=True)
+        return value_and_gradient(forces[:2] + forces[2:], 2)
+
+    def damping(self, p_WP: ArrayLike) -> float:
+        """Minus the force's slope in the virtual mass's own speed, N s/m."""
+        self._forces(np.asarray(p_WP, dtype=float), twin=True)
+        block, context = self._controller(twin=True)
+        port = block.GetInputPort("v_WP")
+        port.FixValue(context, seed([0.0, 0.0]))
+        forces = block.GetOutputPort("forces_W").Eval(context)
+        port.FixValue(context, np.zeros(2))
+        _, slope = value_and_gradient(forces[:2] + forces[2:], 2)
+        return -float(slope[0, 0])
+
+    @cached_property
+    def reach_m(self) -> float:
+        """Beyond this distance no body is seen, m."""
+        return self.loop.scenario.ultrasonic.maximum_range_m
+
+    def law(self, distances: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(n,) repulsion of one body at rest at distances in m, N."""
+        block, context = self._controller(twin=False)
+        self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
+        port, read = (
+            block.GetInputPort("collision_vectors_B"),
+            block.GetOutputPort("forces_W"),
+        )
+        forces = np.zeros(len(distances))
+        for k, c in enumerate(distances):
+            if c <= self.reach_m:
+                port.FixValue(context, [c, 0.0, 0.0, 0.0, 0.0, 0.0])
+                forces[k] = -read.Eval(context)[2]
+        return forces
+
+    def approach_damping(self, distance: float, speed: float = 1e-4) -> float:
+        """Slope of the push in the speed of an obstacle that comes nearer, N s/m.
+
+        Args:
+            distance: Of the obstacle, m.
+            speed: Its speed for the difference, m/s.
+        """
+        block, context = self._controller(twin=False)
+        self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])
+        port = block.GetInputPort("collision_vectors_B")
+        port.FixValue(context, [distance, 0.0, 0.0, 0.0, 0.0, 0.0])
+        state = context.get_discrete_state(0).CopyToVector()
+        pushes = []
+        for earlier in (distance, distance + speed * FRAME_PERIOD_S):
+            seen = np.zeros(len(state))
+            seen[:2] = 1.0, earlier
+            context.SetDiscreteState(0, seen)
+            pushes.append(-block.GetOutputPort("forces_W").Eval(context)[2])
+        context.SetDiscreteState(0, state)
+        return float(pushes[1] - pushes[0]) / speed
+
+    def _controller(self, *, twin: bool) -> tuple[Any, Any]:
+        block, made = self.loop.block("controller", twin=twin), ("controller", twin)
+        if made not in self._contexts:
+            context = self._contexts[made] = block.CreateDefaultContext()
+            for name, value in (
+                ("p_WS_estimated", self.p_WS),
+                ("target_valid", [1.0]),
+                ("v_WP", [0.0, 0.0]),
+            ):
+                block.GetInputPort(name).FixValue(context, np.asarray(value))
+        return block, self._contexts[made]
+
+    def _sensor(self, *, twin: bool) -> tuple[Any, Any]:
+        block, made = self.loop.block("collision", twin=twin), ("collision", twin)
+        if made not in self._contexts:
+            context = self._contexts[made] = block.CreateDefaultContext()
+            block.GetInputPort("pose_WS").FixValue(context, self._pose_WS)
+            obstacles = self.loop.block("obstacles")
+            bodies = obstacles.CreateDefaultContext()
+            bodies.SetTime(self._time_s)
+            for name in ("poses_WO", "sizes"):
+                value = obstacles.GetOutputPort(name).Eval(bodies)
+                block.GetInputPort(name).FixValue(context, value)
+        return block, self._contexts[made]
+
+    def _see(self, block: Any, context: Any, pose: Any, features: Any) -> None:
+        block.GetInputPort("pose_WB_estimated").FixValue(context, pose)
+        block.GetInputPort("features").FixValue(context, np.asarray(features))
+
+    def _forces(self, p_WP: Any, *, twin: bool) -> Any:
+        offset = self.loop.scenario.robot.control_point_m
+        pose = np.array([p_WP[0] - offset, p_WP[1], 0.0 * p_WP[0]])
+        sensor, own = self._sensor(twin=twin)
+        sensor.GetInputPort("pose_WB").FixValue(own, pose)
+        features = sensor.GetOutputPort("features").Eval(own)
+        vectors = sensor.GetOutputPort("collision_vectors_B").Eval(own)
+        block, context = self._controller(twin=twin)
+        self._see(block, context, pose, features)
+        block.GetInputPort("collision_vectors_B").FixValue(context, vectors)
+        return block.GetOutputPort("forces_W").Eval(context).copy()

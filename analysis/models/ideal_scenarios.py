@@ -1,0 +1,117 @@
+"""Scenarios that have a linear model: exact sensors, bodies at rest."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from diagrams.scenario import Scenario
+from systems.base.diff_drive_plant import PlantParameters
+from systems.framework.input_error import InputError
+
+__all__ = [
+    "frozen_scenario",
+    "ideal_scenario",
+    "require_ideal",
+    "require_rolling",
+]
+
+_ALL_IDEAL: dict[str, Any] = {
+    "hearing": "ideal",
+    "obstacle_sensing": "ideal",
+    "ideal_hearing": {
+        "burst_gaps": False,
+        "bearing_noise_deg": 0.0,
+        "range_noise_fraction": 0.0,
+    },
+    "odometry": {"rounding": False},
+}
+
+
+def ideal_scenario(scenario: Scenario) -> Scenario:
+    """The same scenario with exact sensors and a sound that never stops.
+
+    Raises:
+        ValueError: Its wheels can slip.
+    """
+    require_rolling(scenario.plant)
+    return _updated(scenario, _ALL_IDEAL)
+
+
+def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
+    """The same scenario with source and obstacles at rest, where they are then.
+
+    Args:
+        scenario: Any scenario.
+        time_s: The moment, s.
+    """
+    x, y, theta = scenario.source.path().pose(time_s)
+    source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
+    obstacles = []
+    for obstacle in scenario.obstacles:
+        x, y, theta = obstacle.path().pose(time_s)
+        rest = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
+        obstacles.append(obstacle.model_dump() | rest)
+    return _updated(scenario, {"source": source, "obstacles": obstacles})
+
+
+def _updated(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    data = scenario.model_dump()
+    for key, value in changes.items():
+        data[key] = data[key] | value if isinstance(value, dict) else value
+    return Scenario.model_validate(data)
+
+
+def require_rolling(plant: PlantParameters) -> None:
+    """Raises what to do instead where the wheels can slip.
+
+    Raises:
+        InputError: ``plant.friction`` is set.
+    """
+    if plant.friction is not None:
+        raise InputError(
+            "plant.friction",
+            f"is {plant.friction:g}, and linear models are of wheels that roll; set "
+            "plant.friction to null, which below the limit of friction is the same "
+            "motion",
+        )
+
+
+def require_ideal(scenario: Scenario) -> None:
+    """Raises what to do instead where a scenario has no linear model.
+
+    Raises:
+        InputError: Some block has no derivative.
+    """
+    require_rolling(scenario.plant)
+    hearing = scenario.ideal_hearing
+    checks = (
+        (
+            scenario.hearing == "ideal",
+            "hearing",
+            "'audio' has no linear model, for a waveform has no equilibrium",
+        ),
+        (
+            scenario.obstacle_sensing == "ideal",
+            "obstacle_sensing",
+            "'ultrasonic' has no linear model, for cones jump",
+        ),
+        (
+            not scenario.odometry.rounding,
+            "odometry.rounding",
+            "a rounded wheel angle has no derivative",
+        ),
+        (
+            hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
+            "ideal_hearing",
+            "noise has no derivative",
+        ),
+    )
+    for holds, field, reason in checks:
+        if not holds:
+            raise InputError(
+                field,
+                f"{reason}; linearise ideal_scenario(scenario), which differs in "
+                "sensing alone",
+            )

@@ -1,0 +1,281 @@
+"""Linear models of the closed loop at an operating point, by two routes.
+
+Sampled: AutoDiff through one whole period of the built diagram, and the blocks
+linearised one by one and joined by ``control``. Continuous: the same blocks in
+the limit of a period that goes to zero.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.models.autodiff import seed, value_and_gradient
+from analysis.models.block_models import join_blocks, sampled_blocks
+from analysis.models.ideal_loop import Port
+from analysis.models.linear_models import LinearModel, simple_poles
+from analysis.models.operating_points import OperatingPoint
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "GradientCheck",
+    "RouteComparison",
+    "blockwise_model",
+    "check_gradient",
+    "compare_routes",
+    "continuous_model",
+    "plant_derivatives",
+    "sampled_model",
+]
+
+_SOURCE: tuple[Port, ...] = (("hearing", "pose_WS"), ("collision", "pose_WS"))
+_INPUTS = ("p_WS_x", "p_WS_y", "theta_WS")
+_OUTPUTS = (
+    "p_WP_x", "p_WP_y", "theta_WB", "p_PS_B_x", "p_PS_B_y",
+    "acceleration_W_x", "acceleration_W_y",
+)  # fmt: skip
+_READ: tuple[Port, ...] = (
+    ("plant", "pose_WB"),
+    ("hearing", "p_PS_B"),
+    ("controller", "acceleration_W"),
+)
+
+
+def sampled_model(point: OperatingPoint) -> LinearModel:
+    """The closed loop over 25 ms, by AutoDiff of one period of the diagram.
+
+    Inputs: pose of the source at the tick. Outputs, at the tick before its
+    updates: position of P, heading, what hearing says, and the law's
+    acceleration. All states of the diagram.
+    """
+    loop = point.loop
+    found = loop.period_derivatives(
+        point.state,
+        point.time_s,
+        inputs={_SOURCE: loop.scenario.source.path().pose(point.time_s)},
+        outputs=_READ,
+    )
+    to_P = _control_point(point)
+    return LinearModel(
+        name="closed loop",
+        A=found.A,
+        B=found.B,
+        C=to_P @ found.C,
+        D=to_P @ found.D,
+        state_names=loop.state_names,
+        input_names=_INPUTS,
+        output_names=_OUTPUTS,
+        period_s=FRAME_PERIOD_S,
+    )
+
+
+def blockwise_model(point: OperatingPoint) -> LinearModel:
+    """The same from blocks that are linearised alone and joined by ``control``."""
+    loop = point.loop
+    joined = join_blocks(
+        sampled_blocks(loop, point.state, point.time_s),
+        loop.state_names,
+        name="closed loop, from blocks",
+        inputs=tuple(f"pose_WS[{k}]" for k in range(3)),
+        outputs=tuple(
+            f"{name}[{k}]"
+            for role, name in _READ
+            for k in range(loop.block(role).GetOutputPort(name).size())
+        ),
+    )
+    to_P = _control_point(point)
+    return LinearModel(
+        name=joined.name,
+        A=joined.A,
+        B=joined.B,
+        C=to_P @ joined.C,
+        D=to_P @ joined.D,
+        state_names=joined.state_names,
+        input_names=_INPUTS,
+        output_names=_OUTPUTS,
+        period_s=joined.period_s,
+    )
+
+
+def _control_point(point: OperatingPoint) -> NDArray[np.float64]:
+    """(7, 7) from pose_WB and what follows to p_WP and what follows."""
+    epsilon = point.loop.scenario.robot.control_point_m
+    matrix = np.eye(len(_OUTPUTS))
+    matrix[0, 2] = -epsilon * math.sin(point.theta_WB)
+    matrix[1, 2] = epsilon * math.cos(point.theta_WB)
+    return matrix
+
+
+@dataclass(frozen=True)
+class RouteComparison:
+    """How far the two routes to the sampled model are apart."""
+
+    matrix_difference: float
+    """Largest difference of an element of A, B, C or D."""
+    pole_difference: float
+    """Largest distance of a simple nonzero pole to the other route's nearest."""
+    simple_poles: NDArray[np.complex128]
+    """Poles in the z plane that were compared."""
+    states: int
+    """Number of states."""
+
+
+def compare_routes(point: OperatingPoint) -> RouteComparison:
+    """AutoDiff of a whole period against blocks joined by ``control``."""
+    whole, joined = sampled_model(point), blockwise_model(point)
+    pairs = [(getattr(whole, m), getattr(joined, m)) for m in ("A", "B", "C", "D")]
+    poles = simple_poles(whole.poles)
+    apart = [float(np.abs(joined.poles - pole).min()) for pole in poles]
+    return RouteComparison(
+        matrix_difference=max(float(np.abs(a - b).max()) for a, b in pairs),
+        pole_difference=max(apart, default=0.0),
+        simple_poles=poles,
+        states=len(whole.A),
+    )
+
+
+@dataclass(frozen=True)
+class GradientCheck:
+    """AutoDiff against finite differences of the period map."""
+
+    step: float
+    """Step in each state, in its SI unit."""
+    largest_difference: float
+    """Between AutoDiff and central differences, over all elements of A."""
+    largest_at: tuple[str, str]
+    """Names of the state that changed and of the one that was stepped."""
+    kink: float
+    """Largest difference of the two one-sided slopes: where it does not vanish
+    the loop has a corner, as where an obstacle's speed is the norm |dC/dt|."""
+    kink_at: tuple[str, str]
+    """As ``largest_at``."""
+
+
+def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
+    """Compares A with differences of the float diagram, state by state.
+
+    The tracker's covariances are left out: they are zero where hearing is
+    exact, and a step would make them negative on one side.
+    """
+    loop, state, time_s = point.loop, point.state, point.time_s
+    A = loop.period_derivatives(state, time_s).A
+    names = loop.state_names
+    columns = [k for k, name in enumerate(names) if _can_step(name)]
+    here = loop.period_map(state, time_s)
+    central, corner = np.zeros((2, len(A), len(columns)))
+    for column, k in enumerate(columns):
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = state.copy()
+            moved[k] += sign * step
+            sides.append(sign * (loop.period_map(moved, time_s) - here) / step)
+        central[:, column] = (sides[0] + sides[1]) / 2.0 - A[:, k]
+        corner[:, column] = sides[0] - sides[1]
+
+    def worst(array: NDArray[np.float64]) -> tuple[float, tuple[str, str]]:
+        row, column = np.unravel_index(np.abs(array).argmax(), array.shape)
+        found = float(abs(array[row, column]))
+        return found, (names[int(row)], names[columns[int(column)]])
+
+    largest, at = worst(central)
+    kink, kink_at = worst(corner)
+    return GradientCheck(step, largest, at, kink, kink_at)
+
+
+def _can_step(name: str) -> bool:
+    """Whether a small step of a state to either side leaves the map as it is."""
+    role, _, element = name.partition(".")
+    if role == "controller":
+        return "feature" not in element
+    return role != "tracker" or "pose" in element
+
+
+def continuous_model(point: OperatingPoint) -> LinearModel:
+    """The closed loop in continuous time: no sampling, no tick of latency.
+
+    States: pose and wheel speeds of the plant, velocity of the virtual mass.
+    Inputs: position of the source, m, and a push on the virtual mass, m/s^2.
+    Outputs: position of P, m, and heading, rad. The blocks are the sampled
+    ones; odometry and hearing are exact and at once in this limit, and the
+    virtual mass integrates.
+    """
+    loop = point.loop
+    models = sampled_blocks(loop, point.state, point.time_s)
+    sensor, controller, command = (
+        next(model for model in models if model.name == role)
+        for role in ("collision", "controller", "command")
+    )
+    A_plant, B_plant = plant_derivatives(point)
+    moving = [0, 1, 2, 5, 6]  # the wheels' angles move nothing
+    A_plant, B_plant = A_plant[np.ix_(moving, moving)], B_plant[moving]
+    seen = _signals(controller, "output", "acceleration_W")
+    by = {
+        name: controller.D[np.ix_(seen, _signals(controller, "input", name))]
+        for name in (
+            "p_WS_estimated",
+            "pose_WB_estimated",
+            "v_WP",
+            "collision_vectors_B",
+        )
+    }
+    vectors = _signals(sensor, "output", "collision_vectors_B")
+    of = {
+        name: sensor.D[np.ix_(vectors, _signals(sensor, "input", name))]
+        for name in ("pose_WB", "pose_WS")
+    }
+    poses = _signals(command, "input", "pose_WB_estimated")
+    wheels_v, wheels_pose = command.A[2:, :2], command.B[np.ix_([2, 3], poses)]
+    by_pose = by["pose_WB_estimated"] + by["collision_vectors_B"] @ of["pose_WB"]
+    by_source = (
+        by["p_WS_estimated"] + (by["collision_vectors_B"] @ of["pose_WS"])[:, :2]
+    )
+    A = np.zeros((7, 7))
+    A[:5, :5] = A_plant
+    A[:5, :3] += B_plant @ wheels_pose
+    A[:5, 5:] = B_plant @ wheels_v
+    A[5:, :3], A[5:, 5:] = by_pose, by["v_WP"]
+    B = np.zeros((7, 4))
+    B[5:, :2], B[5:, 2:] = by_source, np.eye(2)
+    C = np.zeros((3, 7))
+    C[:, :3] = _control_point(point)[:3, :3]
+    return LinearModel(
+        name="closed loop, continuous",
+        A=A,
+        B=B,
+        C=C,
+        D=np.zeros((3, 4)),
+        state_names=(
+            "plant.x", "plant.y", "plant.theta", "plant.speed_left",
+            "plant.speed_right", "command.v_WP_x", "command.v_WP_y",
+        ),
+        input_names=("p_WS_x", "p_WS_y", "push_x", "push_y"),
+        output_names=("p_WP_x", "p_WP_y", "theta_WB"),
+    )  # fmt: skip
+
+
+def _signals(model: LinearModel, kind: str, port: str) -> list[int]:
+    names = model.input_names if kind == "input" else model.output_names
+    return [k for k, name in enumerate(names) if name.partition("[")[0] == port]
+
+
+def plant_derivatives(
+    point: OperatingPoint,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A (7, 7) and B (7, 2) of the plant in continuous time.
+
+    They do not change along the operating point: it rests or goes straight.
+    """
+    loop = point.loop
+    plant = loop.block("plant", twin=True)
+    context = plant.CreateDefaultContext()
+    state = point.state[loop.indices("plant")]
+    command = loop.indices("command")
+    seeded = seed(np.concatenate([state, point.state[command[2:]]]))
+    context.SetContinuousState(seeded[: len(state)])
+    plant.GetInputPort("wheel_speeds").FixValue(context, seeded[len(state) :])
+    rates = plant.EvalTimeDerivatives(context).CopyToVector()
+    _, slope = value_and_gradient(rates, len(seeded))
+    return slope[:, : len(state)], slope[:, len(state) :]

@@ -1,0 +1,84 @@
+"""Linear models as files that other programs read."""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.io import savemat
+
+from analysis.models.linear_models import LinearModel
+from systems.framework.input_error import InputError
+
+__all__ = ["write_models"]
+
+
+def write_models(models: Sequence[LinearModel], directory: Path) -> None:
+    """Writes ``models.mat`` and ``models/NAME_A.csv``, ``_B``, ``_C``, ``_D``.
+
+    In the .mat file each model is a struct with the fields A, B, C, D, Ts (s; 0
+    where time is continuous, as in MATLAB's ``ss``), StateName, InputName and
+    OutputName. A .csv file has the names of its columns in the first row and
+    those of its rows in the first column.
+
+    Args:
+        models: With names that differ.
+        directory: Exists.
+
+    Raises:
+        InputError: Two models have one name.
+    """
+    names = [_identifier(model.name) for model in models]
+    if len(set(names)) < len(names):
+        raise InputError("models", f"names {names} are not unique; rename one")
+    structs = {name: _struct(model) for name, model in zip(names, models, strict=True)}
+    savemat(directory / "models.mat", structs, long_field_names=True)
+    folder = directory / "models"
+    folder.mkdir()
+    for name, model in zip(names, models, strict=True):
+        x, u, y = model.state_names, model.input_names, model.output_names
+        for matrix, values, row_names, columns in (
+            ("A", model.A, x, x),
+            ("B", model.B, x, u),
+            ("C", model.C, y, x),
+            ("D", model.D, y, u),
+        ):
+            _write_csv(folder / f"{name}_{matrix}.csv", values, row_names, columns)
+
+
+def _identifier(name: str) -> str:
+    """A name that MATLAB takes for a variable's."""
+    return re.sub(r"\W+", "_", name).strip("_")
+
+
+def _struct(model: LinearModel) -> dict[str, object]:
+    def cells(names: Sequence[str]) -> NDArray[np.object_]:
+        return np.array(names, dtype=object).reshape(-1, 1)
+
+    return {
+        "A": model.A,
+        "B": model.B,
+        "C": model.C,
+        "D": model.D,
+        "Ts": model.period_s or 0.0,
+        "StateName": cells(model.state_names),
+        "InputName": cells(model.input_names),
+        "OutputName": cells(model.output_names),
+    }
+
+
+def _write_csv(
+    path: Path,
+    values: NDArray[np.float64],
+    row_names: Sequence[str],
+    columns: Sequence[str],
+) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["", *columns])
+        for name, row in zip(row_names, values, strict=True):
+            writer.writerow([name, *(repr(float(x)) for x in row)])

@@ -1,0 +1,202 @@
+"""The loop cut open where it can be disturbed: at a sensor or an actuator.
+
+Loop transfer functions are in the convention of negative feedback: the closed
+loop has the poles of 1 + L = 0.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.models.force_field import ForceField
+from analysis.models.ideal_loop import Port, ideal_loop, ideal_scenario
+from analysis.models.linear_models import LinearModel
+from analysis.models.model_reduction import minimal_model
+from analysis.models.operating_points import OperatingPoint
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "BREAK_POINTS",
+    "DIRECTIONS",
+    "BreakPoint",
+    "Direction",
+    "closed",
+    "cut_model",
+    "open_loop",
+    "target_loop",
+]
+
+BreakPoint = Literal["sensor", "actuator", "wheels"]
+Direction = Literal["along", "across"]
+
+#: Where the loop can be cut: at what hearing says of the source, at the law's
+#: acceleration, at the commanded wheel speeds.
+BREAK_POINTS: tuple[BreakPoint, ...] = ("sensor", "actuator", "wheels")
+#: Along the line from P to the source, and across it.
+DIRECTIONS: tuple[Direction, ...] = ("along", "across")
+
+#: The input port that is fed from outside, and the output port that fed it.
+_WIRES: dict[BreakPoint, tuple[Port, Port]] = {
+    "sensor": (("tracker", "p_PS_B"), ("hearing", "p_PS_B")),
+    "actuator": (("command", "acceleration_W"), ("controller", "acceleration_W")),
+    "wheels": (("plant", "wheel_speeds"), ("command", "wheel_speeds")),
+}
+
+
+def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
+    """The sampled loop with wires cut: from what is fed in to what arrives.
+
+    Inputs ``<place>_<direction>`` replace the signals, outputs of the same
+    names are the signals as their sources have them. The heading at the
+    operating point is towards the source, so that along is ahead.
+
+    Args:
+        point: The operating point.
+        *places: Wires to cut; none gives the closed loop.
+    """
+    loop = point.loop
+    now = loop.context(point.state, point.time_s)
+    values: dict[tuple[Port, ...], Any] = {}
+    for place in places:
+        (role, name), _ = _WIRES[place]
+        block = loop.block(role)
+        own = block.GetMyContextFromRoot(now)
+        values[((role, name),)] = block.GetInputPort(name).Eval(own).copy()
+    after = loop.period_map(point.state, point.time_s)
+    wheels = [loop.state_names.index(f"command.wheel_{s}") for s in ("left", "right")]
+    if "wheels" in places:
+        values[(_WIRES["wheels"][0],)] = after[wheels]
+    found = loop.period_derivatives(
+        point.state,
+        point.time_s,
+        inputs=values,
+        outputs=[_WIRES[place][1] for place in places if place != "wheels"],
+    )
+    C, D = found.C, found.D
+    if "wheels" in places:
+        # The wheels hold what the command is after the tick's updates.
+        at = 2 * places.index("wheels")
+        C = np.insert(C, [at, at], found.A[wheels], axis=0)
+        D = np.insert(D, [at, at], found.B[wheels], axis=0)
+    turn = np.zeros((2 * len(places), 2 * len(places)))
+    for k, place in enumerate(places):
+        turn[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = _axes(point, place)
+    names = tuple(f"{place}_{way}" for place in places for way in DIRECTIONS)
+    return LinearModel(
+        name=f"loop cut at {' and '.join(places) or 'nothing'}",
+        A=found.A,
+        B=found.B @ turn.T,
+        C=turn @ C,
+        D=turn @ D @ turn.T,
+        state_names=loop.state_names,
+        input_names=names,
+        output_names=names,
+        period_s=FRAME_PERIOD_S,
+    )
+
+
+def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
+    """(2, 2) rows: what is along and what is across, of a signal's two values."""
+    if place == "wheels":
+        return np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
+    if place == "sensor":
+        return np.eye(2)
+    c, s = math.cos(point.theta_WB), math.sin(point.theta_WB)
+    return np.array([[c, s], [-s, c]])
+
+
+def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
+    """Wires joined again; what enters is added to them.
+
+    Args:
+        model: Cut at ``signals`` at least.
+        signals: Names of inputs, and of outputs that feed them again.
+    """
+    into = [model.input_names.index(name) for name in signals]
+    out = [model.output_names.index(name) for name in signals]
+    gain = np.linalg.inv(np.eye(len(signals)) - model.D[np.ix_(out, into)])
+    back = gain @ model.C[out]
+    through = np.eye(len(model.input_names))
+    through[into] = gain @ (model.D[out] + np.eye(len(model.input_names))[into])
+    through[np.ix_(into, into)] = gain
+    return replace(
+        model,
+        A=model.A + model.B[:, into] @ back,
+        B=model.B @ through,
+        C=model.C + model.D[:, into] @ back,
+        D=model.D @ through,
+    )
+
+
+def open_loop(
+    point: OperatingPoint,
+    at: BreakPoint = "sensor",
+    direction: Direction = "along",
+) -> LinearModel:
+    """L of one direction, sampled; the other direction stays closed.
+
+    Args:
+        point: The operating point.
+        at: Where the loop is cut.
+        direction: Which of the two signals.
+    """
+    whole = cut_model(point, at)
+    own = f"{at}_{direction}"
+    (other,) = [name for name in whole.input_names if name != own]
+    part = closed(whole, (other,)).part([own], [own])
+    part = minimal_model(replace(part, C=-part.C, D=-part.D))
+    return replace(part, name=f"L at the {at}, {direction}")
+
+
+def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
+    """L of the ideal target loop: no obstacle, no lag, no sampling.
+
+    A point mass with the attraction's spring and damper along the line to a
+    source at rest; both slopes are the controller's own. Cut at the sensor the
+    damper stays closed; at the actuator both are cut.
+
+    Raises:
+        InputError: There is no spring, hence no target loop.
+    """
+    if scenario.attraction.stiffness_n_m == 0.0:
+        raise InputError(
+            "attraction.stiffness_n_m",
+            "is 0, and without a spring there is no loop to the target; set it above 0",
+        )
+    stiffness, damping = _attraction_slopes(scenario)
+    mass = scenario.robot.mass_kg
+    A = np.array([[0.0, 1.0], [0.0, 0.0]])
+    C = np.array([[stiffness, 0.0]]) / mass
+    if at == "sensor":
+        A[1, 1] = -damping / mass
+    else:
+        C[0, 1] = damping / mass
+    return LinearModel(
+        name=f"ideal target loop, L at the {at}",
+        A=A,
+        B=np.array([[0.0], [1.0]]),
+        C=C,
+        D=np.zeros((1, 1)),
+        state_names=("p_WP", "v_WP"),
+        input_names=("acceleration",),
+        output_names=("acceleration",),
+    )
+
+
+def _attraction_slopes(scenario: Scenario) -> tuple[float, float]:
+    """Stiffness, N/m, and damping, N s/m, towards a lone source at rest."""
+    data = ideal_scenario(scenario).model_dump()
+    data |= {"law": "none", "obstacles": []}
+    data["source"] |= {"waypoints_m": [[0.0, 0.0]]}
+    distance = scenario.attraction.follow_distance_m + 2.0
+    data["start"] = {"position_m": [-distance, 0.0], "heading_deg": 0.0}
+    field = ForceField(ideal_loop(Scenario.model_validate(data)))
+    place = [-distance, 0.0]
+    return -float(field.gradient(place)[1][0, 0]), field.damping(place)

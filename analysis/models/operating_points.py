@@ -1,0 +1,325 @@
+"""Operating points: equilibria of the closed loop, at rest and following.
+
+At rest the heading can be anything: equilibria are continua with one pole at
+z = 1, which the models here leave out by looking at the motion of P alone.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root_scalar
+
+from analysis.models.force_field import ForceField
+from analysis.models.ideal_loop import IdealLoop, ideal_loop, ideal_scenario
+from analysis.models.linear_models import LinearModel, Mode
+from analysis.models.model_reduction import minimal_model
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.world.geometry import control_point, nearest_point_on_rectangle
+
+__all__ = [
+    "NO_FORCE_N",
+    "OperatingPoint",
+    "motion_model",
+    "moving_equilibrium",
+    "resting_equilibrium",
+]
+
+Kind = Literal["sink", "saddle", "source"]
+
+#: Force that counts as none, N.
+NO_FORCE_N = 1e-9
+#: A stiffness below this share of the largest is that of a continuum.
+FLAT = 1e-6
+#: Poles nearer to z = 1 than this are neutral.
+_NEUTRAL = 1e-7
+#: By then the source has started, and drives straight on to rounding errors, s.
+_STEADY_S = 20.0
+
+
+@dataclass(frozen=True)
+class OperatingPoint:
+    """An equilibrium, at rest or at the source's constant velocity."""
+
+    loop: IdealLoop = field(repr=False)
+    """The all-ideal build that it belongs to."""
+    p_WP: NDArray[np.float64]
+    """(2,) m; of a moving one at ``time_s``."""
+    theta_WB: float
+    """Heading, rad: towards the source; any other is an equilibrium too at rest."""
+    v_WS: NDArray[np.float64]
+    """(2,) velocity of source and robot, m/s."""
+    force_n: float
+    """Force that is left, N."""
+    stiffness_n_m: NDArray[np.float64]
+    """(2, 2) minus the force's derivative by position, N/m."""
+    state: NDArray[np.float64] = field(repr=False)
+    """(n,) of the diagram, just before the updates of a tick."""
+    time_s: float
+    """Time of that tick, s."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether it is the state of following a moving source."""
+        return bool(np.any(self.v_WS))
+
+    @property
+    def p_WS(self) -> NDArray[np.float64]:
+        """(2,) source at ``time_s``, m."""
+        return np.array(self.loop.scenario.source.path().pose(self.time_s)[:2])
+
+    @property
+    def source_distance_m(self) -> float:
+        """Between P and the source, m."""
+        return float(np.linalg.norm(self.p_WS - self.p_WP))
+
+    @property
+    def offset_m(self) -> float:
+        """How much farther from the source than ``follow_distance_m``, m."""
+        return self.source_distance_m - self.loop.scenario.attraction.follow_distance_m
+
+    @property
+    def continuum(self) -> bool:
+        """Whether P is free to move along a curve, as round the source."""
+        sizes = np.abs(np.linalg.eigvals(self.stiffness_n_m))
+        return bool(sizes.min() < FLAT * max(sizes.max(), 1.0)) and not self.moves
+
+    @cached_property
+    def motion(self) -> LinearModel:
+        """The sampled closed loop as far as P's motion shows it.
+
+        Inputs: a kick to the velocity of the virtual mass, m/s. Outputs:
+        position of P, m; and the heading, rad, where the robot moves.
+        """
+        A = self.loop.period_derivatives(self.state, self.time_s).A
+        return motion_model(self, A, FRAME_PERIOD_S)
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """Modes of the motion, slowest first, without the neutral ones."""
+        return tuple(
+            mode
+            for mode in self.motion.modes
+            if mode.z is not None and abs(mode.z - 1.0) > _NEUTRAL
+        )
+
+    @property
+    def eigenvalues(self) -> NDArray[np.complex128]:
+        """Poles of the motion in the s plane, ln(z)/T, rad/s; no neutral ones."""
+        poles = self.motion.poles
+        poles = poles[(np.abs(poles - 1.0) > _NEUTRAL) & (np.abs(poles) > 1e-6)]
+        return np.asarray(np.log(poles) / FRAME_PERIOD_S, dtype=complex)
+
+    @property
+    def stable(self) -> bool:
+        """Whether every motion about it decays, neutral ones apart."""
+        return bool((self.eigenvalues.real < 0.0).all())
+
+    @property
+    def kind(self) -> Kind:
+        """By the number of directions in which P goes away from it.
+
+        A growing oscillation counts as one direction, as does a growing
+        exponential.
+        """
+        growing = self.eigenvalues[self.eigenvalues.real >= 0.0]
+        directions = int(np.sum(growing.imag >= -1e-9))
+        kinds: tuple[Kind, ...] = ("sink", "saddle", "source")
+        return kinds[min(directions, 2)]
+
+    @property
+    def clearance_m(self) -> float:
+        """From P to the nearest body, m."""
+        return min(distance for _, distance in self._distances())
+
+    @property
+    def nearest_body(self) -> str:
+        """Name of the nearest body."""
+        return min(self._distances(), key=lambda item: item[1])[0]
+
+    def _distances(self) -> list[tuple[str, float]]:
+        return [
+            (
+                name,
+                math.hypot(
+                    *nearest_point_on_rectangle(
+                        self.p_WP, body.rectangle(self.time_s).tolist()
+                    )
+                ),
+            )
+            for name, body in self.loop.scenario.bodies().items()
+        ]
+
+
+def motion_model(
+    point: OperatingPoint, A: NDArray[np.float64], period_s: float
+) -> LinearModel:
+    """What a matrix of the whole state says of P's motion.
+
+    Args:
+        point: The operating point.
+        A: (n, n) map of the whole state over a period.
+        period_s: The period, s.
+
+    Returns:
+        A model with as few states as the motion has; see
+        ``OperatingPoint.motion`` for its signals.
+    """
+    names = point.loop.state_names
+    kick = [names.index(f"command.v_WP_{axis}") for axis in "xy"]
+    x, y, theta = (names.index(f"plant.{name}") for name in ("x", "y", "theta"))
+    epsilon = point.loop.scenario.robot.control_point_m
+    C = np.zeros((3, len(A)))
+    C[0, x] = C[1, y] = C[2, theta] = 1.0
+    C[0, theta] = -epsilon * math.sin(point.theta_WB)
+    C[1, theta] = epsilon * math.cos(point.theta_WB)
+    shown = 3 if point.moves else 2
+    whole = LinearModel(
+        name="motion of P",
+        A=A,
+        B=np.eye(len(A))[:, kick],
+        C=C[:shown],
+        D=np.zeros((shown, 2)),
+        state_names=names,
+        input_names=("kick_x", "kick_y"),
+        output_names=("p_WP_x", "p_WP_y", "theta_WB")[:shown],
+        period_s=period_s,
+    )
+    return minimal_model(whole)
+
+
+def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
+    """The state of rest with P at a place where no force acts.
+
+    Raises:
+        InputError: A force acts there, or a body moves.
+    """
+    field_ = ForceField(loop)
+    force, slope = field_.gradient(p_WP)
+    left = float(np.linalg.norm(force))
+    if left > NO_FORCE_N:
+        raise InputError(
+            "p_WP",
+            f"at ({p_WP[0]:g}, {p_WP[1]:g}) a force of {left:.3g} N acts, and "
+            "there is no equilibrium; take one from find_equilibria(scenario).points",
+        )
+    to_source = field_.p_WS - p_WP
+    theta = math.atan2(to_source[1], to_source[0])
+    x, y = control_point((*p_WP, theta), -loop.scenario.robot.control_point_m)
+    state, time_s = loop.settled_state((x, y, theta))
+    return OperatingPoint(
+        loop=loop,
+        p_WP=np.asarray(p_WP, dtype=float),
+        theta_WB=theta,
+        v_WS=np.zeros(2),
+        force_n=left,
+        stiffness_n_m=-slope,
+        state=state,
+        time_s=time_s,
+    )
+
+
+def moving_equilibrium(
+    scenario: Scenario, velocity_W: tuple[float, float] | None = None
+) -> OperatingPoint:
+    """Following a source that moves on and on at a constant velocity.
+
+    Obstacles are left out: none moves along. The robot follows behind the
+    source on its line, heading as it drives.
+
+    Args:
+        scenario: Its sensors are taken to be ideal.
+        velocity_W: Of the source, m/s; by default ``source.speed_m_s`` along x.
+
+    Raises:
+        InputError: The source is too fast or at rest, or no distance balances.
+    """
+    vx, vy = velocity_W or (scenario.source.speed_m_s, 0.0)
+    speed, top = math.hypot(vx, vy), scenario.robot.top_speed_m_s
+    if not 0.0 < speed < top:
+        raise InputError(
+            "velocity_W",
+            f"a source at {speed:g} m/s cannot be followed steadily; give "
+            f"a speed above 0 and below robot.top_speed_m_s = {top:g} m/s",
+        )
+    loop = ideal_loop(_steady_scenario(scenario, vx, vy))
+    attraction = loop.scenario.attraction
+    heading = np.array([vx, vy]) / speed
+    theta = math.atan2(vy, vx)
+    epsilon = loop.scenario.robot.control_point_m
+
+    p_WS = np.array(loop.scenario.source.path().pose(_STEADY_S)[:2])
+
+    def settled(distance: float) -> tuple[NDArray[np.float64], float]:
+        place = p_WS - (distance + epsilon) * heading
+        pose = (place[0], place[1], theta)
+        return loop.settled_state(pose, (vx, vy), _STEADY_S)
+
+    def pull(distance: float) -> float:
+        """Acceleration along the line, m/s^2."""
+        state, time_s = settled(distance)
+        read = [("controller", "acceleration_W")]
+        return float(loop.period_derivatives(state, time_s, outputs=read).y @ heading)
+
+    guess = attraction.follow_distance_m
+    if attraction.stiffness_n_m > 0.0:
+        guess += attraction.damping_n_s_m * speed / attraction.stiffness_n_m
+    try:
+        found = root_scalar(pull, x0=guess, x1=guess + 0.05, xtol=1e-14)
+    except (ArithmeticError, InputError):
+        found = None
+    if found is None or not found.converged or abs(pull(found.root)) > 1e-9:
+        raise InputError(
+            "velocity_W",
+            f"no distance behind a source at {speed:g} m/s balances the "
+            "forces; lower repulsion, or raise attraction.stiffness_n_m",
+        )
+    state, time_s = settled(found.root)
+    return _moving_point(loop, state, time_s, (vx, vy), theta)
+
+
+def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
+    """Ideal, without obstacles, the source driving 900 m from the origin."""
+    speed = math.hypot(vx, vy)
+    data = ideal_scenario(scenario).model_dump()
+    data["obstacles"] = []
+    data["source"] |= {
+        "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],
+        "speed_m_s": speed,
+        "top_speed_m_s": 2.0 * speed + 1.0,
+        "start_time_s": 0.0,
+        "at_end": "stop",
+    }
+    data["start"] = {"position_m": [-5.0 * vx, -5.0 * vy - 5.0], "heading_deg": 0.0}
+    return Scenario.model_validate(data)
+
+
+def _moving_point(
+    loop: IdealLoop,
+    state: NDArray[np.float64],
+    time_s: float,
+    velocity: tuple[float, float],
+    theta: float,
+) -> OperatingPoint:
+    read = [("controller", "acceleration_W")]
+    found = loop.period_derivatives(state, time_s, outputs=read)
+    pose = state[loop.indices("plant")[:3]]
+    p_WP = np.array(control_point(pose.tolist(), loop.scenario.robot.control_point_m))
+    mass = loop.scenario.robot.mass_kg
+    return OperatingPoint(
+        loop=loop,
+        p_WP=p_WP,
+        theta_WB=theta,
+        v_WS=np.array(velocity),
+        force_n=float(np.linalg.norm(found.y)) * mass,
+        stiffness_n_m=-ForceField(loop, time_s).gradient(p_WP)[1],
+        state=state,
+        time_s=time_s,
+    )

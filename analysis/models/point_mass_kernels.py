@@ -1,0 +1,251 @@
+"""Compiled loops of the point-mass model of ``analysis.models.point_mass``.
+
+Bodies are rows (x, y, cos, sin, half length, half width); gains are (K_r, D_r,
+d_f, M, top speed, whether all bodies push, number of the velocity term); tables
+are those of ``RadialLaw``: forces, energies and increments.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
+
+__all__ = ["distances", "forces", "run", "trajectory"]
+
+_Array = NDArray[np.float64]
+_State = tuple[float, float, float, float]
+_Vector = tuple[float, float, float, bool]
+_Gains = tuple[float, ...]
+_Tables = tuple[_Array, _Array, _Array]
+
+#: A step across which the nearest body changes is done in so many parts.
+_SWITCH_PARTS = 32
+
+
+@njit(cache=True)
+def _nearest(
+    x: float, y: float, body: _Array
+) -> tuple[float, float, float, bool]:  # pragma: no cover  (compiled)
+    """Vector to the nearest point, its length, and whether that is a corner."""
+    dx, dy = x - body[0], y - body[1]
+    u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
+    du = max(0.0, abs(u) - body[4])
+    dv = max(0.0, abs(v) - body[5])
+    corner = du > 0.0 and dv > 0.0
+    if u > 0.0:
+        du = -du
+    if v > 0.0:
+        dv = -dv
+    cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
+    return cx, cy, math.sqrt(cx * cx + cy * cy), corner
+
+
+@njit(cache=True)
+def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (compiled)
+    """(n, bodies) distances of points (n, 2), m; 0 inside a body."""
+    out = np.empty((points.shape[0], bodies.shape[0]))
+    for i in range(points.shape[0]):
+        for k in range(bodies.shape[0]):
+            out[i, k] = _nearest(points[i, 0], points[i, 1], bodies[k])[2]
+    return out
+
+
+@njit(cache=True)
+def _lookup(table: _Array, c: float) -> float:  # pragma: no cover  (compiled)
+    """Linear interpolation; 0 beyond the table."""
+    place = c / DISTANCE_STEP_M
+    index = int(place)
+    if index >= table.shape[0] - 1:
+        return 0.0
+    part = place - index
+    return (1.0 - part) * table[index] + part * table[index + 1]
+
+
+@njit(cache=True)
+def _increment(
+    table: _Array, c: float, s: float
+) -> float:  # pragma: no cover  (compiled)
+    """f(c, s) - f(c, 0): that of the nearest distance, linear in s."""
+    row = int(c / INCREMENT_STEPS[0] + 0.5)
+    if row >= table.shape[0]:
+        return 0.0
+    place = s / INCREMENT_STEPS[1]
+    column = min(int(place), table.shape[1] - 2)
+    part = place - column
+    return (1.0 - part) * table[row, column] + part * table[row, column + 1]
+
+
+@njit(cache=True)
+def _radial_force(
+    vector: _Vector, v_WP: tuple[float, float], term: float, tables: _Tables
+) -> float:  # pragma: no cover
+    """f(c, s), N; s of a body at rest is |dC/dt|, or the speed of approach."""
+    cx, cy, c, corner = vector
+    vx, vy = v_WP
+    f = _lookup(tables[0], c)
+    if term > 0.5:
+        towards = (vx * cx + vy * cy) / max(c, 1e-12)
+        if term > 1.5:
+            s = max(0.0, towards)
+        elif corner:
+            s = math.sqrt(vx * vx + vy * vy)
+        else:
+            s = abs(towards)
+        f += _increment(tables[2], c, s)
+    return f
+
+
+@njit(cache=True)
+def _force(
+    state: _State, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
+) -> tuple[float, float, float, float, int]:  # pragma: no cover
+    """(Fx, Fy, potential energy, least distance, nearest body)."""
+    x, y, vx, vy = state
+    stiffness, damping, follow, _, _, every, term = gains
+    dx, dy = p_WS[0] - x, p_WS[1] - y
+    r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
+    pull = stiffness * (1.0 - follow / r)
+    fx, fy = pull * dx - damping * vx, pull * dy - damping * vy
+    energy = 0.5 * stiffness * (r - follow) ** 2
+    least, index = np.inf, -1
+    nearest = (0.0, 0.0, 0.0, False)
+    for k in range(bodies.shape[0]):
+        vector = _nearest(x, y, bodies[k])
+        cx, cy, c, _ = vector
+        if every > 0.5 and c > 0.0:
+            f = _radial_force(vector, (vx, vy), term, tables)
+            fx, fy = fx - f * cx / c, fy - f * cy / c
+            energy += _lookup(tables[1], c)
+        if c < least:
+            least, index, nearest = c, k, vector
+    if every < 0.5 and least > 0.0:
+        f = _radial_force(nearest, (vx, vy), term, tables)
+        fx, fy = fx - f * nearest[0] / least, fy - f * nearest[1] / least
+        energy += _lookup(tables[1], least)
+    return fx, fy, energy, least, index
+
+
+@njit(cache=True)
+def forces(
+    states: _Array, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
+) -> _Array:  # pragma: no cover  (compiled)
+    """(n, 2) sum of all forces at states (n, 4), N."""
+    out = np.empty((states.shape[0], 2))
+    for i in range(states.shape[0]):
+        state = (states[i, 0], states[i, 1], states[i, 2], states[i, 3])
+        fx, fy, _, _, _ = _force(state, bodies, p_WS, gains, tables)
+        out[i, 0], out[i, 1] = fx, fy
+    return out
+
+
+@njit(cache=True)
+def _step(
+    state: _State,
+    h: float,
+    bodies: _Array,
+    p_WS: _Array,
+    gains: _Gains,
+    tables: _Tables,
+) -> _State:  # pragma: no cover
+    """State after one Runge-Kutta step; |v| is cut to the top speed."""
+    x, y, vx, vy = state
+    m, g = 1.0 / gains[3], 0.5 * h
+    a1, b1, _, _, _ = _force(state, bodies, p_WS, gains, tables)
+    u2, w2 = vx + g * m * a1, vy + g * m * b1
+    middle = (x + g * vx, y + g * vy, u2, w2)
+    a2, b2, _, _, _ = _force(middle, bodies, p_WS, gains, tables)
+    u3, w3 = vx + g * m * a2, vy + g * m * b2
+    middle = (x + g * u2, y + g * w2, u3, w3)
+    a3, b3, _, _, _ = _force(middle, bodies, p_WS, gains, tables)
+    u4, w4 = vx + h * m * a3, vy + h * m * b3
+    last = (x + h * u3, y + h * w3, u4, w4)
+    a4, b4, _, _, _ = _force(last, bodies, p_WS, gains, tables)
+    x += h / 6.0 * (vx + 2.0 * u2 + 2.0 * u3 + u4)
+    y += h / 6.0 * (vy + 2.0 * w2 + 2.0 * w3 + w4)
+    vx += h / 6.0 * m * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+    vy += h / 6.0 * m * (b1 + 2.0 * b2 + 2.0 * b3 + b4)
+    speed = math.sqrt(vx * vx + vy * vy)
+    if speed > gains[4]:
+        vx, vy = vx * gains[4] / speed, vy * gains[4] / speed
+    return x, y, vx, vy
+
+
+@njit(cache=True)
+def _advance(
+    state: _State,
+    h: float,
+    bodies: _Array,
+    p_WS: _Array,
+    gains: _Gains,
+    tables: _Tables,
+) -> tuple[_State, float, float]:  # pragma: no cover  (compiled)
+    """State, V and least distance one step on.
+
+    Where another body becomes the nearest the force steps; there the step is
+    done again in parts, lest the energy show the integrator's error.
+    """
+    _, _, _, _, before = _force(state, bodies, p_WS, gains, tables)
+    new = _step(state, h, bodies, p_WS, gains, tables)
+    _, _, energy, least, after = _force(new, bodies, p_WS, gains, tables)
+    if after != before:
+        new = state
+        for _ in range(_SWITCH_PARTS):
+            new = _step(new, h / _SWITCH_PARTS, bodies, p_WS, gains, tables)
+        _, _, energy, least, _ = _force(new, bodies, p_WS, gains, tables)
+    kinetic = 0.5 * gains[3] * (new[2] * new[2] + new[3] * new[3])
+    return new, energy + kinetic, least
+
+
+@njit(cache=True)
+def run(
+    starts: _Array,
+    steps: int,
+    h: float,
+    contact: float,
+    bodies: _Array,
+    p_WS: _Array,
+    gains: _Gains,
+    tables: _Tables,
+) -> tuple[_Array, _Array, _Array, _Array]:  # pragma: no cover
+    """Contact times, closest distances, rises of V and ends of starts (n, 4)."""
+    count = starts.shape[0]
+    times, closest = np.full(count, np.inf), np.full(count, np.inf)
+    rises, ends = np.zeros(count), np.empty((count, 4))
+    for i in range(count):
+        state = (starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
+        lowest = np.inf
+        for k in range(steps):
+            state, energy, least = _advance(state, h, bodies, p_WS, gains, tables)
+            closest[i] = min(closest[i], least)
+            if least <= contact:
+                times[i] = (k + 1) * h
+                break
+            lowest = min(lowest, energy)
+            rises[i] = max(rises[i], energy - lowest)
+        ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3] = state
+    return times, closest, rises, ends
+
+
+@njit(cache=True)
+def trajectory(
+    start: _Array,
+    steps: int,
+    h: float,
+    bodies: _Array,
+    p_WS: _Array,
+    gains: _Gains,
+    tables: _Tables,
+) -> _Array:  # pragma: no cover
+    """(steps + 1, 4) states from one start (4,), h apart."""
+    out = np.empty((steps + 1, 4))
+    out[0] = start
+    state = (start[0], start[1], start[2], start[3])
+    for k in range(steps):
+        state, _, _ = _advance(state, h, bodies, p_WS, gains, tables)
+        out[k + 1, 0], out[k + 1, 1], out[k + 1, 2], out[k + 1, 3] = state
+    return out

@@ -1,0 +1,1 @@
+"""What they do not: velocity terms, oscillations, equilibria, portraits."""

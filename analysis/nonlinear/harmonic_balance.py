@@ -1,0 +1,152 @@
+"""Oscillation before an obstacle, predicted by harmonic balance.
+
+The clearance is taken as c_0 + A exp(g t) sin(w t). Mean and first harmonic of
+the law's own f(c, s) over a cycle, closed through the sampled chain from
+acceleration to motion (``analysis.linear.contact_mode``), give centre c_0, growth g
+and frequency w by amplitude A. A limit cycle is where g falls through zero.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import root
+
+from analysis.laws.head_on import HeadOn
+from analysis.linear.contact_mode import motion_chain
+from analysis.models.linear_models import LinearModel
+from analysis.nonlinear.velocity_terms import Variant
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.laws.impedance import obstacle_speed
+
+__all__ = ["OscillationPrediction", "predict_oscillation"]
+
+#: Phases of a cycle at which the law is evaluated.
+_PHASES = 64
+
+
+@dataclass(frozen=True, eq=False)
+class OscillationPrediction:
+    """Harmonic balance by amplitude."""
+
+    amplitudes_m: NDArray[np.float64]
+    """(n,) A, m, as far as a balance was found."""
+    centres_m: NDArray[np.float64]
+    """(n,) c_0, m."""
+    growth_per_s: NDArray[np.float64]
+    """(n,) g of the amplitude, 1/s; negative: it decays."""
+    frequencies_rad_s: NDArray[np.float64]
+    """(n,) w."""
+    clamp_amplitude_m: float
+    """Above it A w passes the top speed, which the balance leaves out, m."""
+
+    @property
+    def limit_cycle(self) -> tuple[float, float, float] | None:
+        """(A, c_0, w) where growth turns to decay, m, m, rad/s; none: nowhere."""
+        g = self.growth_per_s
+        falls = np.flatnonzero((g[:-1] > 0.0) & (g[1:] <= 0.0))
+        if len(falls) == 0:
+            return None
+        k = int(falls[0])
+        part = g[k] / (g[k] - g[k + 1])
+        a, c, w = (
+            float(v[k] + part * (v[k + 1] - v[k]))
+            for v in (self.amplitudes_m, self.centres_m, self.frequencies_rad_s)
+        )
+        return a, c, w
+
+    def at(self, amplitude: float) -> tuple[float, float, float]:
+        """(centre, growth, frequency) at an amplitude, by interpolation."""
+        centre, growth, frequency = (
+            float(np.interp(amplitude, self.amplitudes_m, v))
+            for v in (self.centres_m, self.growth_per_s, self.frequencies_rad_s)
+        )
+        return centre, growth, frequency
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON document."""
+        cycle = self.limit_cycle
+        return {
+            "amplitudes_m": self.amplitudes_m.tolist(),
+            "centres_m": self.centres_m.tolist(),
+            "growth_per_s": self.growth_per_s.tolist(),
+            "frequencies_rad_s": self.frequencies_rad_s.tolist(),
+            "clamp_amplitude_m": self.clamp_amplitude_m,
+            "limit_cycle": None
+            if cycle is None
+            else dict(
+                zip(("amplitude_m", "centre_m", "frequency_rad_s"), cycle, strict=True)
+            ),
+        }
+
+
+def predict_oscillation(
+    contact: HeadOn, term: Variant, *, largest_m: float = 0.4, points: int = 20
+) -> OscillationPrediction:
+    """Harmonic balance up to an amplitude.
+
+    Args:
+        contact: Law and gains.
+        term: Velocity term.
+        largest_m: Largest amplitude, m.
+        points: Number of amplitudes.
+    """
+    chain = motion_chain(contact.scenario)
+    mass = contact.scenario.robot.mass_kg
+    frequency = np.sqrt(max(contact.stiffness_n_m, 1e-6) / mass)
+    guess = np.array([contact.equilibrium_m, 0.0, frequency])
+    rows = []
+    for amplitude in largest_m * (np.arange(points) + 1.0) / points:
+        found = root(
+            lambda x, a=amplitude: _imbalance(contact, chain, term, float(a), x), guess
+        )
+        if not found.success or found.x[0] - amplitude <= 0.0:
+            break
+        guess = found.x
+        rows.append([amplitude, *found.x])
+    table = np.array(rows).reshape(-1, 4)
+    top = contact.scenario.robot.top_speed_m_s
+    below = table[table[:, 0] * table[:, 3] <= top, 0]
+    return OscillationPrediction(
+        amplitudes_m=table[:, 0],
+        centres_m=table[:, 1],
+        growth_per_s=table[:, 2],
+        frequencies_rad_s=table[:, 3],
+        clamp_amplitude_m=float(below.max(initial=0.0)),
+    )
+
+
+def _imbalance(
+    contact: HeadOn,
+    chain: LinearModel,
+    term: Variant,
+    amplitude: float,
+    x: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Mean force, and what the first harmonic lacks to go round the loop."""
+    centre, growth, frequency = x
+    turn = frequency * FRAME_PERIOD_S
+    phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
+    c = centre + amplitude * np.sin(phase)
+    before = centre + amplitude * np.sin(phase - turn)
+    force = np.array(
+        [
+            contact.force(
+                now, obstacle_speed((now, 0.0), (then, 0.0), term, FRAME_PERIOD_S)
+            )
+            for now, then in zip(c.tolist(), before.tolist(), strict=True)
+        ]
+    )
+    # sin(phase) is the imaginary part of exp(j phase).
+    harmonic = 2.0j * np.mean(force * np.exp(-1j * phase)) / amplitude
+    z = np.exp((growth + 1j * frequency) * FRAME_PERIOD_S)
+    inverse = np.linalg.solve(z * np.eye(len(chain.A)) - chain.A, chain.B[:, 0])
+    position, velocity = chain.C @ inverse
+    scenario = contact.scenario
+    mass, damping = scenario.robot.mass_kg, scenario.attraction.damping_n_s_m
+    gap = mass + damping * velocity - harmonic * position
+    gap = gap / (mass * abs(position))
+    return np.array([force.mean(), gap.real, gap.imag])

@@ -1,0 +1,172 @@
+"""The head-on approach in its phase plane: basin and certified region."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.laws.head_on import HeadOn, head_on
+from analysis.models.point_mass import PointMass, VelocityTermModel
+from diagrams import Scenario
+
+__all__ = ["PhasePortrait", "certified_speeds", "head_on_model", "phase_portrait"]
+
+#: Half the width of the obstacle's face, m, and its depth.
+_FACE_M = (4.0, 0.1)
+
+
+@dataclass(frozen=True, eq=False)
+class PhasePortrait:
+    """Clearance c and its rate c' over a grid of starts."""
+
+    contact: HeadOn
+    """The approach."""
+    velocity_term: str
+    """``none``, ``printed`` or ``closing``."""
+    contact_m: float
+    """P nearer to the face is contact, m."""
+    clearances_m: NDArray[np.float64]
+    """(n,) c of the starts, m."""
+    rates_m_s: NDArray[np.float64]
+    """(m,) c' of the starts, m/s."""
+    accelerations_m_s2: NDArray[np.float64]
+    """(n, m) c'' there."""
+    collides: NDArray[np.bool_]
+    """(n, m) whether the start leads to contact, by simulation."""
+    certified_speed_m_s: NDArray[np.float64]
+    """(n,) speeds below this are certified, m/s; NaN: not even rest."""
+    trajectories: tuple[NDArray[np.float64], ...]
+    """(k, 2) c and c' of some runs."""
+
+    @property
+    def certified(self) -> NDArray[np.bool_]:
+        """(n, m) whether the energy certifies the start."""
+        limit = np.nan_to_num(self.certified_speed_m_s, nan=-1.0)
+        return np.abs(self.rates_m_s)[None, :] < limit[:, None]
+
+    @property
+    def ratio(self) -> float:
+        """Certified starts by starts that do not collide."""
+        return float(self.certified.sum() / np.count_nonzero(~self.collides))
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON document."""
+        return {
+            "law": self.contact.law.name,
+            "velocity_term": self.velocity_term,
+            "to_go_m": self.contact.to_go_m,
+            "contact_m": self.contact_m,
+            "equilibria_m": list(self.contact.equilibria_m),
+            "starts": int(self.collides.size),
+            "collisions": int(self.collides.sum()),
+            "certified": int(self.certified.sum()),
+            "certified_collisions": int((self.certified & self.collides).sum()),
+            "certified_by_safe": self.ratio,
+        }
+
+
+def head_on_model(contact: HeadOn) -> PointMass:
+    """The point mass before a wide face at x = 0, the goal ``to_go_m`` behind it.
+
+    P is at x = -c, y = 0.
+    """
+    scenario = contact.scenario
+    follow = max(scenario.attraction.follow_distance_m, 1.0)
+    p_WS = np.array([contact.to_go_m + follow, 0.0])
+    depth = _FACE_M[1]
+    return PointMass(
+        law=contact.law,
+        rectangles=np.array([[0.5 * depth, 0.0, 0.0, depth, 2.0 * _FACE_M[0]]]),
+        p_WS=p_WS,
+        p_WP=np.array([-1.0, 0.0]),
+        stiffness_n_m=scenario.attraction.stiffness_n_m,
+        damping_n_s_m=scenario.attraction.damping_n_s_m,
+        follow_distance_m=follow,
+        mass_kg=scenario.robot.mass_kg,
+        top_speed_m_s=scenario.robot.top_speed_m_s,
+        all_bodies=False,
+    )
+
+
+def phase_portrait(
+    scenario: Scenario,
+    *,
+    to_go_m: float | None = None,
+    velocity_term: VelocityTermModel | None = None,
+    points: int = 41,
+) -> PhasePortrait:
+    """The phase plane up to 1.5 m and the top speed.
+
+    Args:
+        scenario: Law and gains.
+        to_go_m: See ``head_on``.
+        velocity_term: Another one than the scenario's.
+        points: Starts along either axis.
+
+    Raises:
+        InputError: The law is not known.
+        ValueError: The law has no radial force.
+    """
+    contact = head_on(scenario, to_go_m=to_go_m)
+    term = velocity_term or scenario.repulsion.velocity_term
+    model = head_on_model(contact)
+    least = scenario.ultrasonic.minimum_range_m
+    c = np.linspace(least + 0.005, 1.5, points)
+    rate = np.linspace(-model.top_speed_m_s, model.top_speed_m_s, points)
+    grid_c, grid_rate = np.meshgrid(c, rate, indexing="ij")
+    states = np.zeros((c.size * rate.size, 4))
+    states[:, 0], states[:, 2] = -grid_c.ravel(), -grid_rate.ravel()
+    runs = model.run(states, contact_m=least, duration_s=10.0, term=term)
+    force = model.force(states, term)[:, 0]
+    shape = grid_c.shape
+    return PhasePortrait(
+        contact=contact,
+        velocity_term=term,
+        contact_m=least,
+        clearances_m=c,
+        rates_m_s=rate,
+        accelerations_m_s2=-force.reshape(shape) / model.mass_kg,
+        collides=runs.collided.reshape(shape),
+        certified_speed_m_s=certified_speeds(model, c, least),
+        trajectories=_trajectories(model, term, least),
+    )
+
+
+def certified_speeds(
+    model: PointMass, clearances: NDArray[np.float64], least: float
+) -> NDArray[np.float64]:
+    """Speed whose energy does not reach contact from each clearance, m/s.
+
+    NaN where not even rest is certified. On the line the highest level on the
+    way to contact is the greatest of the potential between; beyond a place that
+    even the top speed cannot pass every speed is certified.
+    """
+    fine = np.arange(least, clearances[-1] + 1e-3, 1e-3)
+    points = np.column_stack([-fine, np.zeros_like(fine)])
+    potential = model.potential(points)
+    spare = np.maximum.accumulate(potential) - potential
+    walled = np.maximum.accumulate(spare) > model.top_kinetic_energy_j
+    speed = np.sqrt(2.0 * spare / model.mass_kg)
+    speed = np.where(spare > 0.0, speed, np.nan)
+    # The largest speed itself is allowed where nothing can be reached.
+    speed[walled] = np.nextafter(model.top_speed_m_s, np.inf)
+    below = np.searchsorted(fine, clearances, side="right") - 1
+    above = np.minimum(below + 1, len(fine) - 1)
+    return np.minimum(speed[below], speed[above])
+
+
+def _trajectories(
+    model: PointMass, term: VelocityTermModel, least: float
+) -> tuple[NDArray[np.float64], ...]:
+    top = model.top_speed_m_s
+    starts = [(1.45, -top), (0.8, -top), (0.25, -0.9 * top)]
+    tracks = []
+    for c, rate in (*starts, (0.1, 0.0)):
+        states = model.trajectory([-c, 0.0, -rate, 0.0], duration_s=12.0, term=term)
+        track = np.column_stack([-states[:, 0], -states[:, 2]])
+        hit = np.flatnonzero(track[:, 0] <= least)
+        tracks.append(track[: hit[0] + 1] if len(hit) else track)
+    return tuple(tracks)

@@ -1,0 +1,91 @@
+"""Head-on equilibria of the active law as k_ref/K_0 varies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.laws.head_on import head_on
+from diagrams import Scenario
+from systems.laws.active_impedance_controller import active_force
+
+__all__ = ["RatioMap", "stiffness_ratio_map"]
+
+#: Spacing of the distances at which forces are compared, m.
+_RATIO_STEP_M = 2e-3
+
+
+@dataclass(frozen=True, eq=False)
+class RatioMap:
+    """Head-on equilibria of the active law over k_ref/K_0."""
+
+    ratios: NDArray[np.float64]
+    """(n,) k_ref/K_0, K_0 and reach as in the scenario."""
+    outer_m: NDArray[np.float64]
+    """(n,) where P is held up, m; NaN: nowhere. A saddle: it slips sideways."""
+    inner_m: NDArray[np.float64]
+    """(n,) nearer in, where the vanishing force gives way, m. A source."""
+    to_go_m: float
+    """What is left to go behind the obstacle, m."""
+    today: float
+    """The scenario's ratio."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """For the JSON document."""
+        return {
+            "ratios": self.ratios.tolist(),
+            "outer_m": [None if math.isnan(x) else x for x in self.outer_m.tolist()],
+            "inner_m": [None if math.isnan(x) else x for x in self.inner_m.tolist()],
+            "to_go_m": self.to_go_m,
+            "today": self.today,
+        }
+
+
+def stiffness_ratio_map(
+    scenario: Scenario,
+    ratios: Sequence[float] = tuple(np.geomspace(1.2, 64.0, 60)),
+    *,
+    to_go_m: float | None = None,
+) -> RatioMap:
+    """Head-on equilibria of the active law as k_ref/K_0 varies.
+
+    Args:
+        scenario: Its active law's K_0, reach and velocity term.
+        ratios: k_ref/K_0, above 1.
+        to_go_m: See ``head_on``.
+    """
+    contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
+    gains = scenario.repulsion.active
+    stiffness = scenario.attraction.stiffness_n_m
+    c = np.arange(_RATIO_STEP_M, contact.law.range_m, _RATIO_STEP_M)
+    pull = stiffness * (contact.to_go_m + c)
+    outer, inner = [], []
+    for ratio in ratios:
+        k_ref = float(ratio) * gains.matched_stiffness_n_m
+        case = gains.model_copy(update={"reference_stiffness_n_m": k_ref})
+        force = np.array([active_force(value, 0.0, case) for value in c.tolist()])
+        places = _crossings(c, force - pull)
+        outer.append(max(places["down"], default=math.nan))
+        inner.append(max(places["up"], default=math.nan))
+    return RatioMap(
+        np.array(ratios, dtype=float),
+        np.array(outer),
+        np.array(inner),
+        contact.to_go_m,
+        gains.reference_stiffness_n_m / gains.matched_stiffness_n_m,
+    )
+
+
+def _crossings(
+    x: NDArray[np.float64], y: NDArray[np.float64]
+) -> dict[str, list[float]]:
+    """Where y passes through zero on its way up and down, by interpolation."""
+    at = np.flatnonzero(np.diff(np.sign(y)))
+    places = x[at] - y[at] * (x[at + 1] - x[at]) / (y[at + 1] - y[at])
+    up = y[at + 1] > y[at]
+    return {"up": places[up].tolist(), "down": places[~up].tolist()}

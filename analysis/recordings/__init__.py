@@ -1,0 +1,1 @@
+"""Sounds in recordings of arrays that people have."""

@@ -1,0 +1,346 @@
+"""Faults of a recording's channels, named before they become wrong places.
+
+A channel is first looked at alone (NaN, constant, clipped), then beside the
+others: whether it copies one (``systems.delays.copied_channels``), its level, the
+height and the sign of its correlation with them, and whether the delays of all are of
+the array's size (``analysis.recordings.delay_scale``) and belong to a place
+(``analysis.recordings.channel_order``).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.recordings.channel_order import (
+    agreeing_differences,
+    exchanged_channels,
+    misfit,
+)
+from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
+from systems.delays.copied_channels import copied_pairs
+from systems.delays.pair_correlations import PairCorrelations, correlate_pairs
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["ChannelFault", "find_channel_faults"]
+
+# Below the median of all channels by this, a channel is dead, dB; above it by
+# this, the source is at it.
+_DEAD_DB = 30.0
+_NEAR_DB = 15.0
+
+# Least number and share of a channel's samples at an extreme, and how much more
+# often it occurs than the next values do: with a sine 2.4 times.
+_LEAST_PILE = 5
+_CLIPPED_SHARE = 1e-4
+_PILE = 4.0
+
+# Correlations over those of noise: above the one a sound is shared, below the
+# other nothing is.
+_COHERENT, _INCOHERENT = 5.0, 2.5
+
+# Fewer frames than this may agree by chance; in a few long ones little is heard.
+_LEAST_FRAMES = 16
+
+# Delays so many times too long are not of wrong channels, but of wrong units.
+_OTHER_UNITS = 3.5
+
+# A source that would be farther off than this, straight above, is none, m.
+_FARTHEST_M = 20.0
+
+# Least lead of one sign of a correlation over the other, as a share of both.
+_LEAD = 0.1
+
+
+@dataclass(frozen=True)
+class ChannelFault:
+    """What is wrong with some channels."""
+
+    kind: Literal[
+        "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
+        "units", "size", "late"
+    ]  # fmt: skip
+    channels: tuple[int, ...]
+    """Their numbers, from 0; empty where all are concerned."""
+    message: str
+    """One line: what was seen, and the remedy. It counts channels from 1."""
+
+
+def find_channel_faults(
+    samples: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+    *,
+    sample_rate_hz: float,
+    band_hz: tuple[float, float] | None = None,
+) -> list[ChannelFault]:
+    """What is wrong with the channels of a recording.
+
+    Args:
+        samples: (n, samples) one row a microphone.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+        sample_rate_hz: Rate of the samples, Hz.
+        band_hz: Lowest and highest frequency of the sound, Hz; None: from 300
+            to 8000 or 0.45 of the rate.
+
+    Returns:
+        The faults; empty where none is seen, which is no proof that all is
+        well: a silent recording shows little.
+    """
+    faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
+    found = [fault for fault in faults if fault is not None]
+    use = np.array([k for k, fault in enumerate(faults) if fault is None], dtype=int)
+    found += [fault for k in use if (fault := _clipped(int(k), samples[k])) is not None]
+    if use.size < 2:
+        return found
+    readable = samples if use.size == len(samples) else samples[use]
+    found += _copied(readable, use, sample_rate_hz)
+    band_hz = band_hz or (300.0, min(8000.0, 0.45 * sample_rate_hz))
+    measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
+    if measured is None:
+        return found
+    beside = _levels(measured, use) + _strangers(measured, use)
+    dead = {k for fault in beside if fault.kind == "dead" for k in fault.channels}
+    found += beside
+    inverted = _inverted(measured, use, dead)
+    found += inverted
+    if use.size < shape.count or dead or any(f.kind == "near" for f in beside):
+        return found
+    signs = np.ones(shape.count)
+    signs[[k for fault in inverted for k in fault.channels]] = -1.0
+    metres_per_sample = c / sample_rate_hz
+    lags = _lags(measured, signs)
+    order = _order(measured, lags, shape, metres_per_sample)
+    if any(fault.kind == "swapped" for fault in order):
+        return found + order
+    scale = delay_scale(lags, shape, metres_per_sample)
+    if not _fits(lags, measured, shape, metres_per_sample):
+        for reach_m in REACHES_M:
+            seen = correlate_pairs(readable, reach_m / c, sample_rate_hz, band_hz)
+            if seen is not None and scale is None:
+                scale = delay_scale(_lags(seen, signs), shape, metres_per_sample)
+    return found + (order if scale is None else [_scale_fault(scale, shape)])
+
+
+def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
+    wrong = np.flatnonzero(~np.isfinite(channel))
+    if wrong.size:
+        return ChannelFault(
+            "nan",
+            (k,),
+            f"channel {k + 1}: sample {wrong[0]} is not a number ({wrong.size} are "
+            "not); repair the file",
+        )
+    if channel.size and np.ptp(channel) == 0.0:
+        return ChannelFault(
+            "dead",
+            (k,),
+            f"channel {k + 1}: dead, all samples are {channel[0]:g}; check its "
+            "microphone, or leave it out of the geometry",
+        )
+    return None
+
+
+def _copied(
+    samples: NDArray[np.float64], use: NDArray[np.int64], sample_rate_hz: float
+) -> list[ChannelFault]:
+    return [
+        ChannelFault(
+            "copied",
+            (int(use[i]), int(use[j])),
+            f"channels {use[i] + 1} and {use[j] + 1}: the same samples in both, but "
+            "for gain and delay; record every microphone on a channel of its own",
+        )
+        for i, j in copied_pairs(samples, sample_rate_hz)
+    ]
+
+
+def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
+    """A channel whose samples pile up at an extreme, far above the next values."""
+    _, counts = np.unique(channel, return_counts=True)
+    most = 0
+    for ends in (counts, counts[::-1]):
+        if ends[0] >= _LEAST_PILE and ends[0] > _PILE * ends[1:4].max(initial=0):
+            most += int(ends[0])
+    share = most / channel.size
+    if share < _CLIPPED_SHARE:
+        return None
+    return ChannelFault(
+        "clipped",
+        (k,),
+        f"channel {k + 1}: clipped, {100 * share:.2g} % of its samples stand at an "
+        "extreme; record with less gain",
+    )
+
+
+def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelFault]:
+    """Channels far below or above the others."""
+    level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
+    faults = []
+    for k, channel in enumerate(use.tolist()):
+        others = np.sort(np.delete(level, k))
+        over = float(level[k] - np.median(others))
+        # The loudest alone may have the source at its microphone.
+        if level[k] - others[max(-2, -others.size)] < -_DEAD_DB:
+            faults.append(
+                ChannelFault(
+                    "dead",
+                    (channel,),
+                    f"channel {channel + 1}: dead, {-over:.0f} dB below the others; "
+                    "check its microphone, or leave it out of the geometry",
+                )
+            )
+        if over > _NEAR_DB and _lone(level, k):
+            faults.append(
+                ChannelFault(
+                    "near",
+                    (channel,),
+                    f"channel {channel + 1}: {over:.0f} dB above the others: the "
+                    "source is at its microphone, or gains differ; move the source "
+                    "away from the array, or set equal gains",
+                )
+            )
+    return faults
+
+
+def _lone(level: NDArray[np.float64], k: int) -> bool:
+    """Whether the channels but k have levels like each other's."""
+    return bool(np.ptp(np.delete(level, k)) < _NEAR_DB)
+
+
+def _strangers(
+    measured: PairCorrelations, use: NDArray[np.int64]
+) -> list[ChannelFault]:
+    """Channels that share nothing with the others, which share a sound."""
+    height = np.maximum(measured.pooled_highest, -measured.pooled_lowest)
+    table = np.zeros((use.size, use.size))
+    table[tuple(measured.pairs.T)] = height / measured.noise
+    best = (table + table.T).max(axis=0)
+    if use.size < 3 or best.max() < _COHERENT:
+        return []
+    return [
+        ChannelFault(
+            "dead",
+            (channel,),
+            f"channel {channel + 1}: dead, nothing in it belongs to the sound of the "
+            "others; check its microphone, or leave it out of the geometry",
+        )
+        for k, channel in enumerate(use.tolist())
+        if best[k] < _INCOHERENT
+    ]
+
+
+def _inverted(
+    measured: PairCorrelations, use: NDArray[np.int64], dead: set[int]
+) -> list[ChannelFault]:
+    """Channels whose correlations with most others are upside down."""
+    high, low = measured.pooled_highest, -measured.pooled_lowest
+    heard = np.maximum(high, low) > _COHERENT * measured.noise
+    table = np.zeros((use.size, use.size))
+    table[tuple(measured.pairs.T)] = np.where(heard, (high - low) / (high + low), 0.0)
+    table += table.T
+    alive = np.array([k not in dead for k in use.tolist()])
+    signs = np.sign(np.linalg.eigh(table)[1][:, -1])
+    signs[signs == 0.0] = 1.0
+    if np.sum(signs * alive) < 0.0:
+        signs = -signs
+    # Every channel must agree with the others, on average, once signs are mended.
+    agreement = signs * (table @ (signs * alive)) / max(alive.sum() - 1, 1)
+    if np.any(agreement[alive] < _LEAD):
+        return []
+    return [
+        ChannelFault(
+            "inverted",
+            (int(use[k]),),
+            f"channel {use[k] + 1}: inverted, its correlation with the others is "
+            "negative; exchange the wires of its microphone, or the sign of its "
+            "samples",
+        )
+        for k in np.flatnonzero((signs < 0.0) & alive)
+    ]
+
+
+def _lags(
+    measured: PairCorrelations, signs: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(f, p) delays, samples, of channels some of which are inverted."""
+    i, j = measured.pairs.T
+    upright = signs[i] * signs[j] > 0.0
+    return np.where(upright, measured.lag_of_highest, measured.lag_of_lowest)
+
+
+def _fits(
+    lags: NDArray[np.float64],
+    measured: PairCorrelations,
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> bool:
+    """Whether at least half of the frames agree on their delays, and some do."""
+    agreed, _ = agreeing_differences(lags, measured.levels, shape, metres_per_sample)
+    return len(agreed) >= max(_LEAST_FRAMES, len(lags) / 2)
+
+
+def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
+    """Delays that are not of the array's size."""
+    size = f"an array of {shape.aperture_m:.3g} m"
+    if scale.kind == "beyond":
+        remedy = "check the positions (in m) and the order of the channels"
+        if scale.share > _OTHER_UNITS:
+            remedy = "give positions in m (multiply them by 10, 100 or 1000?)"
+        return ChannelFault(
+            "units",
+            (),
+            f"microphones: {size} cannot have delays {scale.share:.1f} times as long "
+            f"as sound takes along it; {remedy}",
+        )
+    said = f"microphones: delays are below {100 * scale.share:.1g} % of what {size}"
+    if shape.kind == "space" or scale.least_range_m > _FARTHEST_M:
+        return ChannelFault(
+            "units",
+            (),
+            f"{said} can have; give positions in m (divide those in cm by 100, in mm "
+            "by 1000)",
+        )
+    where = "ahead of" if shape.kind == "row" else "above or below"
+    return ChannelFault(
+        "size",
+        (),
+        f"{said} can have: the source is straight {where} it, or the positions are "
+        "not in m; check them",
+    )
+
+
+def _order(
+    measured: PairCorrelations,
+    lags: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> list[ChannelFault]:
+    """Exchanged channels, or a geometry that no exchange mends."""
+    exchanges = exchanged_channels(lags, measured.levels, shape, metres_per_sample)
+    if exchanges:
+        names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)
+        return [
+            ChannelFault(
+                "swapped",
+                tuple(sorted({k for pair in exchanges for k in pair})),
+                f"channels {names}: exchanged, the delays fit the geometry only the "
+                "other way round; exchange them in 'channels'",
+            )
+        ]
+    share = misfit(lags, measured.levels, shape, metres_per_sample)
+    if share is None:
+        return []
+    return [
+        ChannelFault(
+            "geometry",
+            (),
+            f"channels: {100 * share:.0f} % of the delays belong to no place outside "
+            "the array; check the microphones' positions (in m), their order and the "
+            "speed of sound",
+        )
+    ]

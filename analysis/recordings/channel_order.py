@@ -1,0 +1,167 @@
+"""Whether delays belong to a place, or only do so with two channels exchanged.
+
+Not to be seen from sound is an exchange that makes the array its own mirror
+image (the ends of a symmetric row, opposite corners of a square), and which of
+two exchanges it was if they differ by such an image (the two ends of either
+side of a square: both are named). A source straight ahead of a row shows no
+exchange at all, for all its delays are alike.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.recordings.source_levels import levels_contradict
+from systems.hearing.coherent import arrival_delays
+from systems.hearing.multilateration import locate_source
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["agreeing_differences", "exchanged_channels", "misfit"]
+
+# Delays fit where they are right to this part of a sample, or to this share of
+# what sound needs across the array.
+_FIT_SAMPLES = 0.25
+_FIT_SHARE = 0.05
+
+# Fewer frames whose pairs agree prove nothing.
+_LEAST_FRAMES = 5
+
+# Exchanges times frames that are tried, at most.
+_MOST_TRIALS = 20_000
+
+# Shares of such frames that fit a wrong geometry at most, and a right one at
+# least; shares nearer to each other than this are alike; and one that is hopeless.
+_WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
+
+
+def exchanged_channels(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> list[tuple[int, int]]:
+    """Exchanges, each of two channels, of which one makes the delays fit.
+
+    Args:
+        lags: (f, p) delays of ``shape.pairs`` in f frames, samples.
+        levels: (f, n) levels of the channels, any unit.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+
+    Returns:
+        Pairs of numbers from 0. Empty where the delays fit as they are, or where
+        no exchange helps.
+    """
+    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
+    tolerance = _tolerance(shape, metres_per_sample)
+    if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance)[0] > _WRONG:
+        return []
+    exchanges = list(combinations(range(shape.count), 2))
+    trials = len(d) * len(exchanges)
+    every = max(1, min(trials // _MOST_TRIALS, len(d) // _LEAST_FRAMES))
+    d, levels = d[::every], levels[::every]
+    found = [
+        _fitting(
+            d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
+        )
+        for pair in exchanges
+    ]
+    best = max(share for share, _ in found)
+    if best < _RIGHT:
+        return []
+    least = min(error for share, error in found if share > best - _ALIKE)
+    limit = 1.5 * least + 0.05 * tolerance
+    return [
+        pair
+        for pair, (share, error) in zip(exchanges, found, strict=True)
+        if share > best - _ALIKE and error < limit
+    ]
+
+
+def misfit(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+) -> float | None:
+    """Share of the frames that fit no place, if it is hopeless; else None.
+
+    Args:
+        lags: As for ``exchanged_channels``.
+        levels: As there.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+    """
+    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
+    if len(d) < 2 * _LEAST_FRAMES:
+        return None
+    share, _ = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
+    return 1.0 - share if share < _HOPELESS else None
+
+
+def _exchanged(p: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
+    order = np.arange(len(p))
+    order[[i, j]] = j, i
+    return p[order]
+
+
+def _tolerance(shape: ArrayShape, metres_per_sample: float) -> float:
+    return max(_FIT_SAMPLES * metres_per_sample, _FIT_SHARE * shape.aperture_m)
+
+
+def agreeing_differences(
+    lags: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    metres_per_sample: float,
+    tolerance_m: float = np.inf,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """(f, n - 1) differences of range, m, and levels where all pairs agree.
+
+    Args:
+        lags: As for ``exchanged_channels``.
+        levels: As there, or any numbers of the frames.
+        shape: The n microphones.
+        metres_per_sample: Speed of sound over the sample rate.
+        tolerance_m: How well they agree, where that is less than what serves to
+            find a place.
+    """
+    to_pairs = np.zeros((len(shape.pairs), shape.count))
+    rows = np.arange(len(shape.pairs))
+    to_pairs[rows, shape.pairs[:, 1]] = 1.0
+    to_pairs[rows, shape.pairs[:, 0]] = -1.0
+    to_pairs = to_pairs[:, 1:]
+    d = lags * metres_per_sample
+    differences = d @ np.linalg.pinv(to_pairs).T
+    errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
+    agree = errors < min(_tolerance(shape, metres_per_sample), tolerance_m)
+    return differences[agree], levels[agree]
+
+
+def _fitting(
+    differences: NDArray[np.float64],
+    levels: NDArray[np.float64],
+    shape: ArrayShape,
+    tolerance: float,
+) -> tuple[float, float]:
+    """Share of the frames that a place outside the array explains, and RMS error.
+
+    The error in m is that of the frames that it explains.
+    """
+    if shape.kind == "plane" and shape.dimension == 2:
+        # The source need not lie in the plane.
+        shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
+    covariance = (0.5 * tolerance) ** 2 * (np.eye(shape.count - 1) + 1.0)
+    errors = []
+    for d, level in zip(differences, levels, strict=True):
+        fix = locate_source(d, covariance, shape, 1.0)
+        off = arrival_delays(fix, shape, 1.0) - d
+        if np.abs(off).max() < tolerance and not levels_contradict(level, fix, shape):
+            errors.append(off)
+    if not errors:
+        return 0.0, np.inf
+    return len(errors) / len(differences), float(np.sqrt(np.mean(np.square(errors))))

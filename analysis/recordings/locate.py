@@ -1,0 +1,178 @@
+"""Bearing, elevation and range over time of a recording by any array."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
+from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.recording_faults import channels_without_faults
+from analysis.recordings.recording_search import RecordingSearch, Sighting
+from analysis.recordings.recording_spectra import RecordingSpectra
+from analysis.recordings.source_placement import place_source
+from analysis.recordings.wavefront_misfit import late_channel
+from systems.framework.input_error import InputError
+from systems.sound.array_shape import ArrayShape
+from systems.sound.sound_file import read_sound
+
+__all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
+
+_RATES_HZ = (8_000, 192_000)
+
+# Where a geometry names no band.
+_BAND_HZ = (300.0, 15_000.0)
+
+# A band may not reach up to half the sample rate, where recorders' filters fall.
+_TOP_OF_RATE = 0.45
+
+
+# Snapshots of a stretch: more of them for a source that is faint or far, of
+# which fewer show too little.
+_SNAPSHOTS = (8, 32, 128)
+_LEAST_ESTIMATES = 3
+
+# Faults that make channels seem late.
+_EXPLAINS_LATENESS = ("size", "near")
+
+
+def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
+    """Locates the source of a recording, stretch by stretch.
+
+    Args:
+        path: WAV or FLAC with one channel a microphone, 8-192 kHz.
+        geometry: The microphones; the robot's own array by default.
+
+    Returns:
+        ``LocateResult``. A range is reported where its standard deviation is
+        smaller than itself, and the wave fronts' curvature is more than small
+        errors of the geometry, of the speed of sound or reflections could
+        make. These are not in the standard deviations.
+
+    Raises:
+        InputError: The recording cannot be used; says why, and the remedy.
+    """
+    geometry = geometry or ArrayGeometry()
+    samples, rate = read_sound(path, "recording")
+    where = repr(str(path))
+    _check_recording(samples, rate, geometry, where)
+    shape = ArrayShape.of(geometry.microphones)
+    whole = geometry.columns == tuple(range(len(samples)))
+    channels = samples if whole else samples[list(geometry.columns)]
+    recording, faults = _recording(channels, rate, shape, geometry, where)
+    if not recording.starts.size:
+        raise InputError(
+            "recording",
+            f"{where} has {samples.shape[1]} samples, less than one frame of "
+            f"{recording.window.size}; record longer",
+        )
+    search, sightings, estimates = _estimates(recording, shape, geometry.c)
+    late = late_channel(sightings, shape, geometry.c)
+    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        faults.append(late)
+    array = {
+        "microphones": [list(place) for place in geometry.microphones],
+        "channels": list(geometry.columns),
+        "kind": shape.kind,
+        "aperture_m": shape.aperture_m,
+        "sound_speed_m_s": geometry.c,
+        "band_hz": [recording.low_hz, recording.high_hz],
+        "sample_rate_hz": rate,
+        "frame_s": search.stretch_s,
+    }
+    return LocateResult(array, shape, estimates, len(search.stretches), faults)
+
+
+def _recording(
+    channels: NDArray[np.float64],
+    rate: int,
+    shape: ArrayShape,
+    geometry: ArrayGeometry,
+    where: str,
+) -> tuple[RecordingSpectra, list[ChannelFault]]:
+    """The channels that were chosen, mended where they can be; and their faults."""
+    low, high = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
+
+    def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
+        equal = np.empty(channels.shape, dtype=np.float32)
+        for row, channel in zip(equal, channels, strict=True):
+            row[:] = (channel - channel.mean()) / channel.std()
+        return RecordingSpectra(
+            equal, float(rate), low, high, shape.max_delay(geometry.c)
+        )
+
+    def agreement(channels: NDArray[np.float64]) -> float:
+        search = RecordingSearch(spectra(channels), shape, geometry.c, _SNAPSHOTS[0])
+        return search.mean_response()
+
+    faults = find_channel_faults(
+        channels, shape, geometry.c, sample_rate_hz=float(rate), band_hz=geometry.band
+    )
+    channels, faults = channels_without_faults(channels, faults, agreement, where)
+    return spectra(channels), faults
+
+
+def _estimates(
+    recording: RecordingSpectra, shape: ArrayShape, c: float
+) -> tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]:
+    """By the shortest stretches in which something is heard often enough."""
+    best: tuple[RecordingSearch, list[Sighting], list[SourceEstimate]] | None = None
+    for snapshots in _SNAPSHOTS:
+        search = RecordingSearch(recording, shape, c, snapshots)
+        sightings = list(search.sightings())
+        placed = ((s.t_s, place_source(s, shape, c)) for s in sightings)
+        found = [SourceEstimate.of(t_s, fix) for t_s, fix in placed if fix is not None]
+        if best is None or len(found) > len(best[2]):
+            best = search, sightings, found
+        if len(found) >= min(_LEAST_ESTIMATES, len(search.stretches)):
+            break
+    assert best is not None
+    return best
+
+
+def _check_recording(
+    samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, where: str
+) -> None:
+    count, needed = len(samples), len(geometry.microphones)
+    if geometry.channels is not None and max(geometry.channels) >= count >= needed:
+        raise InputError(
+            "recording",
+            f"{where} has {count} channels, numbers 0 to {count - 1}; 'channels' in "
+            f"the geometry file counts from 0 and names {max(geometry.channels)}",
+        )
+    if max(geometry.columns) >= count:
+        what = "is mono" if count == 1 else f"has {count} channels"
+        raise InputError(
+            "recording",
+            f"{where} {what}, but the array needs "
+            f"{max(needed, max(geometry.columns) + 1)}; record every microphone on a "
+            "channel of its own",
+        )
+    if geometry.channels is None and count > needed:
+        default = geometry.microphones == ArrayGeometry().microphones
+        remedy = (
+            "give the places of its microphones by --geometry FILE"
+            if default
+            else "name the channels to use in the geometry file, as "
+            f"'channels: {list(range(needed))}'"
+        )
+        whose = "the robot's own array" if default else "the array"
+        raise InputError(
+            "recording",
+            f"{where} has {count} channels, but {whose} {needed} microphones; {remedy}",
+        )
+    if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+        raise InputError(
+            "recording",
+            f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "
+            f"{_RATES_HZ[1]} Hz",
+        )
+    if geometry.band is not None and rate < 2.0 * geometry.band[1]:
+        raise InputError(
+            "recording",
+            f"{where} has a sample rate of {rate} Hz, below twice the band's upper end "
+            f"of {geometry.band[1]:g} Hz; lower the band or record at a higher rate",
+        )

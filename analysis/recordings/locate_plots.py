@@ -1,0 +1,147 @@
+"""Pictures of a located source, and the files of its result directory."""
+
+from __future__ import annotations
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.recordings.locate_result import LocateResult
+from analysis.reporting.palette import COLOURS
+
+__all__ = ["plot_locate", "write_locate"]
+
+_WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
+
+
+def write_locate(
+    result: LocateResult, document: dict[str, Any], directory: Path
+) -> None:
+    """Writes ``locate.json`` and ``locate.png`` into a directory that exists."""
+    text = json.dumps(document, indent=2, allow_nan=False)
+    (directory / "locate.json").write_text(text + "\n")
+    plot_locate(result).savefig(directory / "locate.png", dpi=150)
+
+
+def plot_locate(result: LocateResult) -> Figure:
+    """Angles and range over time, one standard deviation each, and a plan."""
+    known = [
+        (name, label)
+        for name, label in (
+            ("bearing_deg", "bearing (deg)"),
+            ("elevation_deg", "elevation (deg)"),
+            ("range_m", "range (m)"),
+        )
+        if any(getattr(e, name) is not None for e in result.estimates)
+    ]
+    rows = max(len(known), 1)
+    height = max(_PLAN_IN, 0.9 + _PANEL_IN * rows)
+    figure = Figure(figsize=(_WIDTH_IN, height), layout="constrained")
+    grid = figure.add_gridspec(rows, 2, width_ratios=(1.7, 1.0))
+    top: Axes | None = None
+    for k, (name, label) in enumerate(known):
+        axes = figure.add_subplot(grid[k, 0], sharex=top)
+        top = top or axes
+        _over_time(axes, result, name)
+        axes.set_ylabel(label)
+        axes.tick_params(labelbottom=k == rows - 1)
+        if k == rows - 1:
+            axes.set_xlabel("time (s)")
+    _plan(figure.add_subplot(grid[:, 1] if known else grid[:, :]), result)
+    figure.suptitle(_title(result), fontsize=11)
+    return figure
+
+
+def _title(result: LocateResult) -> str:
+    heard = f"heard in {len(result.estimates)} of {result.frames} frames"
+    summary = result.summary()
+    if not result.estimates or "range" in summary["observable"]:
+        return heard
+    return f"{heard}; range not observable"
+
+
+def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
+    """Estimates with bars; the summary as a line, its error as a band."""
+    std_name = name.replace("_deg", "_std_deg").replace("_m", "_std_m")
+    rows = [
+        (e.t_s, getattr(e, name), getattr(e, std_name))
+        for e in result.estimates
+        if getattr(e, name) is not None
+    ]
+    times, values, errors = np.array(rows).T
+    summary = result.summary()
+    centre, std = summary[name], summary[std_name]
+    if name == "bearing_deg" and centre is not None:
+        # A bearing near 180 deg must not jump from top to bottom.
+        values = centre + (values - centre + 180.0) % 360.0 - 180.0
+    axes.errorbar(
+        times,
+        values,
+        yerr=errors,
+        fmt="o",
+        markersize=3.0,
+        linewidth=0.8,
+        color=COLOURS["estimate"],
+    )
+    if centre is not None:
+        axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
+        axes.axhspan(
+            centre - std,
+            centre + std,
+            color=COLOURS["source"],
+            alpha=0.15,
+            linewidth=0,
+        )
+    axes.grid(color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def _plan(axes: Axes, result: LocateResult) -> None:
+    """Microphones and bearings seen from above, in the frame of the geometry."""
+    places = result.shape.p_AM[:, :2]
+    ranges = [e.range_m for e in result.estimates if e.range_m is not None]
+    size = max(1.6 * float(np.abs(places).max()), 1.15 * max(ranges, default=0.0))
+    for e in result.estimates:
+        if e.bearing_deg is not None:
+            x, y = _ray(e.bearing_deg, e.range_m or 0.85 * size)
+            axes.plot((0, x), (0, y), color=COLOURS["estimate"], alpha=0.25)
+    summary = result.summary()
+    if summary["bearing_deg"] is not None:
+        x, y = _ray(summary["bearing_deg"], 0.95 * size)
+        axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")
+        for other in summary["alternatives"]:
+            if math.isclose(other["bearing_deg"], summary["bearing_deg"], abs_tol=0.5):
+                continue  # the mirror image lies below
+            x, y = _ray(other["bearing_deg"], 0.95 * size)
+            axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
+    axes.plot(*places.T, "o", color=COLOURS["robot"], markersize=4, label="microphones")
+    for k, (x, y) in enumerate(places):
+        axes.annotate(
+            f"{k + 1}",
+            (x, y),
+            xytext=(4, 4),
+            textcoords="offset points",
+            fontsize=8,
+        )
+    axes.set_aspect("equal")
+    axes.set_xlim(-size, size)
+    axes.set_ylim(-size, size)
+    axes.set_xlabel("x (m)")
+    axes.set_ylabel("y (m)")
+    axes.legend(
+        fontsize=8,
+        frameon=False,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=3,
+    )
+
+
+def _ray(bearing_deg: float, length: float) -> tuple[float, float]:
+    angle = math.radians(bearing_deg)
+    return length * math.cos(angle), length * math.sin(angle)

@@ -1,0 +1,74 @@
+"""A located source on a terminal."""
+
+from __future__ import annotations
+
+from analysis.recordings.locate_result import LocateResult, SourceEstimate
+
+__all__ = ["locate_text"]
+
+_WHY_NOTHING = (
+    "; there is silence or noise, or the positions (in m) or the speed of sound are "
+    "not those of the array, or the source is within 0.2 m of its centre"
+)
+
+_COLUMNS = (
+    ("bearing_deg", "bearing/deg", 11, 2),
+    ("bearing_std_deg", "std", 7, 3),
+    ("elevation_deg", "elevation/deg", 13, 1),
+    ("elevation_std_deg", "std", 6, 2),
+    ("range_m", "range/m", 8, 3),
+    ("range_std_m", "std", 7, 3),
+)
+
+
+def locate_text(result: LocateResult) -> str:
+    """A summary, and a row for each estimate."""
+    heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
+    faults = [fault.message for fault in result.faults]
+    if not result.estimates:
+        return "\n".join([f"{heard}: nothing to locate{_WHY_NOTHING}", *faults])
+    lines = [heard, *_direction(result), _range(result), *faults, ""]
+    lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
+    lines += [_row(estimate) for estimate in result.estimates]
+    return "\n".join(lines)
+
+
+def _direction(result: LocateResult) -> list[str]:
+    summary = result.summary()
+    parts = []
+    if summary["bearing_deg"] is not None:
+        parts.append(
+            f"bearing {summary['bearing_deg']:.2f} deg "
+            f"(std {summary['bearing_std_deg']:.2f})"
+        )
+    if summary["elevation_deg"] is not None:
+        parts.append(
+            f"elevation {summary['elevation_deg']:.1f} deg "
+            f"(std {summary['elevation_std_deg']:.1f})"
+        )
+    lines = [", ".join(parts) or "direction not observable: the row is slanted"]
+    for other in summary["alternatives"]:
+        text = f"or bearing {other['bearing_deg']:.2f} deg"
+        if other["elevation_deg"] is not None:
+            text += f", elevation {other['elevation_deg']:.1f} deg"
+        cause = "a row" if summary["ambiguity"] == "front_back" else "a plane"
+        lines.append(f"{text}: {cause} of microphones cannot tell")
+    if summary["elevation_deg"] is None:
+        lines.append("elevation not observable with this array")
+    return lines
+
+
+def _range(result: LocateResult) -> str:
+    summary = result.summary()
+    if summary["range_m"] is None:
+        size = 100.0 * result.shape.aperture_m
+        return f"range not observable (microphones within {size:.1f} cm)"
+    return f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f})"
+
+
+def _row(estimate: SourceEstimate) -> str:
+    row = f"{estimate.t_s:7.3f}"
+    for name, _, width, digits in _COLUMNS:
+        value = getattr(estimate, name)
+        row += f"  {'-':>{width}}" if value is None else f"  {value:{width}.{digits}f}"
+    return row

@@ -1,0 +1,220 @@
+"""From where a recording sounds, stretch by stretch."""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
+from analysis.recordings.recording_spectra import RecordingSpectra
+from systems.hearing.steered_response import (
+    LAG_DENSITY,
+    SearchGrid,
+    arrival_delays,
+    steered_response,
+)
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["RecordingSearch", "Sighting"]
+
+# Least mean weight of a stretch's snapshots: the rest is silence or echo.
+_LEAST_WEIGHT = 0.02
+# A response counts above that of a diffuse field by this many deviations of
+# what independent noise would give, and by this share of what direct sound
+# alone would: no real noise comes from all around quite alike.
+_DEVIATIONS = 5.0
+_LEAST_DIRECT = 0.1
+# To choose among the peaks of a stretch its neighbours help: how many on either
+# side, and by which share.
+_NEIGHBOURS, _HELP = 4, 0.5
+
+
+@dataclass(frozen=True)
+class Sighting:
+    """A stretch of the recording in which one place stands out."""
+
+    t_s: float
+    """Middle of the stretch, s."""
+    tau: NDArray[np.float64]
+    """(n - 1,) delays of channels 1 ... n - 1 against channel 0, s."""
+    covariance: NDArray[np.float64]
+    """(n - 1, n - 1), s^2."""
+    coherence: float
+    """Share of the sound that comes straight from the source, 0 to 1."""
+    response: float
+    """Steered response, 0 to 1."""
+
+
+@dataclass(frozen=True)
+class RecordingSearch:
+    """A recording and the array that made it."""
+
+    recording: RecordingSpectra
+    shape: ArrayShape
+    c: float
+    snapshots: int
+    """Of a stretch; stretches overlap by half."""
+
+    @cached_property
+    def stretches(self) -> list[slice]:
+        """Snapshots of each stretch."""
+        count = len(self.recording.starts)
+        size = min(self.snapshots, count)
+        firsts = range(0, count - size + 1, max(1, size // 2))
+        return [slice(k, k + size) for k in firsts]
+
+    @property
+    def stretch_s(self) -> float:
+        """How long a stretch is, s."""
+        count = self.stretches[0].stop
+        samples = self.recording.window.size + (count - 1) * self.recording.hop
+        return samples / self.recording.sample_rate_hz
+
+    @cached_property
+    def grid(self) -> SearchGrid:
+        """Places to search."""
+        return SearchGrid.of(
+            self.shape, self.c, self.recording.high_hz, self._length / self._window_s
+        )
+
+    @property
+    def _window_s(self) -> float:
+        return self.recording.window.size / self.recording.sample_rate_hz
+
+    @cached_property
+    def _length(self) -> int:
+        """Samples of a correlation in a whole window."""
+        least = LAG_DENSITY * self.recording.high_hz * self._window_s
+        return int(fft.next_fast_len(math.ceil(least), real=True))
+
+    def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
+        """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""
+        whole = np.zeros((len(cross), self._length // 2 + 1), dtype=np.complex64)
+        whole[:, self.recording.bins] = cross
+        correlation = fft.irfft(whole, self._length) * (0.5 * self._length)
+        m = self.grid.max_lag
+        gated = np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
+        return steered_response(gated, self.grid)
+
+    @cached_property
+    def diffuse_response(self) -> NDArray[np.float32]:
+        """(g,) response to sound that comes from all around alike."""
+        weights = self.recording.weights.mean(axis=0, dtype=np.float64)
+        phase = np.outer(self.shape.distances_m, self.recording.angular_frequency)
+        share = weights / max(weights.sum(), 1e-30)
+        cross = np.sinc(phase / (math.pi * self.c)) * share
+        return self._responses(cross.astype(np.complex64))
+
+    def mean_response(self) -> float:
+        """Greatest response of a stretch, on average: how well all pairs agree."""
+        weights = [float(self.recording.weights[s].mean()) for s in self.stretches]
+        best = [
+            float(self._stretch_response(s, w).max())
+            for s, w in zip(self.stretches, weights, strict=True)
+        ]
+        return float(np.average(best, weights=np.array(weights) + 1e-30))
+
+    def sightings(self) -> Iterator[Sighting]:
+        """Stretches with a source, in order of time."""
+        held: deque[tuple[slice, float, NDArray[np.float32]]] = deque()
+        near = np.zeros(len(self.grid.lags))
+        weight = 0.0
+        queue = iter(self.stretches)
+        middle = 0
+        for k in range(len(self.stretches) + _NEIGHBOURS):
+            new = next(queue, None)
+            if new is not None:
+                value = float(self.recording.weights[new].mean())
+                response = self._stretch_response(new, value)
+                held.append((new, value, response))
+                near += value * response
+                weight += value
+            if k < _NEIGHBOURS:
+                continue
+            stretch, value, response = held[middle]
+            found = self._sighting(stretch, value, response, near / max(weight, 1e-30))
+            if found is not None:
+                yield found
+            middle += 1
+            if middle > _NEIGHBOURS:
+                _, value, response = held.popleft()
+                near -= value * response
+                weight -= value
+                middle -= 1
+
+    def _stretch_response(self, stretch: slice, weight: float) -> NDArray[np.float32]:
+        if weight < _LEAST_WEIGHT:
+            return np.zeros(len(self.grid.lags), dtype=np.float32)
+        weights = self.recording.weights[stretch]
+        spectra = self.recording.spectra(stretch)
+        power = np.mean(np.abs(spectra) ** 2, axis=0)
+        spectra *= np.sqrt(weights / np.maximum(power, np.finfo(np.float32).tiny))
+        first, second = self.shape.pairs.T
+        cross = np.empty((len(first), spectra.shape[2]), dtype=np.complex64)
+        for p, (i, j) in enumerate(zip(first, second, strict=True)):
+            cross[p] = np.sum(spectra[i].conj() * spectra[j], axis=0)
+        return self._responses(cross / weights.sum())
+
+    def _sighting(
+        self,
+        stretch: slice,
+        weight: float,
+        response: NDArray[np.float32],
+        near: NDArray[np.float64],
+    ) -> Sighting | None:
+        if weight < _LEAST_WEIGHT:
+            return None
+        best = int(np.argmax(response + _HELP * near))
+        if response[best] < self._threshold(best, stretch):
+            return None
+        fit = self._delays(best, stretch)
+        if fit is None:
+            return None
+        recording = self.recording
+        first, last = recording.starts[[stretch.start, stretch.stop - 1]]
+        return Sighting(
+            t_s=float(first + last + recording.window.size)
+            / (2.0 * recording.sample_rate_hz),
+            tau=fit.tau,
+            covariance=fit.covariance,
+            coherence=fit.coherence,
+            response=float(response[best]),
+        )
+
+    def _threshold(self, place: int, stretch: slice) -> float:
+        # Windows that overlap by half, with the shape used, are worth half as
+        # many independent values; and few of the pairs are independent.
+        values = self.recording.weights[stretch].sum() / 2.0
+        deviation = 1.0 / math.sqrt(2.0 * (self.shape.count - 1) * values)
+        diffuse = float(self.diffuse_response[place])
+        least = _LEAST_DIRECT * (1.0 - diffuse)
+        return diffuse + max(_DEVIATIONS * deviation, least)
+
+    def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
+        """Delays of the channels, aligned for a place of the grid first."""
+        grid, rate = self.grid, self.recording.sample_rate_hz
+        chosen = slice(place, place + 1)
+        later = arrival_delays(
+            grid.p_AS[chosen], grid.inverse_range[chosen], self.shape, self.c
+        )[0]
+        lags = np.rint(later * rate).astype(np.int64)
+        fit = fit_aligned_delays(
+            self.recording.spectra(stretch, lags),
+            self.recording.weights[stretch],
+            self.recording.angular_frequency,
+            grid.coarseness,
+        )
+        if fit is None:
+            return None
+        return AlignedDelays(
+            tau=fit.tau + (lags[1:] - lags[0]) / rate,
+            covariance=fit.covariance,
+            coherence=fit.coherence,
+        )

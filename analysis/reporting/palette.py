@@ -1,0 +1,20 @@
+"""The colours of things: the same in every picture."""
+
+from __future__ import annotations
+
+__all__ = ["COLOURS"]
+
+#: Okabe and Ito's palette: told apart with any colour vision.
+COLOURS = {
+    "robot": "#0072B2",
+    "source": "#D55E00",
+    "estimate": "#CC79A7",
+    "obstacle": "#4D4D4D",
+    "echo": "#E69F00",
+    "empty": "#999999",
+    "attraction": "#D55E00",
+    "repulsion": "#4D4D4D",
+    "sound": "#F0E442",
+    "left": "#56B4E9",
+    "right": "#E69F00",
+}

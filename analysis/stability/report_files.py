@@ -1,0 +1,126 @@
+"""A stability analysis as a JSON document, as text, and as files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any
+
+from analysis.models.model_export import write_models
+from analysis.reporting.plain_values import plain
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.stability.law_analysis import LawAnalysis
+from analysis.stability.report_page import stability_page
+from analysis.stability.verdicts import Verdict, compare_verdicts
+from diagrams import dump_scenario
+
+__all__ = ["stability_document", "stability_text", "write_stability"]
+
+
+def stability_document(
+    analyses: Sequence[LawAnalysis], out: Path | None
+) -> dict[str, Any]:
+    """The JSON document: of one law, or of several beside each other.
+
+    One law: its keys at the top. Several: ``laws`` holds a document each, and
+    ``comparison`` the verdicts side by side.
+    """
+    first = analyses[0].scenario
+    common = {
+        "schema_version": SCHEMA_VERSION,
+        "scenario": first.name,
+        "seed": first.seed,
+    }
+    ending = {"versions": versions(), "out": str(out) if out is not None else None}
+    laws = [_law_document(analysis) for analysis in analyses]
+    if len(laws) == 1:
+        return {**common, **laws[0], **ending}
+    return {**common, "laws": laws, "comparison": plain(comparison(analyses)), **ending}
+
+
+def comparison(analyses: Sequence[LawAnalysis]) -> tuple[Any, ...]:
+    """Verdicts side by side; of one law too."""
+    return compare_verdicts({a.law: _verdicts(a) for a in analyses})
+
+
+def _verdicts(analysis: LawAnalysis) -> Sequence[Verdict]:
+    return analysis.data("verdicts") or ()
+
+
+def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
+    findings = analysis.findings.values()
+    parts: dict[str, Any] = {}
+    for finding in findings:
+        part = finding.part
+        if finding.problem:
+            failed = {"failed": True} if finding.failed else {}
+            parts[part.key] = {"problem": finding.problem, **failed}
+        elif part.document is None:
+            parts[part.key] = plain(finding.data)
+        else:
+            for key, value in plain(part.document(finding.data)).items():
+                # Parts may add to a list of an earlier one.
+                earlier = parts.get(key)
+                parts[key] = earlier + value if isinstance(earlier, list) else value
+    return {
+        "law": analysis.law,
+        **parts,
+        "model": plain(asdict(analysis.sheet)),
+        "seconds": {f.part.key: round(f.seconds, 3) for f in findings},
+    }
+
+
+def stability_text(document: dict[str, Any]) -> str:
+    """The verdicts on one screen."""
+    rows = document.get("comparison")
+    if rows is None:
+        verdicts = document["verdicts"]
+        known = verdicts if isinstance(verdicts, list) else []
+        rows = [_as_comparison(row, document["law"]) for row in known]
+    laws = list(rows[0]["values"]) if rows else []
+    lines = [f"{'':<34}{'threshold':>14}" + "".join(f"{law:>22}" for law in laws)]
+    for row in rows:
+        cells = "".join(
+            f"{_value(row['values'][law]):>12} {_mark(row['verdicts'][law]):>9}"
+            for law in laws
+        )
+        lines.append(f"{row['name']:<34}{row['threshold']:>14}{cells}")
+    return "\n".join(lines)
+
+
+def _as_comparison(row: dict[str, Any], law: str) -> dict[str, Any]:
+    return {
+        **row,
+        "values": {law: row["value"]},
+        "verdicts": {law: row["verdict"]},
+    }
+
+
+def _value(value: float | None) -> str:
+    return "-" if value is None else f"{value:.4g}"
+
+
+def _mark(verdict: str) -> str:
+    return {"not applicable": "n/a"}.get(verdict, verdict)
+
+
+def write_stability(
+    analyses: Sequence[LawAnalysis], document: dict[str, Any], directory: Path
+) -> None:
+    """Writes ``report.html``, ``summary.json``, ``scenario.yaml`` and models.
+
+    Linear models go to ``models.mat`` and to ``models/*.csv``.
+    """
+    several = len(analyses) > 1
+    models = [
+        replace(model, name=f"{analysis.law} {model.name}") if several else model
+        for analysis in analyses
+        for model in analysis.models
+    ]
+    write_models(models, directory)
+    scenario = analyses[0].scenario
+    (directory / "scenario.yaml").write_text(dump_scenario(scenario), "utf-8")
+    (directory / "summary.json").write_text(json.dumps(document) + "\n")
+    (directory / "report.html").write_text(stability_page(analyses), "utf-8")

@@ -1,0 +1,179 @@
+"""A Dask cluster that runs the points of a sweep.
+
+Each thread of a Dask worker keeps a ``WorkerProcess``, as a local sweep does:
+blocks written in Python are never freed, and a Dask worker lives long.
+"""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from itertools import islice
+from queue import Empty, SimpleQueue
+from typing import Any
+from urllib.parse import urlsplit
+from uuid import uuid4
+
+from analysis.reporting.provenance import versions
+from analysis.sweeps.one_run import Outcome, Task, lost_outcome
+from analysis.sweeps.processes import (
+    ATTEMPTS,
+    PULSE_S,
+    WorkerError,
+    WorkerProcess,
+)
+from systems.framework.input_error import InputError
+
+__all__ = ["connect", "run_on_cluster"]
+
+#: Tasks that the cluster holds for each of its threads: one runs, one waits.
+TASKS_A_THREAD = 2
+_CONNECT_S = 10.0
+
+_idle: SimpleQueue[WorkerProcess] = SimpleQueue()
+
+
+def connect(scheduler: str) -> Any:
+    """A Dask client of a cluster that can run sweeps.
+
+    Args:
+        scheduler: Address of the scheduler, as tcp://host:8786.
+
+    Raises:
+        InputError: It cannot be reached, or has no workers, or they have other
+            packages than this process; ``scheduler: ...``.
+    """
+    try:
+        import distributed
+    except ImportError:
+        raise InputError(
+            "scheduler", "needs the package distributed; install phonotaxis[sweep]"
+        ) from None
+    try:
+        address = urlsplit(scheduler)
+        # Dask's own client is noisy about an address at which nobody listens.
+        with socket.create_connection((address.hostname, address.port), _CONNECT_S):
+            client = distributed.Client(scheduler, timeout=_CONNECT_S)
+        trouble = _trouble(client)
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            "scheduler",
+            f"{scheduler} cannot be reached ({error}); give the address "
+            "that `dask scheduler` prints, as tcp://host:8786",
+        ) from None
+    if trouble:
+        client.close()
+        raise InputError("scheduler", f"{scheduler} {trouble}")
+    return client
+
+
+def _trouble(client: Any) -> str:
+    """Why the cluster's workers cannot run a sweep; empty if they can."""
+    found = client.run(versions, on_error="return")
+    if not found:
+        return "has no workers; start some with `dask worker` and that address"
+    for worker, theirs in found.items():
+        if isinstance(theirs, Exception):
+            return f"has a worker {worker} without phonotaxis ({theirs}); install it"
+        for name, version in versions().items():
+            if theirs.get(name) != version:
+                return (
+                    f"has a worker {worker} with {name} {theirs.get(name)}, where we "
+                    f"have {version}; install the same"
+                )
+    return ""
+
+
+def run_on_cluster(
+    tasks: Iterator[Task], pulse: Callable[[], None], *, client: Any
+) -> Generator[Outcome]:
+    """Runs tasks on a cluster.
+
+    Args:
+        tasks: What to run.
+        client: See ``connect``; closed at the end.
+        pulse: Called a few times a second; what it raises ends the work.
+
+    Yields:
+        Outcomes as they come. The runs of a Dask worker that is lost go to the
+        others; one that takes several workers with it is given up.
+
+    Raises:
+        WorkerError: The cluster is gone.
+    """
+    from distributed import wait
+
+    sweep = uuid4().hex
+    futures: dict[Any, Task] = {}
+    try:
+        while True:
+            room = TASKS_A_THREAD * _threads(client) - len(futures)
+            for task in islice(tasks, max(0, room)):
+                key = f"phonotaxis-{sweep}-{task.point.index}"
+                futures[client.submit(_run_remotely, task, key=key)] = task
+            if not futures:
+                return
+            try:
+                done = wait(list(futures), PULSE_S, "FIRST_COMPLETED").done
+            except TimeoutError:
+                done = set()
+            for future in done:
+                yield _outcome(future, futures.pop(future))
+            pulse()
+    except (OSError, CancelledError) as error:
+        raise WorkerError("the Dask cluster is gone") from error
+    finally:
+        with suppress(OSError, CancelledError):
+            client.cancel(list(futures), force=True)
+            client.run(_dismiss_idle, on_error="ignore")
+        with suppress(OSError, CancelledError):
+            client.close()
+
+
+def _threads(client: Any) -> int:
+    return max(1, sum(client.nthreads().values()))
+
+
+def _outcome(future: Any, task: Task) -> Outcome:
+    from distributed import KilledWorker
+
+    if future.status == "finished":
+        outcome: Outcome = future.result()
+        return outcome
+    if future.status == "error":
+        error = future.exception()
+        if isinstance(error, KilledWorker):
+            return lost_outcome(task, f"its Dask workers were lost: {error}")
+        raise WorkerError(f"a Dask worker failed: {type(error).__name__}: {error}")
+    raise WorkerError("the Dask cluster is gone")
+
+
+def _run_remotely(task: Task) -> Outcome:
+    """In a thread of a Dask worker."""
+    for _ in range(ATTEMPTS):
+        try:
+            worker = _idle.get_nowait()
+        except Empty:
+            worker = WorkerProcess(task.scenario)
+        try:
+            outcome = worker.run(task)
+        except EOFError:
+            worker.close()
+            continue
+        except BaseException:
+            worker.close()
+            raise
+        _idle.put(worker)
+        return outcome
+    return lost_outcome(task, f"its worker process ended {ATTEMPTS} times")
+
+
+def _dismiss_idle() -> None:
+    """In a Dask worker: ends the processes that wait for more."""
+    while True:
+        try:
+            _idle.get_nowait().close()
+        except Empty:
+            return

@@ -1,0 +1,168 @@
+"""What the runs of a sweep say, with intervals: by cell, and by drawn field."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from analysis.reporting.intervals import median_interval, wilson_interval
+from analysis.sweeps.one_run import FAILED
+from analysis.sweeps.plan import SweepPlan
+from diagrams.stop_rules import SUCCESSFUL
+
+__all__ = [
+    "QUANTITIES",
+    "Estimate",
+    "Marginal",
+    "Quantity",
+    "cell_label",
+    "ended",
+    "marginal",
+    "short",
+    "shown",
+]
+
+#: A drawn number is cut into at most so many bins, of so many runs or more.
+MOST_BINS, LEAST_RUNS = 8, 20
+
+
+class Estimate(NamedTuple):
+    """A figure with its 95 % interval; NaN where no run has one."""
+
+    value: float
+    low: float
+    high: float
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Something to estimate from runs."""
+
+    name: str
+    """Key in documents."""
+    title: str
+    """Words for pictures, with the unit."""
+    causes: tuple[str, ...] = ()
+    """The share of runs that end so; none: the median of a metric."""
+    metric: str = ""
+    """Column of the results."""
+
+    @property
+    def rate(self) -> bool:
+        """Whether it is a share, between 0 and 1."""
+        return bool(self.causes)
+
+    def estimate(self, runs: pd.DataFrame) -> Estimate:
+        """The figure for runs that ended; see ``ended``."""
+        nothing = Estimate(np.nan, np.nan, np.nan)
+        if self.rate:
+            count = int(runs["cause"].isin(self.causes).sum())
+            if runs.empty:
+                return nothing
+            return Estimate(count / len(runs), *wilson_interval(count, len(runs)))
+        if self.metric not in runs:
+            return nothing
+        values = runs[self.metric].dropna().to_numpy()
+        if not len(values):
+            return nothing
+        return Estimate(float(np.median(values)), *median_interval(values))
+
+
+#: What pages and pictures show.
+QUANTITIES = (
+    Quantity("success", "runs that end well", causes=SUCCESSFUL),
+    Quantity("collision", "runs that end in a collision", causes=("collision",)),
+    Quantity(
+        "minimum_clearance_m",
+        "least clearance, median (m)",
+        metric="minimum_clearance_m",
+    ),
+    Quantity(
+        "following_error_rms_m",
+        "following error rms, median (m)",
+        metric="following_error_rms_m",
+    ),
+)
+
+
+def ended(results: pd.DataFrame) -> pd.DataFrame:
+    """The runs that came to an end, whichever: not those that raised an error."""
+    return results[results["cause"] != FAILED]
+
+
+@dataclass(frozen=True)
+class Marginal:
+    """A quantity against one drawn field, whatever the others were."""
+
+    path: str
+    places: NDArray[np.float64]
+    """Median of the field in each bin, or the number of each choice."""
+    labels: tuple[str, ...]
+    """Names of the choices; none for numbers."""
+    estimates: tuple[Estimate, ...]
+    """One a bin."""
+
+
+def marginal(
+    plan: SweepPlan, key: str, runs: pd.DataFrame, quantity: Quantity
+) -> Marginal:
+    """Estimates for bins of a drawn field.
+
+    Args:
+        plan: The sweep.
+        key: Of ``plan.draw``; of several paths the first one stands for all.
+        runs: That ended.
+        quantity: What is estimated.
+
+    Returns:
+        Bins hold about the same number of runs each, or one choice each.
+    """
+    path = key.partition(",")[0].strip()
+    values = runs[path]
+    if not plan.draw[key].numeric:
+        names = sorted(set(values), key=str)
+        return Marginal(
+            path,
+            np.arange(len(names), dtype=float),
+            tuple(short(name) for name in names),
+            tuple(quantity.estimate(runs[values == name]) for name in names),
+        )
+    count = int(np.clip(len(runs) // LEAST_RUNS, 1, MOST_BINS))
+    parts = np.array_split(np.argsort(values.to_numpy(), kind="stable"), count)
+    groups = [runs.iloc[part] for part in parts if len(part)]
+    return Marginal(
+        path,
+        np.array([float(group[path].median()) for group in groups]),
+        (),
+        tuple(quantity.estimate(group) for group in groups),
+    )
+
+
+def shown(quantity: Quantity, estimate: Estimate) -> str:
+    """An estimate with its interval, for readers; a dash where there is none."""
+    if math.isnan(estimate.value):
+        return "-"
+    scale, form = (100.0, ".0f") if quantity.rate else (1.0, ".3f")
+    value, low, high = (format(scale * x, form) for x in estimate)
+    unit = " %" if quantity.rate else ""
+    return f"{value}{unit} ({low} to {high})"
+
+
+def cell_label(fields: dict[str, Any], names: Sequence[str] | None = None) -> str:
+    """Fields of a cell in words: last part of each path, and value."""
+    chosen = fields if names is None else {name: fields[name] for name in names}
+    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in chosen.items()]
+    return ", ".join(pairs) or "all runs"
+
+
+def short(value: Any, most: int = 24) -> str:
+    """A value in few letters."""
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= most else f"{text[: most - 3]}..."

@@ -1,0 +1,222 @@
+"""A sweep as one page: how the runs ended, heat maps, marginals, failures."""
+
+from __future__ import annotations
+
+import json
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.reporting.html_page import (
+    Cell,
+    definitions,
+    figure_html,
+    heading,
+    page,
+    paragraph,
+    section,
+    table,
+)
+from analysis.sweeps.estimates import QUANTITIES, cell_label, ended, shown
+from analysis.sweeps.one_run import FAILED
+from analysis.sweeps.plan import SweepPlan, SweepPoint
+from analysis.sweeps.plots import (
+    grid_axes,
+    plot_heat_maps,
+    plot_line,
+    plot_marginal,
+)
+from analysis.sweeps.sweep import reproducing_command
+from diagrams.stop_rules import SUCCESSFUL
+
+__all__ = ["sweep_page", "write_sweep"]
+
+#: Pages stay readable: so many maps, and so many commands for errors and others.
+MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
+#: With more cells their tables come last.
+MOST_CELLS = 24
+
+
+def write_sweep(
+    plan: SweepPlan,
+    points: list[SweepPoint],
+    results: pd.DataFrame,
+    summary: dict[str, Any],
+) -> None:
+    """Writes ``summary.json`` and ``report.html`` into the sweep's directory."""
+    out = Path(summary["out"])
+    document = json.dumps(summary, indent=2, allow_nan=False)
+    (out / "summary.json").write_text(document + "\n", "utf-8")
+    (out / "report.html").write_text(
+        sweep_page(plan, points, results, summary), "utf-8"
+    )
+
+
+def sweep_page(
+    plan: SweepPlan,
+    points: list[SweepPoint],
+    results: pd.DataFrame,
+    summary: dict[str, Any],
+) -> str:
+    """The whole page; arguments as of ``sweep_summary``."""
+    cells = {"How the runs ended": [_causes(plan, results), _figures(plan, results)]}
+    few = len(plan.cells()) <= MOST_CELLS
+    parts = {
+        "Summary": _about(plan, results, summary),
+        **(cells if few else {}),
+        "Over the grid": _maps(plan, results),
+        "Over the draws": _marginals(plan, results),
+        "Runs to look at": _commands(points, results, Path(summary["out"])),
+        **({} if few else cells),
+    }
+    shown = {title: inner for title, inner in parts.items() if inner}
+    contents = [(_anchor(title), title) for title in shown]
+    return page(
+        f"Sweep {plan.name}: {plan.scenario}",
+        contents,
+        [section(_anchor(title), title, inner) for title, inner in shown.items()],
+    )
+
+
+def _anchor(title: str) -> str:
+    return title.lower().replace(" ", "-")
+
+
+def _about(
+    plan: SweepPlan, results: pd.DataFrame, summary: dict[str, Any]
+) -> list[str]:
+    causes = results["cause"].value_counts()
+    draws = "all cells have the same" if plan.pair else "each cell has its own"
+    rows = [
+        ("Scenario", plan.scenario),
+        ("Runs", f"{len(results)}: {plan.runs} in each of {len(plan.cells())} cells"),
+        ("Ended", ", ".join(f"{count} {cause}" for cause, count in causes.items())),
+        ("Seed", f"{plan.seed}; {draws} draws"),
+        ("Set", _listed(plan.set)),
+        ("Grid", _listed({key: list(v) for key, v in plan.grid.items()})),
+        (
+            "Draw",
+            _listed({k: d.model_dump(exclude_none=True) for k, d in plan.draw.items()}),
+        ),
+        ("Drawn again", f"{int((results['redraws'] > 0).sum())} runs"),
+        ("Simulated", f"{summary['timing']['simulated_s'] / 3600.0:.2f} h"),
+        ("Versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
+    ]
+    return [
+        definitions(rows),
+        paragraph(
+            "Brackets and bars are 95 % intervals: Wilson's for shares of runs, order "
+            "statistics for medians. Runs that raised an error are in no figure but "
+            "the count of them."
+        ),
+    ]
+
+
+def _listed(fields: dict[str, Any]) -> str:
+    pairs = [f"`{key}`: {json.dumps(value)}" for key, value in fields.items()]
+    return "; ".join(pairs) or "nothing"
+
+
+def _causes(plan: SweepPlan, results: pd.DataFrame) -> str:
+    order = results["cause"].value_counts().index
+    good = [cause for cause in SUCCESSFUL if cause in order]
+    causes = [*good, *(cause for cause in order if cause not in good)]
+    rows: list[list[Cell]] = []
+    for cell, fields in enumerate(plan.cells()):
+        runs = results[results["cell"] == cell]
+        counts = runs["cause"].value_counts()
+        rows.append(
+            [
+                cell_label(fields),
+                len(runs),
+                *(int(counts.get(cause, 0)) for cause in causes),
+            ]
+        )
+    return table(["cell", "runs", *causes], rows, caption="Runs by cause")
+
+
+def _figures(plan: SweepPlan, results: pd.DataFrame) -> str:
+    rows: list[list[Cell]] = []
+    for cell, fields in enumerate(plan.cells()):
+        runs = ended(results[results["cell"] == cell])
+        figures = [shown(quantity, quantity.estimate(runs)) for quantity in QUANTITIES]
+        rows.append([cell_label(fields), *figures])
+    headings = ["cell", *(quantity.title for quantity in QUANTITIES)]
+    return table(headings, rows, caption="Figures with 95 % intervals")
+
+
+def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
+    axes = grid_axes(plan)
+    if not axes:
+        return []
+    if len(axes) == 1 and len(plan.grid) == 1:
+        caption = f"Every figure over `{axes[0]}`."
+        return [figure_html(plot_line(plan, results, axes[0]), "line", caption)]
+    (x, y), others = _map_axes(plan, axes)
+    cases = [
+        dict(zip(others, values, strict=True))
+        for values in product(*(plan.grid[path] for path in others))
+    ]
+    maps = [
+        figure_html(
+            plot_heat_maps(plan, results, x, y, rest),
+            f"map{k}",
+            f"Every figure over `{x}` and `{y}`: {cell_label(rest)}.",
+        )
+        for k, rest in enumerate(cases[:MOST_MAPS])
+    ]
+    if len(cases) > MOST_MAPS:
+        maps.append(paragraph(f"{len(cases) - MOST_MAPS} further maps are left out."))
+    return maps
+
+
+def _map_axes(plan: SweepPlan, axes: list[str]) -> tuple[list[str], list[str]]:
+    """The two fields with most values span the maps; the others have a map each."""
+    by_size = sorted(plan.grid, key=lambda path: -len(plan.grid[path]))
+    chosen = [path for path in plan.grid if path in by_size[:2]]
+    return chosen, [path for path in plan.grid if path not in chosen]
+
+
+def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
+    return [
+        figure_html(
+            plot_marginal(plan, results, key),
+            f"marginal{k}",
+            f"Every figure over `{key}`, in bins of as many runs each.",
+        )
+        for k, key in enumerate(plan.draw)
+        if not ended(results).empty
+    ]
+
+
+def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> list[str]:
+    """The first runs of each cause that is no success, with their commands."""
+    parts = [paragraph("Each command does one run again, with its replay.")]
+    causes = [c for c in results["cause"].value_counts().index if c not in SUCCESSFUL]
+    for cause in sorted(causes, key=lambda cause: cause != FAILED):
+        runs = results[results["cause"] == cause]
+        caption = f"{cause}: {len(runs)} runs"
+        most = MOST_ERRORS if cause == FAILED else MOST_OTHERS
+        if len(runs) > most:
+            caption += f", of which the first {most}"
+        parts.append(heading(3, caption))
+        parts.append(
+            definitions(
+                (
+                    f"Run {row['index']}",
+                    f"{_remark(row)}`{reproducing_command(out, points[row['index']])}`",
+                )
+                for row in runs.head(most).to_dict("records")
+            )
+        )
+    return parts if causes else []
+
+
+def _remark(row: dict[str, Any]) -> str:
+    if row["cause"] == FAILED:
+        return f"{row['error']}: "
+    if row["cause"] == "collision":
+        return f"{row['collision_object']}, by the {row['collision_fault']}'s fault: "
+    return ""

@@ -1,0 +1,338 @@
+"""The plan of a sweep: which scenarios it runs, each with its draws and its seed."""
+
+from __future__ import annotations
+
+import copy
+import hashlib
+import json
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from io import StringIO
+from itertools import product
+from pathlib import Path
+from typing import Annotated, Any
+from zlib import crc32
+
+import numpy as np
+from pydantic import Field, Strict, ValidationError, model_validator
+from ruamel.yaml import YAML
+
+from analysis.sweeps.distributions import Distribution
+from diagrams import Scenario, load_scenario
+from diagrams.laws import law_files
+from diagrams.loading import (
+    explain,
+    read_mapping,
+    resolve_sound,
+    scenario_from_mapping,
+    set_field,
+)
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Parameters
+
+__all__ = ["SweepPlan", "SweepPoint", "dump_plan", "load_sweep"]
+
+GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
+#: All are drawn and checked before the first one runs, a millisecond each.
+MOST_RUNS = 1_000_000
+Count = Annotated[int, Field(ge=1, le=MOST_RUNS)]
+
+
+@dataclass(frozen=True)
+class SweepPoint:
+    """One run of a sweep."""
+
+    index: int
+    """Its number: ``run`` times the number of cells, plus ``cell``."""
+    cell: int
+    """Which cell of the grid."""
+    run: int
+    """Which draw within the cell."""
+    seed: int
+    """Seed of the scenario."""
+    fields: dict[str, Any]
+    """Dotted path and value of every field of grid and draw."""
+    redraws: int
+    """How often its draws made no valid scenario and were drawn again."""
+
+
+class SweepPlan(Parameters):
+    """What a sweep runs; see docs/sweeps.md.
+
+    Paths are those of ``--set``. A key of ``draw`` may list several paths,
+    parted by commas, which all get the one value that is drawn.
+    """
+
+    name: str = Field(default="sweep", min_length=1, pattern=r"\A[^\n]*\z")
+    """Title of the result page."""
+    scenario: str = Field(default="default", min_length=1)
+    """Library name, or path of a YAML file from ``folder``."""
+    set: dict[str, Any] = Field(default_factory=dict)
+    """Fields with one value."""
+    grid: dict[str, GridValues] = Field(default_factory=dict)
+    """Fields with several values, crossed: each combination is a cell."""
+    draw: dict[str, Distribution] = Field(default_factory=dict)
+    """Fields that are drawn for every run, after set and grid, in this order."""
+    runs: Count = 1
+    """Runs in each cell."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """All draws, and the seeds of all scenarios, come from it."""
+    pair: bool = True
+    """Run k has the same draws and the same scenario seed in every cell."""
+    redraws: int = Field(default=0, ge=0, le=10_000)
+    """How often a run is drawn again whose draws make no valid scenario; with
+    ``pair``, in any cell."""
+    trajectories: bool = False
+    """Whether to keep the trajectory of every run."""
+    folder: str = Field(default=".", min_length=1, exclude=True)
+    """Where relative paths begin: the folder of the sweep's file."""
+
+    @model_validator(mode="after")
+    def _check_fields(self) -> SweepPlan:
+        earlier: list[str] = []
+        for part in ("set", "grid", "draw"):
+            for key in getattr(self, part):
+                for path in _paths(key):
+                    _check_path(f"{part}.{path}", path, earlier)
+                    earlier.append(path)
+        for key, values in self.grid.items():
+            texts = [json.dumps(value, default=str) for value in values]
+            for text in texts:
+                if texts.count(text) > 1:
+                    raise InputError(
+                        f"grid.{key}", f"{text} stands there twice; drop one"
+                    )
+        total = self.runs * math.prod(len(values) for values in self.grid.values())
+        if total > MOST_RUNS:
+            raise InputError(
+                "grid",
+                f"its cells with {self.runs} runs each make {total} runs; at most "
+                f"{MOST_RUNS} are possible, so narrow grid or lower runs",
+            )
+        for part in ("set", "grid"):
+            _check_plain(part, getattr(self, part))
+        _check_plain("draw", self.model_dump(include={"draw"}, exclude_none=True))
+        return self
+
+    @cached_property
+    def base(self) -> dict[str, Any]:
+        """Every field of the scenario, with ``set`` applied; not to be changed."""
+        data = load_scenario(self.source).model_dump(mode="json")
+        for key, value in self.set.items():
+            set_field(data, key, copy.deepcopy(value))
+        resolve_sound(data, Path(self.folder))
+        return scenario_from_mapping(data).model_dump(mode="json")
+
+    @property
+    def source(self) -> str:
+        """Library name, or whole path of the scenario's file."""
+        if Path(self.scenario).suffix in (".yaml", ".yml"):
+            return str(Path(self.folder).absolute() / self.scenario)
+        return self.scenario
+
+    @property
+    def paths(self) -> list[str]:
+        """Dotted paths of all fields that differ between runs."""
+        return [path for key in (*self.grid, *self.draw) for path in _paths(key)]
+
+    def cells(self) -> list[dict[str, Any]]:
+        """The grid's fields in each cell; one cell without fields where it is empty."""
+        return [
+            dict(zip(self.grid, values, strict=True))
+            for values in product(*self.grid.values())
+        ]
+
+    def points(self) -> list[SweepPoint]:
+        """Draws all runs, and validates the scenario of each.
+
+        Returns:
+            Points by index. A point does not depend on ``runs``.
+
+        Raises:
+            InputError: A field is unknown, or a value or a layout is not
+                valid; names the field by its whole path.
+        """
+        cells = self.cells()
+        points: list[SweepPoint] = []
+        for run in range(self.runs):
+            if self.pair:
+                points += self._draw_run(run, list(enumerate(cells)), [])
+                continue
+            for cell, fields in enumerate(cells):
+                label = crc32(json.dumps(fields).encode())
+                points += self._draw_run(run, [(cell, fields)], [label])
+        return points
+
+    def scenario_of(self, point: SweepPoint) -> Scenario:
+        """The scenario of a run."""
+        data = copy.deepcopy(self.base)
+        for path, value in point.fields.items():
+            set_field(data, path, copy.deepcopy(value))
+        data["seed"] = point.seed
+        resolve_sound(data, Path(self.folder))
+        return scenario_from_mapping(data)
+
+    @property
+    def digest(self) -> str:
+        """Hash of everything that the draws and the runs depend on."""
+        document = {**self.model_dump(mode="json"), "base": self.base}
+        if self.file_digests:
+            document["files"] = self.file_digests
+        return hashlib.sha256(json.dumps(document).encode()).hexdigest()
+
+    @cached_property
+    def file_digests(self) -> dict[str, str]:
+        """SHA-256 of each file on which runs depend: sounds, and laws' modules."""
+        values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
+        files: set[Path] = set()
+        for field, text in _texts("", values):
+            if field == "law":
+                files.update(law_files(text))
+            elif field in ("file", "ego_noise_file"):
+                files.add(Path(self.folder, text).resolve())
+        return {
+            str(path): hashlib.sha256(path.read_bytes()).hexdigest()
+            for path in sorted(files)
+            if path.is_file()
+        }
+
+    def _draw_run(
+        self, run: int, cells: list[tuple[int, dict[str, Any]]], stream: list[int]
+    ) -> list[SweepPoint]:
+        """One run in the cells that share its draws."""
+        entropy = [self.seed, run, *stream]
+        seed = int(np.random.SeedSequence(entropy).generate_state(1, np.uint64)[0] >> 1)
+        for attempt in range(self.redraws + 1):
+            drawn = dict(self._draws([*entropy, attempt]))
+            points = [
+                SweepPoint(
+                    index=run * _count(self.grid) + cell,
+                    cell=cell,
+                    run=run,
+                    seed=seed,
+                    fields={**fields, **drawn},
+                    redraws=attempt,
+                )
+                for cell, fields in cells
+            ]
+            complaint = self._complaint(points)
+            if complaint is None:
+                return points
+        assert complaint is not None
+        raise complaint
+
+    def _complaint(self, points: list[SweepPoint]) -> InputError | None:
+        """What is wrong with the first point that makes no valid scenario."""
+        for point in points:
+            try:
+                self.scenario_of(point)
+            except InputError as error:
+                where = f"cell {point.cell} of the grid"
+                if self._valid_undrawn(point):
+                    times = f"drawn {self.redraws + 1} times; " if self.redraws else ""
+                    where = f"run {point.run}, {where}; {times}narrow the draws, or "
+                    where += "raise redraws to replace such runs"
+                return InputError(error.field, f"{error.message} ({where})")
+        return None
+
+    def _valid_undrawn(self, point: SweepPoint) -> bool:
+        undrawn = replace(point, fields=self.cells()[point.cell])
+        try:
+            self.scenario_of(undrawn)
+        except InputError:
+            return False
+        return bool(self.draw)
+
+    def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
+        """Each key has a stream of its own: it does not depend on the others."""
+        for key, distribution in self.draw.items():
+            words = [*entropy, crc32(key.encode())]
+            generator = np.random.Generator(np.random.Philox(seed=words))
+            value = distribution.draw(generator)
+            for path in _paths(key):
+                yield path, value
+
+
+def load_sweep(path: str | Path) -> SweepPlan:
+    """Loads the plan of a sweep.
+
+    Args:
+        path: A YAML file with the fields of ``SweepPlan``. Relative paths in
+            it begin in its folder.
+
+    Raises:
+        InputError: The file cannot be read, or a field is unknown or wrong.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise InputError("sweep", f"there is no file {path}; check the path")
+    data = read_mapping(path)
+    for part in ("set", "grid", "draw"):  # a heading with nothing below it
+        if part in data and data[part] is None:
+            del data[part]
+    data.setdefault("name", path.stem)
+    data["folder"] = str(path.parent.absolute())
+    try:
+        return SweepPlan.model_validate(data)
+    except ValidationError as error:
+        raise explain(error, SweepPlan, "a sweep") from None
+
+
+def dump_plan(plan: SweepPlan) -> str:
+    """The plan as YAML, loadable by ``load_sweep``."""
+    yaml = YAML()
+    yaml.default_flow_style = None
+    stream = StringIO()
+    document = plan.model_dump(mode="json", exclude_none=True)
+    yaml.dump({**document, "scenario": plan.source}, stream)
+    return stream.getvalue()
+
+
+def _paths(key: str) -> list[str]:
+    return [path.strip() for path in key.split(",")]
+
+
+def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
+    """Every text within a value, with the last part of the key that it stands at."""
+    if isinstance(value, dict):
+        for inner, item in value.items():
+            for path in _paths(str(inner)):
+                known = path.split(".")[-1]
+                # A distribution's own fields stand for the field that is drawn.
+                yield from _texts(key if known == "choice" else known, item)
+    elif isinstance(value, list | tuple):
+        for item in value:
+            yield from _texts(key, item)
+    elif isinstance(value, str):
+        yield key, value
+
+
+def _count(grid: dict[str, tuple[Any, ...]]) -> int:
+    return int(np.prod([len(values) for values in grid.values()], dtype=np.int64))
+
+
+def _check_path(field: str, path: str, earlier: list[str]) -> None:
+    if not all(path.split(".")):
+        raise InputError(field, "is no dotted path, as source.speed_m_s; mend it")
+    if path == "seed":
+        raise InputError(
+            field, "every run gets a seed of its own; set the sweep's own seed"
+        )
+    for other in earlier:
+        if path == other or other.startswith(f"{path}."):
+            raise InputError(
+                field, f"would overwrite {other}, which comes before it; drop one"
+            )
+
+
+def _check_plain(part: str, value: Any) -> None:
+    try:
+        json.dumps(value, allow_nan=False)
+    except (TypeError, ValueError):
+        raise InputError(
+            part,
+            "values must be finite numbers, texts, truth values, lists or "
+            "mappings; quote what is meant as text",
+        ) from None

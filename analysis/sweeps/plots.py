@@ -1,0 +1,178 @@
+"""Pictures of a sweep: the grid as heat maps, the draws as marginals."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pandas as pd
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from analysis.sweeps.estimates import (
+    QUANTITIES,
+    Estimate,
+    Quantity,
+    cell_label,
+    ended,
+    marginal,
+    short,
+)
+from analysis.sweeps.plan import SweepPlan
+
+__all__ = ["plot_heat_maps", "plot_line", "plot_marginal"]
+
+WIDTH_IN = 9.0
+#: Okabe and Ito's colours, which the colour-blind can tell apart.
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+
+
+def grid_axes(plan: SweepPlan) -> list[str]:
+    """Fields of the grid that have more than one value."""
+    return [path for path, values in plan.grid.items() if len(values) > 1]
+
+
+def plot_heat_maps(
+    plan: SweepPlan, results: pd.DataFrame, x: str, y: str, rest: dict[str, Any]
+) -> Figure:
+    """Every quantity over two fields of the grid.
+
+    Args:
+        plan: The sweep.
+        results: See ``load_results``.
+        x: Path of the field along the first axis.
+        y: Path of the field along the second one.
+        rest: Values of the grid's other fields.
+    """
+    cells = plan.cells()
+    figure = Figure(figsize=(WIDTH_IN, 7.0), layout="constrained")
+    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+        values = np.full((len(plan.grid[y]), len(plan.grid[x])), np.nan)
+        for row, y_value in enumerate(plan.grid[y]):
+            for column, x_value in enumerate(plan.grid[x]):
+                cell = cells.index({**rest, x: x_value, y: y_value})
+                runs = ended(results[results["cell"] == cell])
+                values[row, column] = quantity.estimate(runs).value
+        _heat_map(axes, quantity, values)
+        _ticks(axes, "x", x, plan.grid[x])
+        _ticks(axes, "y", y, plan.grid[y])
+    return figure
+
+
+def _heat_map(axes: Axes, quantity: Quantity, values: np.ndarray) -> None:
+    top = 1.0 if quantity.rate else None
+    bottom = 0.0 if quantity.rate else None
+    image = axes.imshow(
+        values, origin="lower", aspect="auto", cmap="cividis", vmin=bottom, vmax=top
+    )
+    axes.set_title(quantity.title, fontsize=10)
+    middle = 0.5 * sum(image.get_clim())
+    if values.shape[1] > 8:  # no room for numbers
+        axes.figure.colorbar(image, ax=axes)
+        return
+    for (row, column), value in np.ndenumerate(values):
+        text = "-" if math.isnan(value) else f"{100 * value:.0f} %"
+        if not quantity.rate and not math.isnan(value):
+            text = f"{value:.3g}"
+        colour = "white" if value < middle else "black"
+        axes.text(column, row, text, ha="center", va="center", color=colour, fontsize=9)
+
+
+def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
+    labels = [short(value, 16) for value in values]
+    turned = side == "x" and max(map(len, labels)) * len(labels) > 40
+    places = axes.set_xticks if side == "x" else axes.set_yticks
+    places(
+        range(len(labels)),
+        labels,
+        fontsize=8,
+        rotation=30 if turned else 0,
+        ha="right" if turned or side == "y" else "center",
+    )
+    name = axes.set_xlabel if side == "x" else axes.set_ylabel
+    name(path, fontsize=9)
+
+
+def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
+    """Every quantity over the one field of the grid, with 95 % intervals."""
+    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
+    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+        estimates = [
+            quantity.estimate(ended(results[results["cell"] == cell]))
+            for cell in range(len(plan.grid[x]))
+        ]
+        places = np.arange(len(estimates), dtype=float)
+        _errorbars(axes, places, estimates, COLOURS[0], "")
+        _frame(axes, quantity)
+        _ticks(axes, "x", x, plan.grid[x])
+    return figure
+
+
+def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
+    """Every quantity over one drawn field, a curve for each value of an axis.
+
+    The first axis of the grid with few enough values has the curves; over the
+    others, as over all other draws, the runs are taken together.
+    """
+    runs = ended(results)
+    split = next(
+        (path for path in grid_axes(plan) if len(plan.grid[path]) <= len(COLOURS)), None
+    )
+    groups = {"all runs": runs}
+    if split is not None:
+        cells = plan.cells()
+        groups = {
+            cell_label({split: value}): runs[
+                [cells[cell][split] == value for cell in runs["cell"]]
+            ]
+            for value in plan.grid[split]
+        }
+    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
+    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+        for (label, group), colour in zip(groups.items(), COLOURS, strict=False):
+            if group.empty:
+                continue
+            found = marginal(plan, key, group, quantity)
+            _errorbars(axes, found.places, found.estimates, colour, label)
+            if found.labels:
+                axes.set_xticks(found.places, found.labels, fontsize=7, rotation=30)
+        axes.set_xlabel(key.partition(",")[0], fontsize=9)
+        _frame(axes, quantity)
+    figure.legend(
+        *figure.axes[0].get_legend_handles_labels(),
+        loc="outside lower center",
+        ncols=len(groups),
+        frameon=False,
+    )
+    return figure
+
+
+def _errorbars(
+    axes: Axes,
+    places: np.ndarray,
+    estimates: Sequence[Estimate],
+    colour: str,
+    label: str,
+) -> None:
+    value, low, high = np.array(estimates).T
+    axes.errorbar(
+        places,
+        value,
+        yerr=[np.maximum(value - low, 0.0), np.maximum(high - value, 0.0)],
+        color=colour,
+        label=label,
+        marker="o",
+        markersize=4,
+        capsize=3,
+        linewidth=1,
+    )
+
+
+def _frame(axes: Axes, quantity: Quantity) -> None:
+    axes.set_title(quantity.title, fontsize=10)
+    axes.grid(color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)
+    if quantity.rate:
+        axes.set_ylim(-0.03, 1.03)

@@ -1,0 +1,260 @@
+"""The directory of a sweep: every run that is done is kept at once.
+
+While a sweep runs, ``runs.jsonl`` gets a line a run. When all are there,
+``runs.parquet`` takes its place.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import json
+import os
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+from ruamel.yaml import YAML
+from ruamel.yaml.error import YAMLError
+
+from analysis.reporting.provenance import versions
+from analysis.reporting.result_directory import whole_directory
+from analysis.run_error import RunError
+from analysis.sweeps.one_run import Outcome
+from analysis.sweeps.plan import SweepPlan, dump_plan
+from analysis.sweeps.table import parquet_bytes, results_table
+from diagrams import dump_scenario
+from diagrams.loading import scenario_from_mapping
+from systems.framework.input_error import InputError
+
+__all__ = ["StoreError", "SweepStore", "load_results", "trajectory_path"]
+
+SCHEMA_VERSION = 1
+JOURNAL, TABLE, MANIFEST, PLAN = (
+    "runs.jsonl",
+    "runs.parquet",
+    "sweep.json",
+    "sweep.yaml",
+)
+
+
+class StoreError(RunError):
+    """Results that cannot be written; what was written before is kept."""
+
+
+class SweepStore:
+    """An open directory of a sweep, which no other process can open."""
+
+    def __init__(self, out: Path | None, plan: SweepPlan) -> None:
+        """Opens the directory of this plan, or makes it where there is none.
+
+        Args:
+            out: The directory; none: the next number under results/.
+            plan: What to run.
+
+        Raises:
+            InputError: It holds something else, cannot be written, or is in
+                use; ``out: ...``.
+            StoreError: The disk is full.
+        """
+        self._journal = -1
+        try:
+            if out is not None and out.is_dir() and any(out.iterdir()):
+                _check_same(out, plan)
+                self.out = out
+            else:
+                with whole_directory(out) as (self.out, directory):
+                    _make(directory, plan)
+            self._lock = _locked(self.out / MANIFEST)
+        except BlockingIOError:
+            raise InputError("out", f"another process works in {out}; wait") from None
+        except OSError as error:
+            raise _unwritable(out, error) from None
+        try:
+            self._open()
+        except OSError as error:
+            self.close()
+            raise _unwritable(self.out, error) from None
+
+    def _open(self) -> None:
+        """Finds what is done, and cuts off a line that a crash left unfinished."""
+        path = self.out / JOURNAL
+        if (self.out / TABLE).exists() and not path.exists():
+            self.done = set(load_results(self.out)["index"])
+            return
+        lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
+        rows = [row for line in lines if (row := _parse(line)) is not None]
+        self.done = {row["index"] for row in rows}
+        whole = b"".join(line for line in lines if _parse(line) is not None)
+        if whole != b"".join(lines):
+            _write_whole(path, whole)
+        self._journal = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
+
+    def add(self, outcome: Outcome) -> None:
+        """Keeps a run.
+
+        Raises:
+            StoreError: The disk is full, or broken.
+        """
+        index = outcome.row["index"]
+        line = memoryview((json.dumps(outcome.row, allow_nan=False) + "\n").encode())
+        size = os.fstat(self._journal).st_size
+        try:
+            if outcome.trajectory is not None:
+                _write_whole(trajectory_path(self.out, index), outcome.trajectory)
+            while line:
+                line = line[os.write(self._journal, line) :]
+        except OSError as error:
+            os.ftruncate(self._journal, size)
+            raise self._stopped(error) from None
+        self.done.add(index)
+
+    def write_table(self, *, complete: bool) -> None:
+        """Writes the table of the runs so far.
+
+        Args:
+            complete: Whether these are all, so that the journal can go.
+
+        Raises:
+            StoreError: The disk is full, or broken.
+        """
+        if self._journal < 0:
+            return
+        try:
+            table = parquet_bytes(load_results(self.out))
+            _write_whole(self.out / TABLE, table)
+            if complete:
+                (self.out / JOURNAL).unlink()
+        except OSError as error:
+            raise self._stopped(error) from None
+
+    def _stopped(self, error: OSError) -> StoreError:
+        return StoreError(
+            f"{self.out} cannot be written ({error.strerror}); the {len(self.done)} "
+            "runs that are done are kept: make room and go on with --resume"
+        )
+
+    def close(self) -> None:
+        """Lets other processes work in the directory."""
+        if self._journal >= 0:
+            os.close(self._journal)
+        os.close(self._lock)
+
+
+def load_results(out: str | Path) -> pd.DataFrame:
+    """The runs of a sweep's directory by index, also while it runs.
+
+    Returns:
+        See ``results_table``.
+
+    Raises:
+        InputError: The directory holds no sweep.
+    """
+    journal, table = Path(out) / JOURNAL, Path(out) / TABLE
+    if journal.exists():
+        rows = map(_parse, journal.read_bytes().splitlines(keepends=True))
+        return results_table({row["index"]: row for row in rows if row}.values())
+    if table.exists():
+        try:
+            return pd.read_parquet(table)
+        except ValueError as error:  # pyarrow's complaint about a damaged file
+            raise InputError("out", f"{table} cannot be read ({error})") from None
+    raise InputError("out", f"{out} holds no results of a sweep; check the path")
+
+
+def trajectory_path(out: Path, index: int) -> Path:
+    """The file of a run's trajectory."""
+    return out / "trajectories" / f"{index:06d}.parquet"
+
+
+def _unwritable(out: Path | None, error: OSError) -> StoreError:
+    return StoreError(
+        f"{out or 'results'} cannot be written ({error.strerror}); make room, or name "
+        "another directory with --out"
+    )
+
+
+def _make(out: Path, plan: SweepPlan) -> None:
+    if plan.trajectories:
+        (out / "trajectories").mkdir()
+    (out / PLAN).write_text(dump_plan(plan), "utf-8")
+    base = scenario_from_mapping(plan.base)
+    (out / "scenario.yaml").write_text(dump_scenario(base), "utf-8")
+    (out / JOURNAL).touch()
+    manifest = {
+        "schema_version": SCHEMA_VERSION,
+        "plan_sha256": plan.digest,
+        "files_sha256": plan.file_digests,
+        "versions": versions(),
+    }
+    (out / MANIFEST).write_text(json.dumps(manifest, indent=2) + "\n")
+
+
+def _locked(path: Path) -> int:
+    lock = os.open(path, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        os.close(lock)
+        raise
+    return lock
+
+
+def _check_same(out: Path, plan: SweepPlan) -> None:
+    """Whether the directory's runs are some of the plan's."""
+    try:
+        manifest = json.loads((out / MANIFEST).read_text("utf-8"))
+        stored = YAML(typ="safe").load(out / PLAN)
+        digest, found = manifest["plan_sha256"], manifest["versions"]
+        then = manifest.get("files_sha256", {})
+        ours = YAML(typ="safe").load(dump_plan(plan))
+        parts = [key for key in ours if stored.get(key) != ours[key]]
+    except (OSError, ValueError, YAMLError, TypeError, LookupError, AttributeError):
+        raise InputError(
+            "out", f"{out} holds no sweep; name the directory of one, or a new one"
+        ) from None
+    if digest != plan.digest:
+        files = plan.file_digests
+        names = sorted({*files, *then})
+        parts += [name for name in names if files.get(name) != then.get(name)]
+        what = ", ".join(parts) or "the scenario's file"
+        raise InputError(
+            "out",
+            f"{out} holds another sweep, which differs in {what}; name another "
+            "directory",
+        )
+    now = versions()
+    parts = [
+        f"{name} {found.get(name)}" for name in now if found.get(name) != now[name]
+    ]
+    if parts:
+        raise InputError(
+            "out",
+            f"the runs in {out} were made with {', '.join(parts)}; install that, "
+            "or name another directory",
+        )
+
+
+def _parse(line: bytes) -> dict[str, Any] | None:
+    """A row; none where a crash left half a line."""
+    if not line.endswith(b"\n"):
+        return None
+    with suppress(ValueError):
+        row = json.loads(line)
+        if isinstance(row, dict) and isinstance(row.get("index"), int):
+            return row
+    return None
+
+
+def _write_whole(path: Path, content: bytes) -> None:
+    """Writes a file that appears whole or not at all."""
+    partial = path.with_name(f".{path.name}.part")
+    try:
+        with partial.open("wb") as file:
+            file.write(content)
+            file.flush()
+            os.fsync(file.fileno())
+        partial.replace(path)
+    except BaseException:
+        partial.unlink(missing_ok=True)
+        raise

@@ -1,0 +1,111 @@
+"""A sweep in one JSON document, and on one screen."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from analysis.reporting.provenance import versions
+from analysis.sweeps.estimates import (
+    QUANTITIES,
+    Estimate,
+    Quantity,
+    cell_label,
+    ended,
+    shown,
+)
+from analysis.sweeps.one_run import FAILED
+from analysis.sweeps.plan import SweepPlan, SweepPoint
+from analysis.sweeps.sweep import reproducing_command
+
+__all__ = ["sweep_summary", "sweep_text"]
+
+#: Raised when a key of the document changes its meaning.
+SCHEMA_VERSION = 1
+#: Columns that are no metrics.
+_NO_METRICS = ("index", "cell", "run", "seed", "redraws", "wall_s")
+
+
+def sweep_summary(
+    plan: SweepPlan, points: list[SweepPoint], results: pd.DataFrame, out: Path
+) -> dict[str, Any]:
+    """The JSON document of a sweep.
+
+    Args:
+        plan: What was run.
+        points: All its runs.
+        results: See ``load_results``.
+        out: The directory, for commands.
+    """
+    failed = results[results["cause"] == FAILED]
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "name": plan.name,
+        "scenario": plan.scenario,
+        "seed": plan.seed,
+        "runs": len(results),
+        "failed": len(failed),
+        "cells": [
+            _cell(plan, fields, results[results["cell"] == cell])
+            for cell, fields in enumerate(plan.cells())
+        ],
+        "failures": [
+            {
+                "index": int(row["index"]),
+                "seed": int(row["seed"]),
+                "error": row["error"],
+                "command": reproducing_command(out, points[int(row["index"])]),
+            }
+            for row in failed.to_dict("records")
+        ],
+        "timing": {
+            "runs_wall_s": float(results["wall_s"].sum()),
+            "simulated_s": float(results["simulated_s"].sum()),
+        },
+        "versions": versions(),
+        "out": str(out),
+    }
+
+
+def _cell(
+    plan: SweepPlan, fields: dict[str, Any], runs: pd.DataFrame
+) -> dict[str, Any]:
+    causes = runs["cause"].value_counts()
+    whole = ended(runs)
+    numbers = runs.select_dtypes("number").columns
+    own = {*_NO_METRICS, *plan.paths}
+    metrics = [Quantity(name, name, metric=name) for name in numbers if name not in own]
+    return {
+        "fields": fields,
+        "runs": len(runs),
+        "causes": {str(cause): int(count) for cause, count in causes.items()},
+        **{q.name: _plain(q.estimate(whole), "estimate") for q in QUANTITIES if q.rate},
+        "metrics": {q.name: _plain(q.estimate(whole), "median") for q in metrics},
+    }
+
+
+def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
+    values = zip((name, "low", "high"), estimate, strict=True)
+    return {key: None if math.isnan(value) else value for key, value in values}
+
+
+def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
+    """A line a cell, with 95 % intervals."""
+    headings = ["cell", "runs", *(quantity.title for quantity in QUANTITIES)]
+    rows = [headings]
+    for cell, fields in enumerate(plan.cells()):
+        runs = ended(results[results["cell"] == cell])
+        figures = [shown(q, q.estimate(runs)) for q in QUANTITIES]
+        rows.append([cell_label(fields), str(len(runs)), *figures])
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = [
+        "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+    failed = int((results["cause"] == FAILED).sum())
+    if failed:
+        lines.append(f"{failed} of {len(results)} runs failed with an error")
+    return "\n".join(lines)

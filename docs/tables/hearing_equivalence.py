@@ -1,0 +1,103 @@
+"""Whether ideal hearing gives the same outcomes as full audio, as a table.
+
+``python -m docs.tables.hearing_equivalence docs/results/hearing.json`` prints the
+table of docs/comparison.md.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+__all__ = ["CLEARANCE_M", "RATE", "equivalent", "hearing_table"]
+
+#: Bounds within which both count as equivalent.
+RATE, CLEARANCE_M = 0.05, 0.03
+
+_CLEARANCE = "minimum_obstacle_clearance_m"
+
+
+def equivalent(summary: dict[str, Any]) -> bool:
+    """Whether all pairs together differ less than the bounds, intervals included."""
+    pair = _pooled(summary)
+    clearance = pair["metrics"][_CLEARANCE]
+    rates = (pair["success"], pair["collision"])
+    return all(r["low"] > -RATE and r["high"] < RATE for r in rates) and (
+        clearance["low"] > -CLEARANCE_M and clearance["high"] < CLEARANCE_M
+    )
+
+
+def hearing_table(summary: dict[str, Any]) -> str:
+    """Full audio beside ideal hearing in Markdown, a row a scenario and law.
+
+    Args:
+        summary: JSON document of ``phonotaxis compare --grid
+            hearing=[audio,ideal]``.
+    """
+    headings = (
+        "scenario, law",
+        "success, audio / ideal",
+        "collision, audio / ideal",
+        "median clearance, audio / ideal",
+        "layouts on which one alone succeeds",
+    )
+    lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
+    pairs = [pair for pair in summary["pairs"] if pair["field"] == "hearing"]
+    lines += [_row(summary, pair) for pair in pairs]
+    pair = _pooled(summary)
+    clearance = pair["metrics"][_CLEARANCE]
+    rates = " | ".join(
+        f"{100.0 * rate['difference']:+.1f} points "
+        f"({100.0 * rate['low']:+.1f}, {100.0 * rate['high']:+.1f})"
+        for rate in (pair["success"], pair["collision"])
+    )
+    lines.append(
+        f"| all {pair['success']['pairs']} pairs, audio less ideal | {rates} | "
+        f"{100.0 * clearance['difference']:+.2f} cm "
+        f"({100.0 * clearance['low']:+.2f}, {100.0 * clearance['high']:+.2f}) | "
+        f"{_apart(pair)} |"
+    )
+    return "\n".join(lines)
+
+
+def _pooled(summary: dict[str, Any]) -> dict[str, Any]:
+    return next(pair for pair in summary["pooled"] if pair["field"] == "hearing")
+
+
+def _row(summary: dict[str, Any], pair: dict[str, Any]) -> str:
+    audio, ideal = (
+        next(
+            cell
+            for cell in summary["cells"]
+            if cell["scenario"] == pair["scenario"]
+            and {"law": cell["law"], **cell["fields"]}
+            == {**pair["fields"], "hearing": hearing}
+        )
+        for hearing in (pair["first"], pair["second"])
+    )
+    rates = (
+        f"{100.0 * audio[name]['estimate']:.1f} % / "
+        f"{100.0 * ideal[name]['estimate']:.1f} %"
+        for name in ("success", "collision")
+    )
+    clearances = " / ".join(
+        f"{100.0 * cell['metrics'][_CLEARANCE]['median']:.1f}"
+        for cell in (audio, ideal)
+    )
+    law = pair["fields"]["law"]
+    return (
+        f"| {pair['scenario']}, {law} | {' | '.join(rates)} | {clearances} cm | "
+        f"{_apart(pair)} |"
+    )
+
+
+def _apart(pair: dict[str, Any]) -> str:
+    rate = pair["success"]
+    return f"{rate['only_first']} + {rate['only_second']} of {rate['pairs']}"
+
+
+if __name__ == "__main__":
+    document = json.loads(Path(sys.argv[1]).read_text("utf-8"))
+    sys.stdout.write(hearing_table(document) + "\n")

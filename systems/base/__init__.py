@@ -1,0 +1,1 @@
+"""Bodies with wheels: the robot's drive and odometry, and the source's carrier."""

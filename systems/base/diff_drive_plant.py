@@ -1,0 +1,317 @@
+"""The differential-drive base: motors, wheels, motion, with or without slip."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from pydantic import Field, Strict
+from pydrake.systems.framework import BasicVector_, LeafSystem_
+
+from systems.base.robot import RobotParameters
+from systems.base.tyre_grip import GripNumbers, grip_accelerations
+from systems.framework.finite import check_finite, check_port
+from systems.framework.parameters import Duration, Parameters
+from systems.framework.scalar_math import cos, sin
+from systems.framework.scalar_types import define_for_scalars
+
+__all__ = [
+    "DiffDrivePlant",
+    "DiffDrivePlant_",
+    "PlantNumbers",
+    "PlantParameters",
+    "body_twist",
+    "plant_derivatives",
+    "slipping_derivatives",
+]
+
+_Slip = Annotated[float, Field(gt=-1.0, lt=1.0)]
+
+
+class PlantParameters(Parameters):
+    """Motors and contact of the wheels."""
+
+    motor_lag_s: Duration = 0.05
+    """Time constant of each wheel's speed loop, s; not printed, ours."""
+    slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
+    """Part of the left and right rim speed that is lost, unseen by the encoders;
+    negative: the wheel is larger than ``wheel_radius_m`` by this share."""
+    friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
+    """Coefficient of friction between tyres and floor: the wheels slip where motion
+    would need more force than this share of the weight. None: they never do."""
+
+
+def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
+    """Forward speed, m/s, and yaw rate, rad/s, from wheel speeds in rad/s."""
+    left = robot.wheel_radius_m * (1.0 - slip[0]) * wheel_speeds[0]
+    right = robot.wheel_radius_m * (1.0 - slip[1]) * wheel_speeds[1]
+    return _rim_twist(left, right, robot.wheel_separation_m)
+
+
+@register_jitable
+def _rim_twist(left, right, separation):
+    return (left + right) / 2.0, (right - left) / separation
+
+
+class PlantNumbers(NamedTuple):
+    """What the plant's motion hangs on, the last arguments of compiled code."""
+
+    left_rim_m: float
+    """Way of the left end of the axle for an angle of its wheel, m/rad."""
+    right_rim_m: float
+    """The same of the right end, m/rad."""
+    wheel_separation_m: float
+    """Distance between the wheels, m."""
+    top_wheel_speed: float
+    """Commands saturate here, rad/s."""
+    motor_lag_s: float
+    """Time constant of the wheels' speeds, s."""
+
+    @classmethod
+    def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
+        """From the parameters."""
+        left, right = plant.slip
+        return cls(
+            robot.wheel_radius_m * (1.0 - left),
+            robot.wheel_radius_m * (1.0 - right),
+            robot.wheel_separation_m,
+            robot.top_wheel_speed,
+            plant.motor_lag_s,
+        )
+
+
+@njit(cache=True)
+def plant_derivatives(
+    state,
+    commanded,
+    left_rim_m,
+    right_rim_m,
+    wheel_separation_m,
+    top_wheel_speed,
+    motor_lag_s,
+):
+    """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
+
+    Args:
+        state: (7,) x, y, theta, left and right wheel angle, left and right wheel
+            speed; m, rad, rad/s.
+        commanded: (2,) left and right wheel speed, rad/s.
+        left_rim_m: See ``PlantNumbers``, also for the others.
+        right_rim_m: m/rad.
+        wheel_separation_m: m.
+        top_wheel_speed: rad/s.
+        motor_lag_s: s.
+
+    Returns:
+        (7,) derivatives in the order of the state.
+    """
+    theta, left, right = state[2], state[5], state[6]
+    v, omega = _rim_twist(left_rim_m * left, right_rim_m * right, wheel_separation_m)
+    rates = np.empty_like(state)
+    rates[0], rates[1], rates[2] = v * np.cos(theta), v * np.sin(theta), omega
+    _set_wheel_rates(rates, state, commanded, top_wheel_speed, motor_lag_s)
+    return rates
+
+
+@njit(cache=True)
+def slipping_derivatives(
+    state,
+    commanded,
+    left_rim_m,
+    right_rim_m,
+    wheel_separation_m,
+    top_wheel_speed,
+    motor_lag_s,
+    grip,
+):
+    """``plant_derivatives`` with friction: the body moves by the tyres' forces.
+
+    Args:
+        state: (10,) that of ``plant_derivatives``, then the body's forward and
+            leftward speed, m/s, and yaw rate, rad/s.
+        commanded: (2,) left and right wheel speed, rad/s.
+        left_rim_m: See ``PlantNumbers``, also for the others.
+        right_rim_m: m/rad.
+        wheel_separation_m: m.
+        top_wheel_speed: rad/s.
+        motor_lag_s: s.
+        grip: ``GripNumbers``.
+
+    Returns:
+        (10,) derivatives in the order of the state.
+    """
+    theta, forward, sideways = state[2], state[7], state[8]
+    rates = np.empty_like(state)
+    rates[0] = forward * np.cos(theta) - sideways * np.sin(theta)
+    rates[1] = forward * np.sin(theta) + sideways * np.cos(theta)
+    rates[2] = state[9]
+    _set_wheel_rates(rates, state, commanded, top_wheel_speed, motor_lag_s)
+    rates[7], rates[8], rates[9] = grip_accelerations(
+        (forward, sideways, state[9]),
+        (left_rim_m * state[5], right_rim_m * state[6]),
+        (left_rim_m * rates[5], right_rim_m * rates[6]),
+        wheel_separation_m,
+        grip,
+    )
+    return rates
+
+
+@register_jitable
+def _set_wheel_rates(rates, state, commanded, top_wheel_speed, motor_lag_s):
+    left, right = state[5], state[6]
+    rates[3], rates[4] = left, right
+    rates[5] = (_saturate(commanded[0], top_wheel_speed) - left) / motor_lag_s
+    rates[6] = (_saturate(commanded[1], top_wheel_speed) - right) / motor_lag_s
+
+
+@njit(cache=True)
+def _checked_derivatives(state, commanded, *numbers):  # pragma: no cover  (compiled)
+    """``plant_derivatives``, and whether all that they rest on is finite."""
+    rates = plant_derivatives(state, commanded, *numbers)
+    return rates, np.isfinite(state.sum() + commanded.sum())
+
+
+@njit(cache=True)
+def _checked_slipping(state, commanded, *numbers):  # pragma: no cover  (compiled)
+    """The same of ``slipping_derivatives``."""
+    rates = slipping_derivatives(state, commanded, *numbers)
+    return rates, np.isfinite(state.sum() + commanded.sum())
+
+
+@register_jitable
+def _saturate(value, limit):
+    if value > limit:
+        return value * 0.0 + limit
+    if value < -limit:
+        return value * 0.0 - limit
+    return value
+
+
+@define_for_scalars("DiffDrivePlant_", __name__)
+def DiffDrivePlant_(T):
+    class Impl(LeafSystem_[T]):
+        """Moves the robot: motor lag, saturation, wheels that roll or slip.
+
+        .. pydrake_system::
+
+            name: DiffDrivePlant
+            input_ports:
+            - wheel_speeds [rad/s, left and right, commanded]
+            output_ports:
+            - pose_WB [m, m, rad]
+            - velocity_WB [m/s, m/s, rad/s]
+            - wheel_angles [rad, left and right]
+            - slip_velocities [m/s, left and right rim less its ground, sideways]
+
+        Continuous state: x, y, theta, two wheel angles, two wheel speeds; with
+        ``plant.friction`` also forward and leftward speed and yaw rate of the
+        body, which else are those of the rims. The outputs are functions of the
+        state; no feedthrough. The heading is not wrapped.
+
+        Args:
+            robot: Dimensions and top speed.
+            plant: ``PlantParameters``.
+            initial_pose: (x, y, theta) at time zero, at rest.
+
+        Raises:
+            ValueError: The initial pose, a state or a command is not finite, which
+                an error-controlled integrator would meet with endless steps.
+
+        Reference: Han 2019, table 6; the motor lag and the grip are ours.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            plant=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._robot = robot or RobotParameters()
+            self._plant = plant or PlantParameters()
+            self._numbers: Any = PlantNumbers.of(self._robot, self._plant)
+            self._derivatives, self._checked = plant_derivatives, _checked_derivatives
+            body = 0
+            if self._plant.friction is not None:
+                self._numbers += (GripNumbers.of(self._robot, self._plant.friction),)
+                self._derivatives = slipping_derivatives
+                self._checked = _checked_slipping
+                body = 3
+            self._initial_pose = tuple(initial_pose)
+            check_finite("DiffDrivePlant: initial_pose", self._initial_pose)
+            self.set_name("diff_drive_plant")
+            self._wheel_speeds = self.DeclareVectorInputPort(
+                name="wheel_speeds", size=2
+            )
+            at_rest = [0] * (4 + body)
+            initial_state = [T(value) for value in (*self._initial_pose, *at_rest)]
+            self.DeclareContinuousState(BasicVector_[T](initial_state))
+            ticket = {self.xc_ticket()}
+            for name, size, calc in (
+                ("pose_WB", 3, self._pose),
+                ("velocity_WB", 3, self._velocity),
+                ("wheel_angles", 2, self._angles),
+                ("slip_velocities", 3, self._slip),
+            ):
+                self.DeclareVectorOutputPort(
+                    name=name, size=size, calc=calc, prerequisites_of_calc=ticket
+                )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                plant=other._plant,
+                initial_pose=other._initial_pose,
+                converter=converter,
+            )
+
+        def DoCalcTimeDerivatives(self, context, derivatives):
+            motion = self._state(context), self._wheel_speeds.Eval(context)
+            finite = False
+            if T is float:
+                rates, finite = self._checked(*motion, *self._numbers)
+            else:
+                rates = self._derivatives.py_func(*motion, *self._numbers)
+            if not finite:
+                check_port(context, self._wheel_speeds, motion[1])
+                check_finite("DiffDrivePlant: state", motion[0])
+            derivatives.SetFromVector(rates)
+
+        def _state(self, context):
+            return context.get_continuous_state_vector().CopyToVector()
+
+        def _pose(self, context, output):
+            output.SetFromVector(self._state(context)[:3])
+
+        def _velocity(self, context, output):
+            state = self._state(context).tolist()
+            v, sideways, omega = self._motion(state)
+            c, s = cos(state[2]), sin(state[2])
+            output.SetFromVector([v * c - sideways * s, v * s + sideways * c, omega])
+
+        def _motion(self, state):
+            """Forward and leftward speed, yaw rate."""
+            if self._plant.friction is not None:
+                return state[7:]
+            v, omega = body_twist(state[5:7], self._robot, self._plant.slip)
+            return v, 0.0 * v, omega
+
+        def _slip(self, context, output):
+            state = self._state(context).tolist()
+            v, sideways, omega = self._motion(state)
+            turn = omega * self._robot.wheel_separation_m / 2.0
+            left, right = (self._robot.wheel_radius_m * speed for speed in state[5:7])
+            output.SetFromVector([left - (v - turn), right - (v + turn), sideways])
+
+        def _angles(self, context, output):
+            output.SetFromVector(self._state(context)[3:5])
+
+    return Impl
+
+
+DiffDrivePlant = DiffDrivePlant_[None]

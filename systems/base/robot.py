@@ -1,0 +1,66 @@
+"""Dimensions of the sound-following robot, shared by several blocks."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from itertools import combinations
+from typing import Annotated
+
+from pydantic import Field, Strict, model_validator
+
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Length, Mass, Parameters, Point, Speed
+
+__all__ = ["LEAST_SPACING_M", "RobotParameters"]
+
+#: Microphones nearer to one another than this are one, m.
+LEAST_SPACING_M = 1e-3
+
+
+class RobotParameters(Parameters):
+    """The slave robot of Han 2019, table 6.
+
+    The table prints "350 (W) x 820 (L)" beside a wheel distance of 410 mm and
+    a microphone row of 800 mm, so that 820 mm can only be the lateral size.
+    """
+
+    length_m: Length = 0.35
+    """Extent of the body along its x axis, m."""
+    width_m: Length = 0.82
+    """Extent of the body along its y axis, the microphone bar included, m."""
+    control_point_m: Length = 0.175
+    """Distance epsilon of the control point P ahead of the axle, m."""
+    microphones_m: Annotated[tuple[Point, ...], Strict(False), Field(min_length=3)] = (
+        (0.0, 0.4),
+        (0.0, 0.0),
+        (0.0, -0.4),
+    )
+    """Microphones from P in B axes, m, at least three; no two within 1 mm.
+
+    A row with 0.4 m between neighbours, from left to right (Han 2019, 2.3).
+    """
+    wheel_radius_m: Length = 0.06
+    """Radius of the driven wheels, m."""
+    wheel_separation_m: Length = 0.41
+    """Distance L between the driven wheels, m."""
+    mass_kg: Mass = 3.94
+    """Virtual mass M at P, kg: the mass of the robot."""
+    top_speed_m_s: Speed = 0.72
+    """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
+
+    @model_validator(mode="after")
+    def _check_microphones(self) -> RobotParameters:
+        for (i, a), (j, b) in combinations(enumerate(self.microphones_m), 2):
+            if math.dist(a, b) < LEAST_SPACING_M:
+                raise InputError(
+                    "microphones_m",
+                    f"microphones {i} and {j}, at {a} and {b}, are "
+                    f"less than {LEAST_SPACING_M:g} m apart; move one",
+                )
+        return self
+
+    @cached_property
+    def top_wheel_speed(self) -> float:
+        """Largest wheel speed, rad/s."""
+        return self.top_speed_m_s / self.wheel_radius_m

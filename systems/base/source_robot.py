@@ -1,0 +1,83 @@
+"""The master robot that carries the loudspeaker."""
+
+from __future__ import annotations
+
+import math
+
+from pydrake.systems.framework import LeafSystem_
+
+from systems.base.carrier import CarrierParameters
+from systems.framework.parameters import Angle, Length
+from systems.framework.scalar_types import define_for_scalars
+from systems.world.paths import seconds
+
+__all__ = ["SourceRobot", "SourceRobotParameters", "SourceRobot_"]
+
+
+class SourceRobotParameters(CarrierParameters):
+    """Path, drive and size of the master robot (Han 2019, 5.3 and table 5)."""
+
+    heading_deg: Angle = 0.0
+    """Heading of a source at rest, deg CCW from the x axis of W."""
+    length_m: Length = 0.326
+    """Extent of the body along its direction of travel, m."""
+    width_m: Length = 0.352
+    """Extent of the body across its direction of travel, m."""
+
+    @property
+    def rest_heading(self) -> float:
+        """Heading where there is one waypoint, rad."""
+        return math.radians(self.heading_deg)
+
+
+@define_for_scalars("SourceRobot_", __name__)
+def SourceRobot_(T):
+    class Impl(LeafSystem_[T]):
+        """Drives the source along its waypoints.
+
+        .. pydrake_system::
+
+            name: SourceRobot
+            output_ports:
+            - pose_WS [m, m, rad]
+            - v_WS [m/s, m/s, rad/s]
+
+        The motion is that of its wheels (``DrivenPath``), on which nothing acts
+        back: a function of time alone, no state, no latency. The source is an
+        exogenous body, so that gradients do not pass through it.
+
+        Args:
+            source: ``SourceRobotParameters``, or ``InterfererParameters``.
+            suffix: Ends the names of block and ports; empty for the source
+                that is followed.
+        """
+
+        def _construct(self, *, source=None, suffix="", converter=None):
+            super().__init__(converter=converter)
+            self._source = source or SourceRobotParameters()
+            self._suffix = suffix
+            self._path = self._source.path()
+            self.set_name(f"source_robot{suffix}")
+            for name, calc in (("pose_WS", self._pose), ("v_WS", self._velocity)):
+                self.DeclareVectorOutputPort(
+                    name=f"{name}{suffix}",
+                    size=3,
+                    calc=calc,
+                    prerequisites_of_calc={self.time_ticket()},
+                )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self, source=other._source, suffix=other._suffix, converter=converter
+            )
+
+        def _pose(self, context, output):
+            output.SetFromVector(self._path.pose(seconds(context)))
+
+        def _velocity(self, context, output):
+            output.SetFromVector(self._path.velocity(seconds(context)))
+
+    return Impl
+
+
+SourceRobot = SourceRobot_[None]

@@ -1,0 +1,171 @@
+"""Dead reckoning from the wheel encoders."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from pydantic import Field
+from pydrake.systems.framework import LeafSystem_
+
+from systems.base.diff_drive_plant import body_twist
+from systems.base.robot import RobotParameters
+from systems.framework.finite import check_finite, read_list
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Parameters
+from systems.framework.scalar_math import cos, sin
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import FRAME_PERIOD_S
+
+__all__ = [
+    "OdometryParameters",
+    "WheelOdometry",
+    "WheelOdometry_",
+    "advance_pose",
+    "encoder_angle",
+]
+
+
+class OdometryParameters(Parameters):
+    """Wheel encoders (Han 2019, 4.1)."""
+
+    pulses_per_revolution: int = Field(default=2600, gt=0, le=10_000_000)
+    """Encoder pulses a wheel revolution."""
+    rounding: bool = True
+    """Angles in whole pulses; off: exact angles, as linearisation needs."""
+
+
+def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
+    """Wheel angle in whole pulses, rad."""
+    pulse = math.tau / pulses_per_revolution
+    return math.floor(angle / pulse) * pulse
+
+
+def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
+    """Pose after the wheels have turned, by the arc's chord.
+
+    Args:
+        pose: (x, y, theta), m and rad; floats or AutoDiffXd.
+        wheel_angle_steps: Left and right angle turned, rad.
+        robot: Wheel radius and separation.
+
+    Returns:
+        (x, y, theta). The chord is taken along the mean heading; its length
+        is that of the arc, to second order in the angle.
+    """
+    distance, turn = body_twist(wheel_angle_steps, robot)
+    mean = pose[2] + turn / 2.0
+    return (
+        pose[0] + distance * cos(mean),
+        pose[1] + distance * sin(mean),
+        pose[2] + turn,
+    )
+
+
+@define_for_scalars("WheelOdometry_", __name__)
+def WheelOdometry_(T):
+    class Impl(LeafSystem_[T]):
+        """Estimates pose and velocity from the wheels' encoders.
+
+        .. pydrake_system::
+
+            name: WheelOdometry
+            input_ports:
+            - wheel_angles [rad, left and right]
+            output_ports:
+            - pose_WB_estimated [m, m, rad]
+            - velocity_WB_estimated [m/s, m/s, rad/s]
+
+        Discrete state, 25 ms: pose and encoder angles at the last tick. The
+        outputs continue it to the present angles: no latency. The velocity
+        is the mean over the tick in progress (at a tick: the last 25 ms).
+        Slip goes unseen.
+
+        Args:
+            robot: Wheel radius and separation.
+            odometry: ``OdometryParameters``.
+            initial_pose: (x, y, theta) at time zero, known.
+
+        Raises:
+            InputError: Rounding is on in an AutoDiffXd system.
+            ValueError: The initial pose is not finite.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            odometry=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._robot = robot or RobotParameters()
+            self._odometry = odometry or OdometryParameters()
+            self._initial_pose = tuple(initial_pose)
+            check_finite("WheelOdometry: initial_pose", self._initial_pose)
+            if self._odometry.rounding and T is not float:
+                raise InputError(
+                    "WheelOdometry",
+                    "odometry.rounding is true, and a rounded angle "
+                    "has no derivative; set odometry.rounding to false",
+                )
+            self.set_name("wheel_odometry")
+            self._angles = self.DeclareVectorInputPort(name="wheel_angles", size=2)
+            self.DeclareDiscreteState([T(v) for v in (*self._initial_pose, 0, 0)])
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+            )
+            self._pose, _ = (
+                self.DeclareVectorOutputPort(
+                    name=name,
+                    size=3,
+                    calc=calc,
+                    prerequisites_of_calc={self._angles.ticket(), self.xd_ticket()},
+                )
+                for name, calc in (
+                    ("pose_WB_estimated", self._advance),
+                    ("velocity_WB_estimated", self._velocity),
+                )
+            )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                robot=other._robot,
+                odometry=other._odometry,
+                initial_pose=other._initial_pose,
+                converter=converter,
+            )
+
+        def _encoder_angles(self, context):
+            angles = read_list(context, self._angles)
+            if self._odometry.rounding:
+                pulses = self._odometry.pulses_per_revolution
+                return [encoder_angle(angle, pulses) for angle in angles]
+            return angles
+
+        def _held(self, context):
+            return context.get_discrete_state(0).CopyToVector().tolist()
+
+        def _advance(self, context, output):
+            left, right = self._encoder_angles(context)
+            *pose, left_then, right_then = self._held(context)
+            steps = (left - left_then, right - right_then)
+            output.SetFromVector(advance_pose(pose, steps, self._robot))
+
+        def _update(self, context, discrete_state):
+            pose = self._pose.Eval(context).tolist()
+            now = [*pose, *self._encoder_angles(context)]
+            discrete_state.set_value(np.array(now))
+
+        def _velocity(self, context, output):
+            now, held = self._pose.Eval(context), self._held(context)
+            output.SetFromVector(
+                [(now[k] - held[k]) / FRAME_PERIOD_S for k in range(3)]
+            )
+
+    return Impl
+
+
+WheelOdometry = WheelOdometry_[None]

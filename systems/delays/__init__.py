@@ -1,0 +1,1 @@
+"""Delays between channels: spectra, correlations, peaks, fits, their errors."""

@@ -1,0 +1,226 @@
+"""Peaks of weighted cross-correlations and their errors, from their spectra.
+
+Compiled functions that call each other stand in one file: numba's cache does not
+see that a function in another one has changed.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+
+from systems.framework.compiling import REORDER
+
+__all__ = ["measure_peaks"]
+
+# Largest number of steps, and the step at which it ends, samples.
+_ITERATIONS = 10
+_TOLERANCE = 1e-6
+
+# Variance of an arrival that is rounded to whole samples: 1/12 a pair.
+_ROUNDING = 1.0 / 24.0
+
+
+@njit(cache=True, fastmath=REORDER, forceinline=True)
+def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compiled)
+    """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
+
+    The turns come from a few cosines by doubling: the rest is sums and products.
+    """
+    bins = cross.size
+    cosine, sine = np.empty(bins), np.empty(bins)
+    cosine[0], sine[0] = math.cos(first * t), math.sin(first * t)
+    done = 1
+    while done < bins:
+        c, s = math.cos(step * t * done), math.sin(step * t * done)
+        for k in range(min(done, bins - done)):
+            cosine[done + k] = cosine[k] * c - sine[k] * s
+            sine[done + k] = sine[k] * c + cosine[k] * s
+        done *= 2
+    for k in range(bins):
+        x, y = np.float64(cross[k].real), np.float64(cross[k].imag)
+        real[k] = x * cosine[k] - y * sine[k]
+        imaginary[k] = x * sine[k] + y * cosine[k]
+
+
+@njit(cache=True, fastmath=REORDER, forceinline=True)
+def _slope_and_curve(
+    real, imaginary, weights, first, step
+):  # pragma: no cover  (compiled)
+    """Derivatives of a correlation: sums of -w W Im(z) and of w^2 W Re(z)."""
+    slope, curve = 0.0, 0.0
+    for k in range(real.size):
+        w = first + k * step
+        slope -= w * weights[k] * imaginary[k]
+        curve += w * w * weights[k] * real[k]
+    return slope, curve
+
+
+@njit(cache=True, fastmath=REORDER, forceinline=True)
+def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled)
+    """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
+    plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(real.size):
+        w, weight = first + k * step, np.float64(weights[k])
+        plain += real[k]
+        aligned += weight * real[k]
+        total += weight * math.sqrt(real[k] * real[k] + imaginary[k] * imaginary[k])
+        squares += (w * weight) ** 2 * real[k]
+        noise += (w * weight) ** 2
+    return plain, aligned, total, squares, noise
+
+
+@njit(cache=True)
+def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (compiled)
+    """Peaks of weighted cross-correlations, and sums for their errors.
+
+    Args:
+        cross: (p, n) cross-spectra of the pairs.
+        weights: (p, n) W.
+        first: Angular frequency of the first bin, rad a sample.
+        step: From bin to bin, rad a sample.
+        start: (p,) where the search begins, samples.
+        newton: Whether to search, or to stay there.
+
+    Returns:
+        tau (p,) in samples. With z the cross-spectrum turned back by tau:
+        the sum of Re(z) (p,); the share of sum W |z| that is in phase (p,);
+        and sums (p, 3) of w^2 W Re(z), w^2 W^2 Re(z) and w^2 W^2.
+    """
+    pairs, bins = cross.shape
+    tau, plain, agreement = np.empty(pairs), np.empty(pairs), np.empty(pairs)
+    sums = np.empty((pairs, 3))
+    real, imaginary = np.empty(bins), np.empty(bins)
+    for p in range(pairs):
+        t = start[p]
+        for _ in range(_ITERATIONS):
+            tau[p] = t
+            _turned(cross[p], first, step, t, real, imaginary)
+            slope, curve = _slope_and_curve(real, imaginary, weights[p], first, step)
+            if not newton or curve <= 0.0:
+                break
+            move = min(max(slope / curve, -0.5), 0.5)
+            if abs(move) < _TOLERANCE:
+                break
+            t += move
+        plain[p], aligned, total, squares, noise = _sums(
+            real, imaginary, weights[p], first, step
+        )
+        agreement[p] = aligned / max(total, 1e-300)
+        sums[p] = curve, squares, noise
+    return tau, plain, agreement, sums
+
+
+@njit(cache=True)
+def _arrival_variances(
+    r, sums, energy, pairs, to_shares, bins, padding
+):  # pragma: no cover  (compiled)
+    """(n,) of each channel's time of arrival, samples^2.
+
+    With noise of power n a bin and signal of power s, a correlation's peak moves
+    by the noise over its curvature,
+    sum w^2 W^2 (s_i n_j + s_j n_i + n_i n_j) / 2 / (sum w^2 W s)^2: for equal
+    weights and much signal that is the bound of Knapp and Carter (1976).
+    """
+    channels = energy.size
+    n, s = np.empty(channels), np.empty(channels)
+    for m in range(channels):
+        exponent = 0.0
+        for p in range(len(pairs)):
+            exponent += to_shares[m, p] * math.log(min(max(r[p], 1e-3), 1.0))
+        q = min(max(math.exp(exponent), 1e-3), 1.0 - 1e-9)
+        n[m], s[m] = (1.0 - q) * energy[m] / bins, q * energy[m]
+    parts = np.zeros(channels)
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        curve, squares, noise = sums[p]
+        scale = padding / (2.0 * curve * curve * (channels - 1))
+        cross = 0.5 * n[i] * n[j] * noise
+        # Each channel's part: noise of one against the signal of the other.
+        parts[i] += scale * (n[i] * squares * math.sqrt(s[j] / s[i]) + cross)
+        parts[j] += scale * (n[j] * squares * math.sqrt(s[i] / s[j]) + cross)
+    return parts
+
+
+@njit(cache=True)
+def _reconcile(
+    tau, arrivals, pairs, to_delays, reconciled
+):  # pragma: no cover  (compiled)
+    """Fills in the arrivals that fit all delays best.
+
+    Returns:
+        How far they are from the given ones at most, and each delay from them.
+    """
+    moved, closure = 0.0, 0.0
+    reconciled[0] = 0.0
+    for m in range(1, reconciled.size):
+        reconciled[m] = 0.0
+        for p in range(tau.size):
+            reconciled[m] += to_delays[m - 1, p] * tau[p]
+        moved = max(moved, abs(reconciled[m] - arrivals[m]))
+    for p in range(tau.size):
+        i, j = pairs[p]
+        closure = max(closure, abs(tau[p] - (reconciled[j] - reconciled[i])))
+    return moved, closure
+
+
+@njit(cache=True)
+def measure_peaks(
+    cross, weights, energy, arrivals, tables, sizes, newton
+):  # pragma: no cover  (compiled)
+    """Fields of ``Peaks``; a correlation of 0 where there is no peak.
+
+    Args:
+        cross: From ``_pair_spectra``.
+        weights: (p, bins).
+        energy: From ``_pair_spectra``.
+        arrivals: See ``find_peaks``.
+        tables: ``PairTables``.
+        sizes: First bin, length of the transform, and of the cut channels
+            less what their edges cost, samples.
+        newton: See ``find_peaks``.
+    """
+    pairs, to_delays, to_shares = tables
+    first, length, cut_samples = sizes
+    others = len(energy) - 1
+    step = 2.0 * math.pi / length
+    whole = np.rint(arrivals)
+    start = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        start[p] = (arrivals[j] - whole[j]) - (arrivals[i] - whole[i])
+    tau, plain, agreement, sums = _refine(
+        cross, weights, first * step, step, start, newton
+    )
+    reconciled, covariance = np.empty(others + 1), np.empty((others, others))
+    r = np.empty(len(pairs))
+    for p in range(len(pairs)):
+        i, j = pairs[p]
+        tau[p] += whole[j] - whole[i]
+        r[p] = plain[p] / max(math.sqrt(energy[i] * energy[j]), 1e-300)
+    correlation, angular_frequency, noise_energy = 0.0, 0.0, 0.0
+    moved, closure = _reconcile(tau, arrivals, pairs, to_delays, reconciled)
+    if r.min() > 0.0 and sums[:, 0].min() > 0.0:
+        padding = length / cut_samples
+        variances = _arrival_variances(
+            r, sums, energy, pairs, to_shares, cross.shape[1], padding
+        )
+        if not newton:
+            variances += _ROUNDING
+        covariance[:] = variances[0]
+        for m in range(others):
+            covariance[m, m] += variances[m + 1]
+        correlation = min(r.min(), agreement.min(), 1.0)
+        angular_frequency = math.sqrt((sums[:, 0] / plain).min())
+        noise_energy = (1.0 - r.mean()) * energy.mean() / length * padding
+    return (
+        reconciled,
+        covariance,
+        correlation,
+        angular_frequency,
+        noise_energy,
+        moved,
+        closure,
+    )

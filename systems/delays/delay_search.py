@@ -1,0 +1,301 @@
+"""First search for the delays of a frame, and whether it holds a sound at all.
+
+Channels of noise alone are independent, whatever its colour. The correlation
+of two such channels at a given lag is then Gaussian with a variance that the
+channels' own spectra give, so the height of its highest peak says how likely
+noise alone would reach it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import fft
+
+from systems.delays.delay_peaks import whitening
+from systems.delays.delay_plan import DelayPlan
+from systems.framework.compiling import REORDER
+
+__all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
+
+# Largest coherence: there is always some noise.
+_WHOLE = 0.99
+
+# Nothing is as high above noise as so many standard deviations.
+_HIGHEST = 38.0
+
+
+class DelaySearch(NamedTuple):
+    """What the first look at a frame tells."""
+
+    arrivals: NDArray[np.float64]
+    """(n,) arrival at each channel after channel 0, samples."""
+    ambiguity: float
+    """Second peak over first within the gate, 0 to 1; worst edge."""
+    chance: float
+    """Probability that noise alone has peaks as high as these."""
+    weakest: float
+    """Probability that noise alone has a peak as high as the lowest of these: near
+    one where the sound has not reached all channels yet."""
+    energy: float
+    """Of the mean channel within the band, units of the frame squared."""
+
+
+def amdf(
+    x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
+) -> NDArray[np.float64]:
+    """Average magnitude difference of two channels (Han 2019, eq. 4-6).
+
+    The papers maximise 1 / sum_k |x_i(k) - x_j(k + lag)| over lag = 0 ... n-1.
+    Here the sum itself is minimised, so that equal signals do no harm; both
+    signs of the lag are searched; and the sum is divided by the number of its
+    terms, for the printed one favours large lags.
+
+    Args:
+        x_i: (n,) samples.
+        x_j: (n,) samples.
+        max_lag: Largest lag, below n.
+
+    Returns:
+        (2 max_lag + 1,) for the lags -max_lag ... max_lag. The minimum stands
+        at the delay t_j - t_i.
+    """
+    return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
+
+
+@njit(cache=True, fastmath=REORDER)
+def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
+    n = x_i.size
+    out = np.empty(2 * max_lag + 1)
+    for lag in range(-max_lag, max_lag + 1):
+        first, last = max(0, -lag), min(n, n - lag)
+        total = np.float32(0.0)
+        for k in range(first, last):
+            total += abs(x_i[k] - x_j[k + lag])
+        out[lag + max_lag] = total / (last - first)
+    return out
+
+
+@njit(cache=True)
+def _peak(values):  # pragma: no cover  (compiled)
+    """Place of the highest value, and the next peak's height over it.
+
+    The main lobe ends on either side where the values have fallen below half
+    the peak. A peak on the border is no peak: its ambiguity is 1.
+    """
+    best = np.argmax(values)
+    top = values[best]
+    if best in (0, values.size - 1) or top <= 0.0:
+        return best, 1.0
+    low, high = best, best
+    while low > 0 and values[low] > 0.5 * top:
+        low -= 1
+    while high < values.size - 1 and values[high] > 0.5 * top:
+        high += 1
+    second = 0.0
+    for k in range(values.size):
+        if (k < low or k > high) and values[k] > second:
+            second = values[k]
+    return best, second / top
+
+
+@njit(cache=True, fastmath=REORDER)
+def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
+    """Cross-spectra (e, size) of the edges, from the bin ``first`` on.
+
+    Returns:
+        They, (e, 2) sums of |C|^2 and of k^2 |C|^2 over the bins k, and the
+        energy of the mean channel; 0 where one is silent.
+    """
+    channels, bins = spectra.shape
+    cross = np.zeros((len(edges), size), dtype=spectra.dtype)
+    moments, energy = np.zeros((len(edges), 2)), np.zeros(channels)
+    for e in range(len(edges)):
+        i, j = edges[e]
+        for k in range(bins):
+            c = spectra[i, k].conjugate() * spectra[j, k]
+            cross[e, first + k] = c
+            square = c.real * c.real + c.imag * c.imag
+            moments[e, 0] += square
+            moments[e, 1] += square * np.float32((first + k) ** 2)
+    for m in range(channels):
+        for k in range(bins):
+            a = spectra[m, k]
+            energy[m] += a.real * a.real + a.imag * a.imag
+    return cross, moments, energy.mean() if energy.min() > 0.0 else 0.0
+
+
+@njit(cache=True)
+def _gated_peak(correlation, gate):  # pragma: no cover  (compiled)
+    """Lag of the highest peak within the gate, second peak over it, its height."""
+    gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
+    gated[:gate] = correlation[correlation.size - gate :]
+    gated[gate:] = correlation[: gate + 1]
+    best, ratio = _peak(gated)
+    lag = float(best - gate)
+    if 0 < best < 2 * gate:  # vertex of the parabola
+        rise, fall = gated[best] - gated[best - 1], gated[best] - gated[best + 1]
+        lag += 0.5 * (rise - fall) / max(rise + fall, np.float32(1e-30))
+    return lag, ratio, gated[best]
+
+
+@njit(cache=True)
+def _chance_of_noise(heights, counts):  # pragma: no cover  (compiled)
+    """Probability that noise reaches all peaks together, and the lowest of them.
+
+    Args:
+        heights: (e,) peaks over their standard deviation.
+        counts: (e,) how often noise crosses zero upwards within the gate; it
+            crosses a height z exp(-z^2 / 2) times as often (Rice 1944).
+    """
+    log_product, weakest = 0.0, 0.0
+    for e in range(heights.size):
+        z = heights[e]
+        crossings = counts[e] * math.exp(-0.5 * z * z) if z < _HIGHEST else 0.0
+        below = (1.0 - 0.5 * math.erfc(z / math.sqrt(2.0))) * math.exp(-crossings)
+        log_product += math.log(max(1.0 - below, 1e-300))
+        weakest = max(weakest, 1.0 - below)
+    # Fisher: the product of m independent probabilities.
+    term, total = 1.0, 0.0
+    for k in range(heights.size):
+        total += term
+        term *= -log_product / (k + 1)
+    return min(math.exp(log_product) * total, 1.0), weakest
+
+
+@njit(cache=True)
+def _judge(
+    correlation, moments, edges, gates, padding, stretch
+):  # pragma: no cover  (compiled)
+    """Arrivals, ambiguity, chance and weakest of ``DelaySearch``.
+
+    Args:
+        correlation: (e, grid) of the edges.
+        moments: From ``_cross_spectra``.
+        edges: (e, 2) channels, a tree.
+        gates: (e,) largest lags.
+        padding: Length of the transform over that of the frame.
+        stretch: Samples of the frame a sample of the correlation.
+    """
+    count, grid = correlation.shape
+    arrivals, ambiguity = np.zeros(count + 1), 0.0
+    heights, counts = np.empty(count), np.empty(count)
+    for e in range(count):
+        lag, ratio, height = _gated_peak(correlation[e], gates[e])
+        i, j = edges[e]
+        arrivals[j] = arrivals[i] + lag * stretch
+        ambiguity = max(ambiguity, ratio)
+        # Padding makes the bins dependent: fewer count than are summed.
+        heights[e] = height / (math.sqrt(2.0 * padding * moments[e, 0]) + 1e-300)
+        rms_bin = math.sqrt(moments[e, 1] / (moments[e, 0] + 1e-300))
+        counts[e] = 2.0 * gates[e] / grid * rms_bin
+    chance, weakest = _chance_of_noise(heights, counts)
+    return arrivals, ambiguity, chance, weakest
+
+
+def weakest_sound(plan: DelayPlan, rate: float) -> float:
+    """Level of the weakest sound that is not taken for noise.
+
+    For a given energy, no sound correlates higher above the noise than one with
+    the noise's own spectrum (Cauchy-Schwarz), so that this holds for every sound.
+
+    Args:
+        plan: Rates, band and array.
+        rate: Probability below which noise does not explain a correlation.
+
+    Returns:
+        Energy of the sound over that of the noise, within the band.
+    """
+    from scipy.optimize import brentq
+
+    bins = np.arange(plan.band.start, plan.band.stop)
+    counts = 2.0 * plan.gates / plan.grid * math.sqrt(np.mean(bins**2.0))
+
+    def excess(z: float) -> float:
+        return _chance_of_noise(np.full(len(counts), z), counts)[0] - rate
+
+    z = brentq(excess, 0.0, _HIGHEST) if excess(0.0) > 0.0 else 0.0
+    independent = 2.0 * len(bins) * plan.frame_samples / plan.length
+    coherence = min(z / math.sqrt(independent), _WHOLE)
+    return coherence / (1.0 - coherence)
+
+
+def _correlation_search(
+    cross: NDArray[np.complex64],
+    moments: NDArray[np.float64],
+    energy: float,
+    plan: DelayPlan,
+) -> DelaySearch:
+    correlation = fft.irfft(cross, plan.grid, overwrite_x=True, norm="forward")
+    padding = plan.length / plan.frame_samples
+    stretch = plan.length / plan.grid
+    arrivals, ambiguity, chance, weakest = _judge(
+        correlation, moments, plan.edges, plan.gates, padding, stretch
+    )
+    return DelaySearch(arrivals, ambiguity, chance, weakest, energy / plan.length)
+
+
+def _arrivals(lags: NDArray[np.float64], plan: DelayPlan) -> NDArray[np.float64]:
+    """(n,) arrivals from the lags along the edges."""
+    arrivals = np.zeros(len(lags) + 1)
+    for (i, j), lag in zip(plan.edges.tolist(), lags.tolist(), strict=True):
+        arrivals[j] = arrivals[i] + lag
+    return arrivals
+
+
+def _amdf_search(
+    frame: NDArray[np.float32], plan: DelayPlan
+) -> tuple[NDArray[np.float64], float]:
+    """Arrivals by the papers' function, and their ambiguity."""
+    lags, ambiguity = np.empty(len(plan.edges)), 0.0
+    for e, (i, j) in enumerate(plan.edges.tolist()):
+        reach = int(plan.edge_lags[e]) + 1
+        difference = amdf(frame[i], frame[j], reach)
+        # Its depth below the mean is what a correlation has as height.
+        best, ratio = _peak(difference.mean() - difference)
+        lags[e] = best - reach
+        ambiguity = max(ambiguity, ratio)
+    return _arrivals(lags, plan), ambiguity
+
+
+def search_delays(
+    frame: NDArray[np.float32],
+    spectra: NDArray[np.complex64],
+    plan: DelayPlan,
+    band: slice,
+    *,
+    phat: bool = False,
+    by_amdf: bool = False,
+) -> DelaySearch | None:
+    """Looks for a sound in a frame; None where a channel is silent.
+
+    Args:
+        frame: (n, frame_samples), any unit.
+        spectra: (n, bins) its transform of ``plan.length`` within the band.
+        plan: Rates and array.
+        band: Bins of the transform.
+        phat: Whether to whiten.
+        by_amdf: Whether the delays are those of the papers' function.
+            Detection rests on the correlation all the same.
+    """
+    size = plan.grid // 2 + 1
+    cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)
+    if not energy > 0.0:
+        return None
+    white = cross.copy() if phat else None
+    found = _correlation_search(cross, moments, energy, plan)
+    if white is not None:
+        # Whitening breaks the tie of a tone's peaks by noise: the ambiguity of
+        # the plain correlation counts as well, and noise is judged by it.
+        white[:, band] *= whitening(white[:, band])
+        seen = _correlation_search(white, moments, energy, plan)
+        arrivals, ambiguity = seen.arrivals, max(found.ambiguity, seen.ambiguity)
+    elif by_amdf:
+        arrivals, ambiguity = _amdf_search(frame, plan)
+    else:
+        return found
+    return found._replace(arrivals=arrivals, ambiguity=ambiguity)

@@ -1,0 +1,158 @@
+"""Delays between the channels of a frame.
+
+The delays of neighbouring channels are first found on a grid. Then the
+channels are cut to the stretch that they share, so that the edges of the frame
+do not bend the result, and the peak of each pair's cross-correlation is found
+by Newton's method on the cross-spectrum. The coherence of the cut channels
+gives the errors of the delays.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.delays.delay_peaks import Peaks, find_peaks
+from systems.delays.delay_plan import DelayPlan
+from systems.delays.delay_search import DelaySearch, search_delays
+from systems.delays.occupied_band import occupied_band
+from systems.delays.transforms import transform_rows
+
+__all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look"]
+
+# The channels are cut again when a delay has moved by more than this, samples.
+_SETTLED = 0.75
+_CUTS = 4
+
+
+class _Method(NamedTuple):
+    phat: bool = False
+    """Whether the cross-spectra are whitened."""
+    by_amdf: bool = False
+    """Whether delays are whole samples by the papers' function."""
+
+
+#: Ways to measure delays, by name.
+METHODS = {
+    "gcc": _Method(),
+    "gcc_phat": _Method(phat=True),
+    "amdf": _Method(by_amdf=True),
+    "ml": _Method(),  # starts from the correlation; see systems.hearing.coherent
+}
+
+
+class DelayEstimate(NamedTuple):
+    """Delays of one frame and what speaks for them."""
+
+    tau: NDArray[np.float64]
+    """(n - 1,) t_k - t_0 of the channels 1 ... n - 1, s; positive where the
+    sound reaches channel 0 earlier."""
+    covariance: NDArray[np.float64]
+    """(n - 1, n - 1) of the delays, s^2."""
+    correlation: float
+    """Least correlation coefficient of the pairs, 0 to 1."""
+    closure: float
+    """Largest disagreement of a pair's own delay with ``tau``, s."""
+    ambiguity: float
+    """Second peak over first within the gate, 0 to 1; worst edge."""
+    chance: float
+    """Probability that noise alone has peaks as high as these."""
+    angular_frequency: float
+    """Root mean square over the sound that the channels share, rad/s."""
+    noise_energy: float
+    """Of what the mean channel does not share with the others, within the band,
+    units of the frame squared."""
+    band: slice
+    """Bins of the plan's transform that were used."""
+
+
+def look(
+    frame: NDArray[np.float32],
+    plan: DelayPlan,
+    method: str = "gcc",
+    *,
+    find_band: bool = False,
+) -> tuple[DelaySearch, slice] | None:
+    """First look at a frame; see ``estimate_delays``.
+
+    Returns:
+        The search and the bins that it used, or None where a channel is silent.
+    """
+    chosen = METHODS[method]
+    spectra = transform_rows(frame, plan.length)[:, plan.band]
+    band = plan.band
+    if find_band:
+        first, last = occupied_band(spectra, plan.sample_rate_hz / plan.length)
+        spectra = spectra[:, first:last]
+        band = slice(plan.band.start + first, plan.band.start + last)
+    search = search_delays(
+        frame, spectra, plan, band, phat=chosen.phat, by_amdf=chosen.by_amdf
+    )
+    return None if search is None else (search, band)
+
+
+def estimate_delays(
+    frame: NDArray[np.float32],
+    plan: DelayPlan,
+    method: str = "gcc",
+    *,
+    find_band: bool = False,
+    seen: tuple[DelaySearch, slice] | None = None,
+) -> DelayEstimate | None:
+    """Delays of a frame.
+
+    Args:
+        frame: (n, frame_samples), any unit.
+        plan: Rates, band and array.
+        method: A key of METHODS.
+        find_band: Whether to use the occupied part of the band alone.
+        seen: What ``look`` returned for this frame, if it was called already.
+
+    Returns:
+        The estimate, however poor, or None where a channel is silent or the
+        correlation has no peak within the gate.
+    """
+    chosen = METHODS[method]
+    seen = seen or look(frame, plan, method, find_band=find_band)
+    if seen is None:
+        return None
+    search, band = seen
+    arrivals = search.arrivals
+    for _ in range(_CUTS):
+        reach = arrivals.tolist()
+        if max(reach) - min(reach) > plan.max_lag + 1:
+            return None
+        peaks = find_peaks(
+            frame,
+            arrivals,
+            plan.tables,
+            length=plan.length,
+            band=band,
+            phat=chosen.phat,
+            newton=not chosen.by_amdf,
+        )
+        if peaks is None:
+            return None
+        arrivals = peaks.arrivals
+        if peaks.moved < _SETTLED:
+            return _estimate(peaks, search, band, plan)
+    return None
+
+
+def _estimate(
+    peaks: Peaks, search: DelaySearch, band: slice, plan: DelayPlan
+) -> DelayEstimate:
+    rate = plan.sample_rate_hz
+    return DelayEstimate(
+        tau=peaks.arrivals[1:] / rate,
+        covariance=peaks.covariance / rate**2,
+        correlation=peaks.correlation,
+        closure=peaks.closure / rate,
+        ambiguity=search.ambiguity,
+        chance=search.chance,
+        angular_frequency=peaks.angular_frequency * rate,
+        noise_energy=peaks.noise_energy,
+        band=band,
+    )

@@ -1,0 +1,40 @@
+"""How loud a frame is."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from systems.framework.compiling import REORDER
+
+__all__ = ["BLOCK_SAMPLES", "frame_energy"]
+
+#: The mean of so many samples does not count: rumble of 100 Hz loses 19 dB of it at
+#: 100 kHz, so that a motor's does not hide a sound.
+BLOCK_SAMPLES = 64
+
+
+@njit(cache=True, fastmath=REORDER)
+def frame_energy(frame):  # pragma: no cover  (compiled)
+    """Sum of squares of an (n, samples) frame about the means of short blocks."""
+    channels, samples = frame.shape
+    whole = samples - samples % BLOCK_SAMPLES
+    energy = 0.0
+    for m in range(channels):
+        for begin in range(0, whole, BLOCK_SAMPLES):
+            energy += _block_energy(frame[m], begin, BLOCK_SAMPLES)
+        if whole < samples:
+            energy += _block_energy(frame[m], whole, samples - whole)
+    return energy
+
+
+# Inlined, so that blocks of a known length vectorise.
+@njit(cache=True, fastmath=REORDER, inline="always", error_model="numpy")
+def _block_energy(samples, begin, count):  # pragma: no cover  (compiled)
+    """Sum of squares about the mean of one block; whole numbers will do."""
+    total, squares = np.float32(0.0), np.float32(0.0)
+    for k in range(count):
+        x = np.float32(samples[begin + k])
+        total += x
+        squares += x * x
+    return squares - total * total / np.float32(count)

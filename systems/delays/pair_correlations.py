@@ -1,0 +1,135 @@
+"""Whitened correlations of all pairs of a recording's channels, frame by frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from systems.delays.delay_peaks import whitening
+
+__all__ = ["PairCorrelations", "correlate_pairs"]
+
+# Loudest frames that are looked at; they lie anywhere in the recording.
+_FRAMES = 64
+
+# A frame lasts at least this, and many times what sound needs to cross the array.
+_FRAME_S = 0.05
+_CROSSINGS = 12
+
+# Delays so many times as long as possible are looked at, to see impossible ones.
+_BEYOND = 3.0
+
+# Points of the correlation a sample.
+_DENSITY = 4
+
+
+@dataclass(frozen=True)
+class PairCorrelations:
+    """Extremes of the correlations of p pairs in f frames, and levels."""
+
+    pairs: NDArray[np.int64]
+    """(p, 2) channels i < j."""
+    lag_of_highest: NDArray[np.float64]
+    """(f, p) delay t_j - t_i, samples."""
+    lag_of_lowest: NDArray[np.float64]
+    """(f, p) samples."""
+    pooled_highest: NDArray[np.float64]
+    """(p,) largest value of the correlation's mean over the frames."""
+    pooled_lowest: NDArray[np.float64]
+    """(p,) its smallest value."""
+    levels: NDArray[np.float64]
+    """(f, n) RMS of the channels within the band."""
+    level: NDArray[np.float64]
+    """(n,) RMS over all these frames."""
+    noise: float
+    """About what the pooled extremes are in independent noise."""
+
+
+def correlate_pairs(
+    samples: NDArray[np.float64],
+    max_delay_s: float,
+    sample_rate_hz: float,
+    band_hz: tuple[float, float],
+) -> PairCorrelations | None:
+    """Correlations of the loudest frames.
+
+    Args:
+        samples: (n, samples) channels without NaN.
+        max_delay_s: Longest delay that sound can have, s. Delays three times as
+            long are looked at, to see impossible ones.
+        sample_rate_hz: Rate of the samples, Hz.
+        band_hz: Lowest and highest frequency to use, Hz.
+
+    Returns:
+        The extremes, or None where the recording is too short or silent.
+    """
+    count, total = samples.shape
+    crossing = max_delay_s * sample_rate_hz
+    gate = math.ceil(_BEYOND * crossing) + 2
+    least = max(_FRAME_S * sample_rate_hz, _CROSSINGS * crossing)
+    length = int(fft.next_fast_len(math.ceil(least), real=True))
+    frames = total // length
+    if frames == 0:
+        return None
+    # A view of each channel: recordings may be long.
+    cut = [row[: frames * length].reshape(frames, length) for row in samples]
+    energy = np.array([np.var(channel, axis=1) for channel in cut])
+    mean = energy.mean(axis=1, keepdims=True)
+    loudness = np.mean(energy / np.maximum(mean, 1e-300), axis=0)
+    chosen = np.sort(np.argsort(-loudness)[:_FRAMES])
+    window = np.hanning(length)
+    loudest = np.array([channel[chosen] for channel in cut])
+    spectra = fft.rfft(loudest * window, 2 * length)
+    f = fft.rfftfreq(2 * length, 1.0 / sample_rate_hz)
+    outside = (f < band_hz[0]) | (f > band_hz[1])
+    spectra[:, :, outside] = 0.0
+    bins = np.count_nonzero(~outside) / 2.0
+    power = np.sum(np.abs(spectra) ** 2, axis=2) / length
+    if bins < 1 or not power.any():
+        return None
+    pairs = np.stack(np.triu_indices(count, 1), axis=1)
+    values = [_correlation(spectra[i], spectra[j], gate) for i, j in pairs]
+    extremes = [_extremes(v, gate) for v in values]
+    at_highest, at_lowest = np.stack(extremes, axis=2)
+    return PairCorrelations(
+        pairs=pairs,
+        lag_of_highest=at_highest,
+        lag_of_lowest=at_lowest,
+        pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
+        pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
+        levels=np.sqrt(power / length).T,
+        level=np.sqrt(power.mean(axis=1) / length),
+        noise=math.sqrt(math.log(2.0 * gate + 1.0) / bins / chosen.size),
+    )
+
+
+def _correlation(
+    first: NDArray[np.complex128], second: NDArray[np.complex128], gate: int
+) -> NDArray[np.float64]:
+    """(f, lags) correlation of a pair within the gate."""
+    cross = (first.conj() * second).astype(np.complex64)
+    cross = cross * whitening(cross)
+    total = np.sum(np.abs(cross), axis=1, keepdims=True)
+    grid = _DENSITY * 2 * (cross.shape[1] - 1)
+    # All values lie between -1 and 1: the bins' sizes add up to 1.
+    values = fft.irfft(cross / np.maximum(total, 1e-30), grid) * (grid / 2.0)
+    reach = _DENSITY * gate
+    return np.concatenate((values[:, -reach:], values[:, : reach + 1]), axis=1)
+
+
+def _extremes(values: NDArray[np.float64], gate: int) -> NDArray[np.float64]:
+    """(2, f) lags of the highest and the lowest value."""
+    return np.stack((_vertex(values), _vertex(-values))) / _DENSITY - gate
+
+
+def _vertex(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places of the rows' largest values, by a parabola."""
+    rows = np.arange(len(values))
+    best = np.clip(values.argmax(axis=1), 1, values.shape[1] - 2)
+    left, top, right = (values[rows, best + k] for k in (-1, 0, 1))
+    curve = np.minimum(left - 2.0 * top + right, -1e-12)
+    return best + np.clip(0.5 * (left - right) / curve, -1.0, 1.0)

@@ -1,0 +1,1 @@
+"""What every block rests on: parameters, checks, noise, scalars, compiled code."""

@@ -1,0 +1,1 @@
+"""From a frame to a place: estimators, sensors of the source, the tracker."""

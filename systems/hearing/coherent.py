@@ -1,0 +1,204 @@
+"""Maximum likelihood: the place at which the channels of a frame add up best.
+
+A sound s of unknown waveform reaches microphone m at t_m with the gain a_m,
+among white noise. With its best guess of s put in, the likelihood of a place
+grows with sum_k |Y_k|^2, Y_k = sum_m a_m X_m(w_k) exp(j w_k t_m), over sum
+a_m^2. It is maximised by Newton's method: the slope and the curvature over the
+times of arrival at a place make a set of delays with a covariance, and the
+place that fits them (``systems.hearing.multilateration``) is the next one. With as many
+microphones as are just needed this is the peak of the delays, with more it
+uses only delays that belong to a place.
+
+The gains are those of the channels, the principal component of their
+cross-spectra, for which 1/R_m holds where microphones are alike.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy import fft
+
+from systems.delays.overlap import EDGE_SAMPLES, cut_to_overlap
+from systems.hearing.multilateration import locate_source
+from systems.hearing.source_fix import SourceFix
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["arrival_delays", "refine_source"]
+
+# Newton steps, and the change of a delay at which they end, samples.
+_STEPS = 8
+_SETTLED = 1e-4
+
+# The channels are cut again when a delay is off the cut by more than this, samples.
+_RECUT = 0.02
+
+# Left of a frame after the cut, as a share.
+_LEAST_OVERLAP = 0.25
+
+
+def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
+    """(n - 1,) delays t_k - t_0 of the sound from a fix, s."""
+    if fix.range_valid:
+        ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
+    else:
+        ranges = -shape.p_AM @ fix.p_AS
+    return np.asarray((ranges[1:] - ranges[0]) / c)
+
+
+def refine_source(
+    frame: NDArray[np.float32],
+    start: SourceFix,
+    shape: ArrayShape,
+    c: float,
+    *,
+    sample_rate_hz: float,
+    band_hz: tuple[float, float],
+) -> SourceFix | None:
+    """The most likely place near a first one.
+
+    Args:
+        frame: (n, samples) channels, any unit.
+        start: A fix whose delays are right to half a period of the highest
+            frequency that is heard.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+        sample_rate_hz: Rate of the frame, Hz.
+        band_hz: Lowest and highest frequency to use, Hz.
+
+    Returns:
+        The fix, its errors from the signal and noise that the frame shows, or
+        None where the likelihood has no maximum nearby.
+    """
+    fix, cut_at = start, np.full(shape.count - 1, np.inf)
+    for _ in range(_STEPS):
+        delays = arrival_delays(fix, shape, c) * sample_rate_hz
+        if np.abs(delays - cut_at).max() > _RECUT:
+            cut = _cut(frame, delays)
+            if cut is None:
+                return None
+            cut_at, whole = delays, np.rint(delays)
+            spectra, first, step, padding = _spectra(cut, sample_rate_hz, band_hz)
+        found = _newton_step(spectra, first, step, delays - whole)
+        if found is None:
+            return None
+        move, covariance = found
+        fix = locate_source(
+            (delays + move) / sample_rate_hz,
+            covariance * (padding / sample_rate_hz**2),
+            shape,
+            c,
+        )
+        if np.abs(move).max() < _SETTLED:
+            break
+    return fix
+
+
+def _cut(
+    frame: NDArray[np.float32], delays: NDArray[np.float64]
+) -> NDArray[np.float32] | None:
+    """(n, m) the stretch that all channels share; None where too little is left."""
+    arrivals = np.concatenate((np.zeros(1), delays))
+    length = frame.shape[1] - np.ptp(np.rint(arrivals))
+    if length < max(_LEAST_OVERLAP * frame.shape[1], 4 * EDGE_SAMPLES):
+        return None
+    # An offset would show at the edges, in all channels alike.
+    return cut_to_overlap(frame - frame.mean(axis=1, keepdims=True), arrivals)
+
+
+def _spectra(
+    cut: NDArray[np.float32], sample_rate_hz: float, band_hz: tuple[float, float]
+) -> tuple[NDArray[np.complex64], float, float, float]:
+    """Spectra within the band; first and step of w, rad a sample; padding.
+
+    The padding is the number of bins that bear the noise of one.
+    """
+    length = int(fft.next_fast_len(cut.shape[1], real=True))
+    first = max(1, math.ceil(band_hz[0] * length / sample_rate_hz))
+    last = min(length // 2, math.floor(band_hz[1] * length / sample_rate_hz))
+    spectra = fft.rfft(cut, length)[:, first : last + 1]
+    # Sums of the window's squares and fourth powers: 3/8 and 35/128 an edge.
+    flat = cut.shape[1] - 2 * EDGE_SAMPLES
+    squares, fourths = flat + 0.75 * EDGE_SAMPLES, flat + 35.0 / 64.0 * EDGE_SAMPLES
+    step = 2.0 * math.pi / length
+    return spectra, first * step, step, length * fourths / squares**2
+
+
+@njit(cache=True)
+def _pair_sums(spectra, first, step, rest):  # pragma: no cover  (compiled)
+    """Sums over the bins of the channels' products, turned back by their delays.
+
+    Args:
+        spectra: (n, bins).
+        first: Angular frequency w of the first bin, rad a sample.
+        step: From bin to bin, rad a sample.
+        rest: (n,) delays, samples.
+
+    Returns:
+        (n, n) sums of the products X_m X_n^*: real part, w times imaginary
+        part, w^2 times real part; and the sum of w^2.
+    """
+    n, bins = spectra.shape
+    aligned = np.empty((bins, n), dtype=np.complex128)
+    for m in range(n):
+        turn = complex(math.cos(first * rest[m]), math.sin(first * rest[m]))
+        advance = complex(math.cos(step * rest[m]), math.sin(step * rest[m]))
+        for k in range(bins):
+            aligned[k, m] = spectra[m, k] * turn
+            turn *= advance
+    power = np.zeros((n, n))
+    slope = np.zeros((n, n))
+    curve = np.zeros((n, n))
+    squares = 0.0
+    for m in range(n):
+        for j in range(m + 1):
+            w = first
+            for k in range(bins):
+                x, y = aligned[k, m], aligned[k, j]
+                real = x.real * y.real + x.imag * y.imag
+                power[m, j] += real
+                slope[m, j] += w * (x.imag * y.real - x.real * y.imag)
+                curve[m, j] += w * w * real
+                w += step
+            power[j, m] = power[m, j]
+            slope[j, m] = -slope[m, j]
+            curve[j, m] = curve[m, j]
+    for k in range(bins):
+        squares += (first + k * step) ** 2
+    return power, slope, curve, squares
+
+
+def _newton_step(
+    spectra: NDArray[np.complex64],
+    first: float,
+    step: float,
+    rest: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]] | None:
+    """Change of the delays to the maximum, samples, and their covariance."""
+    n, bins = spectra.shape
+    power, slope, curve, squares = _pair_sums(
+        spectra, first, step, np.concatenate((np.zeros(1), rest))
+    )
+    if not np.trace(power) > 0.0:
+        return None
+    values, vectors = np.linalg.eigh(power)
+    gains = vectors[:, -1]  # of unit length
+    weights = np.outer(gains, gains)
+    information = -2.0 * weights * curve
+    np.fill_diagonal(information, 0.0)
+    information -= np.diag(information.sum(axis=1))
+    gradient = -2.0 * (weights * slope).sum(axis=1)[1:]
+    try:
+        inverse = np.linalg.inv(np.linalg.cholesky(information[1:, 1:]))
+    except np.linalg.LinAlgError:
+        return None
+    inverse = inverse.T @ inverse
+    noise = float(np.sum(values[:-1])) / (bins * (n - 1))
+    off = ~np.eye(n, dtype=bool)
+    signal = float(np.sum((weights * curve)[off]) / np.sum(weights[off] ** 2))
+    # Noise in one channel meets the sound of the others, and their noise.
+    excess = 1.0 + noise * squares / signal if signal > 0.0 else math.inf
+    return inverse @ gradient, inverse * (noise * excess)

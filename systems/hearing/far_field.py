@@ -1,0 +1,136 @@
+"""Direction of a source so far away that its wave fronts are plane.
+
+The delays are then linear in the direction u: tau_k = (p_0 - p_k) . u / c.
+A row tells one component of u and a plane two; what is left of its unit length
+is the component off the row or plane.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.hearing.multilateration import angles_of, whitening_matrix
+from systems.hearing.source_fix import SourceFix
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["locate_far_source"]
+
+_STEPS = 8
+
+
+def locate_far_source(
+    tau: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+    tolerance: NDArray[np.float64] | None = None,
+    *,
+    inverse_range_std: float = 0.0,
+) -> SourceFix:
+    """Where the sound comes from, if from far away.
+
+    Args:
+        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
+        covariance: (n - 1, n - 1) of the delays, s^2.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+        tolerance: (n - 1, n - 1) further errors that weigh the delays and count
+            in chi-square, but not in the standard deviations, s^2.
+        inverse_range_std: How uncertain it is that waves are plane: standard
+            deviation of the inverse range before anything was heard, 1/m. It
+            counts in the errors as far as the delays leave it open.
+
+    Returns:
+        The source on the side of ``shape.ahead``, without a range.
+    """
+    slopes = (shape.p_AM[0] - shape.p_AM[1:]) / c
+    whole = covariance if tolerance is None else covariance + tolerance
+    root = whitening_matrix(whole)
+    if shape.ahead is None:
+        u, basis = _on_sphere(root @ slopes, root @ tau)
+    else:
+        u, basis = _off_array(root @ slopes, root @ tau, shape)
+    gain = np.linalg.pinv(root @ slopes @ basis) @ root
+    of_u = basis @ gain @ covariance @ gain.T @ basis.T
+    if inverse_range_std > 0.0:
+        bend = _bend(u, root, slopes @ basis, shape, c, inverse_range_std)
+        of_u += basis @ np.outer(bend, bend) @ basis.T
+    residual = root @ (tau - slopes @ u)
+    bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
+    return SourceFix(
+        bearing=math.atan2(u[1], u[0]),
+        bearing_std=bearing_std,
+        elevation=elevation,
+        elevation_std=elevation_std,
+        range=0.0,
+        range_valid=False,
+        range_std=math.inf,
+        p_AS=u,
+        covariance=of_u,
+        chi_square=float(residual @ residual),
+    )
+
+
+def _bend(
+    u: NDArray[np.float64],
+    root: NDArray[np.float64],
+    slopes: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+    inverse_range_std: float,
+) -> NDArray[np.float64]:
+    """(k,) deviation of the direction's coordinates by an unknown curvature.
+
+    A wave front from the distance 1/w reaches a microphone at p later than a
+    plane one by w |p - (p . u) u|^2 / 2c.
+    """
+    square = np.sum(shape.p_AM**2, axis=1) - (shape.p_AM @ u) ** 2
+    curved = root @ (square[1:] - square[0]) / (2.0 * c)
+    within = root @ slopes
+    turned = np.linalg.pinv(within) @ curved
+    seen = curved - within @ turned
+    return np.asarray(turned / math.sqrt(float(seen @ seen) + inverse_range_std**-2))
+
+
+def _on_sphere(
+    slopes: NDArray[np.float64], tau: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Best unit vector for whitened delays, and the directions across it."""
+    u = _least_squares(slopes, tau)
+    u /= max(float(np.linalg.norm(u)), 1e-12)
+    for _ in range(_STEPS):
+        basis = np.linalg.svd(u[np.newaxis])[2][1:].T
+        step = _least_squares(slopes @ basis, tau - slopes @ u)
+        u = u + basis @ step
+        u /= np.linalg.norm(u)
+    return u, np.linalg.svd(u[np.newaxis])[2][1:].T
+
+
+def _off_array(
+    slopes: NDArray[np.float64], tau: NDArray[np.float64], shape: ArrayShape
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """As ``_on_sphere``, with the component off the array from unit length."""
+    assert shape.ahead is not None
+    span = shape.span
+    within = slopes @ span.T
+    v = _least_squares(within, tau)
+    length = float(np.linalg.norm(v))
+    if length > 1.0:
+        # More than the array is long: in its line or plane.
+        v = _on_sphere(within, tau)[0] if len(v) > 1 else v / length
+    off = math.sqrt(max(0.0, 1.0 - float(v @ v)))
+    # The component off the array is the root of a small difference there: its
+    # error stays below the root of that difference's.
+    spread = np.linalg.pinv(within)
+    floor = math.sqrt(max(float(np.linalg.norm(spread @ spread.T, 2)), 0.0))
+    basis = span.T - np.outer(shape.ahead, v) / max(off, math.sqrt(floor), 1e-6)
+    return v @ span + off * shape.ahead, basis
+
+
+def _least_squares(
+    slopes: NDArray[np.float64], tau: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.lstsq(slopes, tau, rcond=None)[0], dtype=np.float64)

@@ -1,0 +1,204 @@
+"""Exact hearing in place of loudspeaker, microphones and estimator."""
+
+from __future__ import annotations
+
+import math
+
+from pydrake.math import atan2
+from pydrake.systems.framework import LeafSystem_
+
+from systems.base.robot import RobotParameters
+from systems.framework.finite import read_lists
+from systems.framework.input_error import InputError
+from systems.framework.noise import tick_generator
+from systems.framework.parameters import Length, NonNegative, Parameters
+from systems.framework.scalar_math import cos, sin
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.waveforms import SoundParameters
+from systems.world.geometry import control_point, rotate, safe_norm
+
+__all__ = [
+    "IdealHearingParameters",
+    "IdealSourceSensor",
+    "IdealSourceSensor_",
+    "relative_position",
+]
+
+
+class IdealHearingParameters(Parameters):
+    """What is left of imperfection when hearing is ideal."""
+
+    burst_gaps: bool = True
+    """Hears only while the source sounds; off: at every tick."""
+    bearing_noise_deg: NonNegative = 0.0
+    """Standard deviation of a bearing, deg."""
+    range_noise_fraction: NonNegative = 0.0
+    """Standard deviation of a range over the range."""
+    maximum_range_m: Length = 30.0
+    """A source beyond it is not heard, m."""
+
+
+def relative_position(pose_WB, pose_WS, control_point_m):
+    """p_PS_B: the source from P in B axes, m; floats or AutoDiffXd."""
+    x_P, y_P = control_point(pose_WB, control_point_m)
+    return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
+
+
+@define_for_scalars("IdealSourceSensor_", __name__)
+def IdealSourceSensor_(T):
+    class Impl(LeafSystem_[T]):
+        """Measures where the source is, exactly or with a set noise.
+
+        .. pydrake_system::
+
+            name: IdealSourceSensor
+            input_ports:
+            - pose_WB [m, m, rad]
+            - pose_WS [m, m, rad]
+            output_ports:
+            - source_bearing [rad]
+            - source_range [m]
+            - p_PS_B [m]
+            - covariance [m^2, of p_PS_B, row by row]
+            - detected [0 or 1]
+            - range_valid [0 or 1]
+
+        Stands in for ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator`` with
+        the outputs of the last. Discrete state, 25 ms: p_PS_B and detected.
+        Latency one tick, like the estimator's, so that both builds have the
+        same loop; unlike the estimator it tells front from back.
+
+        Args:
+            robot: Place of P.
+            hearing: ``IdealHearingParameters``.
+            sound: ``SoundParameters``; its gate says when there is sound.
+            seed: Seed of the noise.
+
+        Raises:
+            InputError: Noise is set in an AutoDiffXd system.
+        """
+
+        def _construct(
+            self,
+            *,
+            robot=None,
+            hearing=None,
+            sound=None,
+            seed=0,
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._config = {
+                "robot": robot or RobotParameters(),
+                "hearing": hearing or IdealHearingParameters(),
+                "sound": sound or SoundParameters(),
+                "seed": seed,
+            }
+            self._hearing = self._config["hearing"]
+            self._noisy = (
+                self._hearing.bearing_noise_deg > 0.0
+                or self._hearing.range_noise_fraction > 0.0
+            )
+            if self._noisy and T is not float:
+                raise InputError(
+                    "IdealSourceSensor",
+                    "noise is set, and noise has no derivative; "
+                    "set bearing_noise_deg and range_noise_fraction to 0",
+                )
+            self.set_name("ideal_source_sensor")
+            self._poses = [
+                self.DeclareVectorInputPort(name=name, size=3)
+                for name in ("pose_WB", "pose_WS")
+            ]
+            self._position = self.DeclareDiscreteState(2)
+            self._detected = self.DeclareDiscreteState(1)
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._measure
+            )
+            self._declare("source_bearing", 1, self._bearing)
+            self._declare("source_range", 1, self._range)
+            self.DeclareStateOutputPort("p_PS_B", self._position)
+            self._declare(
+                "covariance",
+                4,
+                self._covariance,
+                self.xd_ticket(),
+            )
+            self.DeclareStateOutputPort("detected", self._detected)
+            self.DeclareStateOutputPort("range_valid", self._detected)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(self, **other._config, converter=converter)
+
+        def _declare(self, name, size, calc, ticket=None):
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=size,
+                calc=calc,
+                prerequisites_of_calc={ticket or self.xd_ticket()},
+            )
+
+        def _state(self, context):
+            return context.get_discrete_state(self._position).CopyToVector().tolist()
+
+        def _sounds(self, time: float) -> bool:
+            return not self._hearing.burst_gaps or self._config["sound"].sounds(time)
+
+        def _measure(self, context, discrete_state):
+            x, y = relative_position(
+                *read_lists(context, self._poses),
+                self._config["robot"].control_point_m,
+            )
+            time = context.get_time()
+            time = time if T is float else time.value()
+            heard = self._sounds(time - FRAME_PERIOD_S / 2.0) and bool(
+                safe_norm(x, y) <= self._hearing.maximum_range_m
+            )
+            if self._noisy:
+                x, y = self._disturbed(x, y, round(time / FRAME_PERIOD_S))
+            if not heard:
+                x = y = T(0.0)
+            discrete_state.set_value(self._position, [x, y])
+            discrete_state.set_value(self._detected, [T(float(heard))])
+
+        def _disturbed(self, x, y, tick):
+            rng = tick_generator(self._config["seed"], tick)
+            bearing_noise, range_noise = rng.standard_normal(2).tolist()
+            bearing = math.atan2(y, x) + bearing_noise * math.radians(
+                self._hearing.bearing_noise_deg
+            )
+            factor = 1.0 + range_noise * self._hearing.range_noise_fraction
+            distance = math.hypot(x, y) * max(factor, 0.0)
+            return distance * math.cos(bearing), distance * math.sin(bearing)
+
+        def _bearing(self, context, output):
+            x, y = self._state(context)
+            output.SetFromVector([atan2(y, x)])
+
+        def _range(self, context, output):
+            x, y = self._state(context)
+            output.SetFromVector([safe_norm(x, y)])
+
+        def _covariance(self, context, output):
+            x, y = self._state(context)
+            bearing = atan2(y, x)
+            across = math.radians(self._hearing.bearing_noise_deg) ** 2 * (
+                x * x + y * y
+            )
+            along = self._hearing.range_noise_fraction**2 * (x * x + y * y)
+            c, s = cos(bearing), sin(bearing)
+            mixed = (along - across) * c * s
+            output.SetFromVector(
+                [
+                    along * c * c + across * s * s,
+                    mixed,
+                    mixed,
+                    along * s * s + across * c * c,
+                ]
+            )
+
+    return Impl
+
+
+IdealSourceSensor = IdealSourceSensor_[None]

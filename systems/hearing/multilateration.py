@@ -1,0 +1,107 @@
+"""Where a source is, from the delays at microphones of any places.
+
+Three microphones equally spaced in a row have a closed form
+(``systems.hearing.near_field``); ``systems.hearing.delay_fit`` serves all others.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.hearing import near_field
+from systems.hearing.delay_fit import DelayProblem, fit_delays
+from systems.hearing.source_fix import SourceFix
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["angles_of", "locate_source", "whitening_matrix"]
+
+# Keeps errors of the azimuth finite right above an array.
+_LEAST_COSINE = 1e-3
+
+
+def locate_source(
+    tau: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    shape: ArrayShape,
+    c: float,
+) -> SourceFix:
+    """Where the sound comes from.
+
+    Args:
+        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
+        covariance: (n - 1, n - 1) of the delays, s^2.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        The source on the side of ``shape.ahead``. Its range is valid where it
+        exceeds its standard deviation. Otherwise the direction is that of a
+        source far away, and its error counts the unknown range, taken to be
+        rarely less than two apertures.
+    """
+    if shape.equal_row is not None and shape.angles == ("bearing",):
+        fix = near_field.locate_source(tau, covariance, shape.equal_row, c)
+        uncertain = fix.range_valid and fix.range_std >= fix.range
+        return fix.without_range() if uncertain else fix
+    u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
+        DelayProblem(
+            c * np.asarray(tau, dtype=np.float64),
+            whitening_matrix(covariance) / c,
+            shape.p_AM,
+            shape.span,
+            np.zeros(shape.dimension) if shape.ahead is None else shape.ahead,
+        ),
+        0.5 / shape.aperture_m,
+    )
+    valid = math.isfinite(variance)
+    bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
+    return SourceFix(
+        bearing=math.atan2(u[1], u[0]),
+        bearing_std=bearing_std,
+        elevation=elevation,
+        elevation_std=elevation_std,
+        range=1.0 / w if valid else 0.0,
+        range_valid=valid,
+        range_std=math.sqrt(variance) / (w * w) if valid else math.inf,
+        p_AS=u / w if valid else u,
+        covariance=of_p,
+        chi_square=chi_square,
+        twin=twin if twin.any() else None,
+    )
+
+
+def whitening_matrix(covariance: NDArray[np.float64]) -> NDArray[np.float64]:
+    """L^-1 of a covariance L L^T, which may be singular to rounding."""
+    floor = 1e-12 * np.diag(covariance) + 1e-30
+    return np.linalg.inv(np.linalg.cholesky(covariance + np.diag(floor)))
+
+
+def angles_of(
+    u: NDArray[np.float64], of_u: NDArray[np.float64], shape: ArrayShape
+) -> tuple[float, float | None, float | None]:
+    """Angles of a direction, with errors.
+
+    Args:
+        u: (d,) unit vector.
+        of_u: (d, d) its covariance.
+        shape: The array, which may not tell every angle.
+
+    Returns:
+        Standard deviation of the azimuth; elevation, and its own; rad.
+    """
+    level = math.hypot(u[0], u[1])
+    x, y = (u[0] / level, u[1] / level) if level > 0.0 else (1.0, 0.0)
+    cosine = max(level, _LEAST_COSINE)
+    variance = y * y * of_u[0, 0] - 2.0 * x * y * of_u[0, 1] + x * x * of_u[1, 1]
+    bearing_std = math.sqrt(max(variance, 0.0)) / cosine
+    if shape.dimension == 2 or shape.angles == ("bearing",):
+        return bearing_std, None, None
+    known = "elevation" in shape.angles
+    return (
+        bearing_std if "bearing" in shape.angles else math.inf,
+        math.atan2(u[2], math.hypot(u[0], u[1])),
+        math.sqrt(of_u[2, 2]) / cosine if known else math.inf,
+    )

@@ -1,0 +1,149 @@
+"""Range and bearing of a source from the delays at three microphones in a row.
+
+M1, M2 and M3 stand at y = l, 0, -l; the source lies ahead, x > 0. With
+a = c tau_12 and b = c tau_13, where tau_ij = t_j - t_i, Apollonius' theorem
+gives R1 = (2 l^2 + 2 a^2 - b^2) / (2 (b - 2 a)) (Kim 2017, eq. 8; eq. 9 of
+Han 2019 is not consistent with its own eq. 7), R2 = R1 + a, R3 = R1 + b and
+sin(bearing) = (R3^2 - R1^2) / (4 l R2), exact at any distance.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from systems.hearing.source_fix import SourceFix
+from systems.sound.array_shape import EqualRow
+
+__all__ = ["locate_source", "source_from_delays"]
+
+# Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
+_LEAST_GAP_M = 1e-9
+
+# Keeps the covariance finite for a source on the line of the microphones.
+_LEAST_COSINE = 1e-3
+
+
+@njit(cache=True)
+def _ranges(a, b, spacing):  # pragma: no cover  (compiled)
+    """Whether the delays have a finite range, and R1, R2, R3 in m."""
+    if b - 2.0 * a <= _LEAST_GAP_M:
+        return False, 0.0, 0.0, 0.0
+    r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
+    r2, r3 = r1 + a, r1 + b
+    valid = min(r1, r2, r3) > 0.0 and abs(r3 * r3 - r1 * r1) <= 4.0 * spacing * r2
+    return valid, r1, r2, r3
+
+
+@njit(cache=True)
+def source_from_delays(tau_12, tau_13, spacing, c):  # pragma: no cover  (compiled)
+    """Bearing and range of the source from M2.
+
+    Args:
+        tau_12: Time by which the sound reaches M2 later than M1, s.
+        tau_13: Time by which the sound reaches M3 later than M1, s.
+        spacing: Distance l between neighbouring microphones, m.
+        c: Speed of sound, m/s.
+
+    Returns:
+        bearing in [-pi/2, pi/2] (rad, left positive), range (m) and whether
+        the range is valid. If not, the range is 0 and the bearing is that of
+        a source far away.
+    """
+    a, b = c * tau_12, c * tau_13
+    valid, r1, r2, r3 = _ranges(a, b, spacing)
+    if not valid:
+        return math.asin(min(1.0, max(-1.0, b / (2.0 * spacing)))), 0.0, False
+    return math.asin((r3 * r3 - r1 * r1) / (4.0 * spacing * r2)), r2, True
+
+
+@njit(cache=True)
+def _spread(slopes, covariance):  # pragma: no cover  (compiled)
+    """J C J^T."""
+    rows = slopes.shape[0]
+    spread = np.zeros((rows, rows))
+    for i in range(rows):
+        for j in range(rows):
+            for m in range(2):
+                for n in range(2):
+                    spread[i, j] += slopes[i, m] * covariance[m, n] * slopes[j, n]
+    return spread
+
+
+@njit(cache=True)
+def _slopes(bearing, r2, a, b, spacing, c):  # pragma: no cover  (compiled)
+    """(4, 2) what the errors of the two delays do to range, bearing, x and y."""
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    r1, r3 = r2 - a, r2 - a + b
+    gap = b - 2.0 * a
+    to_range = np.array([c * (r1 + r3) / gap, -c * r3 / gap])
+    to_y = np.array([c * b * r2, -c * a * r3]) / (spacing * gap)
+    slopes = np.empty((4, 2))
+    slopes[0] = to_range
+    slopes[1] = (to_y - sine * to_range) / (r2 * max(cosine, _LEAST_COSINE))
+    slopes[2] = cosine * to_range - r2 * sine * slopes[1]
+    slopes[3] = sine * to_range + r2 * cosine * slopes[1]
+    return slopes
+
+
+@njit(cache=True)
+def _locate(
+    tau, covariance, to_delays, axes, spacing, c
+):  # pragma: no cover  (compiled)
+    """Place, its covariance, and errors of bearing and range, in the array's axes."""
+    tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
+    tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
+    of_delays = _spread(to_delays, covariance)
+    bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
+    sine, cosine = math.sin(bearing), math.cos(bearing)
+    if valid:
+        slopes = _slopes(bearing, r2, c * tau_12, c * tau_13, spacing, c)
+        place = np.array([r2 * cosine, r2 * sine])
+    else:
+        turn = c / (2.0 * spacing * max(cosine, _LEAST_COSINE))
+        slopes = np.zeros((4, 2))
+        slopes[1:, 1] = turn, -turn * sine, turn * cosine
+        place = np.array([cosine, sine])
+    errors = _spread(slopes, of_delays)
+    p_AS = np.zeros(axes.shape[0])
+    for k in range(2):
+        p_AS += axes[:, k] * place[k]
+    range_std = math.sqrt(errors[0, 0]) if valid else np.inf
+    of_p = _spread(axes, errors[2:, 2:])
+    return p_AS, of_p, math.sqrt(errors[1, 1]), r2, valid, range_std
+
+
+def locate_source(
+    tau: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    row: EqualRow,
+    c: float,
+) -> SourceFix:
+    """As ``source_from_delays``, with what the delays' errors make of it.
+
+    Args:
+        tau: (2,) delays t_k - t_0 in the order of the channels, s.
+        covariance: (2, 2) of them, s^2.
+        row: The microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        The source in the axes of the array.
+    """
+    p_AS, of_p, bearing_std, distance, valid, range_std = _locate(
+        tau, covariance, row.to_delays, row.axes, row.spacing_m, c
+    )
+    return SourceFix(
+        bearing=math.atan2(p_AS[1], p_AS[0]),
+        bearing_std=bearing_std,
+        elevation=None,
+        elevation_std=None,
+        range=distance,
+        range_valid=valid,
+        range_std=range_std,
+        p_AS=p_AS,
+        covariance=of_p,
+    )

@@ -1,0 +1,174 @@
+"""Bearing and range of the source from the frames of the microphones."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from systems.base.robot import RobotParameters
+from systems.framework.finite import check_record
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
+from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.hearing.source_fix import SourceFix
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["TDOAEstimator", "TDOAParameters", "port_values", "robot_localiser"]
+
+
+def robot_localiser(
+    parameters: TDOAParameters, robot: RobotParameters, acoustics: AcousticParameters
+) -> tuple[Localiser, NDArray[np.float64]]:
+    """The localiser of the robot's own microphones.
+
+    Returns:
+        The localiser, and (2,) the microphones' centroid from P in B axes, m.
+    """
+    shape = ArrayShape.of(robot.microphones_m)
+    localiser = Localiser(parameters, shape, acoustics.c)
+    return localiser, np.mean(robot.microphones_m, axis=0)
+
+
+class TDOAEstimator(LeafSystem):
+    """Hears where the source is.
+
+    .. pydrake_system::
+
+        name: TDOAEstimator
+        input_ports:
+        - audio [AudioFrame]
+        output_ports:
+        - source_bearing [rad]
+        - source_range [m]
+        - p_PS_B [m, m]
+        - covariance [m^2]
+        - detected [0 or 1]
+        - range_valid [0 or 1]
+
+    ``systems.hearing.localise`` tells where the sound of a frame comes from: delays of
+    all pairs of channels, a place that explains them, and its errors. Range and
+    bearing count from the microphones' centroid, for the default row M2 = P;
+    p_PS_B from P. Microphones in a row cannot tell front from back: the source
+    is reported in the front half plane. Where nothing is heard all outputs are
+    zero. Where ``range_valid`` is 0 the range is 0, p_PS_B is the unit vector
+    along the bearing and the covariance is that of this vector. The covariance
+    (row major, of p_PS_B) counts noise and echoes, not errors of the
+    microphones' places or of the speed of sound.
+
+    State: the outputs, one group a port, and what ``HearingMemory`` holds.
+    Rate and latency: updated every 25 ms from the frame that ends then, and
+    visible after it: one tick, the time that a processor takes.
+
+    Args:
+        parameters: Method, band and thresholds.
+        robot: Places of the microphones.
+        acoustics: Speed of sound.
+
+    Raises:
+        InputError: The array cannot serve at this rate and band.
+
+    Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
+    """
+
+    def __init__(
+        self,
+        *,
+        parameters: TDOAParameters | None = None,
+        robot: RobotParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+    ) -> None:
+        super().__init__()
+        self._localiser, self._p_PA_B = robot_localiser(
+            parameters or TDOAParameters(),
+            robot or RobotParameters(),
+            acoustics or AcousticParameters(),
+        )
+        self.set_name("tdoa_estimator")
+        self._audio = self.DeclareAbstractInputPort(
+            name="audio", model_value=Value(object())
+        )
+        for name, size in _PORTS:
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
+        self.DeclareDiscreteState(5)
+        self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
+        )
+
+    def _listen(self, context, discrete_state) -> None:
+        audio = self._audio.Eval(context)
+        if not isinstance(audio, AudioFrame):
+            raise TypeError(
+                f"TDOAEstimator: port audio carries a {type(audio).__name__}; connect "
+                "the audio of a MicArray"
+            )
+        check_record(context, self._audio, audio)
+        if audio.sample_rate_hz != SAMPLE_RATE_HZ:
+            raise InputError(
+                "TDOAEstimator",
+                f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
+                f"record at {SAMPLE_RATE_HZ} Hz",
+            )
+        before, located = self._remembered(context)
+        fix, after = self._localiser.localise(audio.counts, before)
+        flags = after.echoes is not None, after.heard, fix is not None
+        discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
+        if after.echoes is not None and after.echoes is not before.echoes:
+            discrete_state.set_value(_ECHOES, after.echoes.ravel())
+        if fix is None and not located:
+            return  # silence goes on, and the outputs are zero already
+        for group, values in enumerate(port_values(fix, self._p_PA_B)):
+            discrete_state.set_value(group, values)
+
+    def _remembered(self, context) -> tuple[HearingMemory, bool]:
+        """What the last frame left, and whether it held a place."""
+        numbers = context.get_discrete_state(_MEMORY).value().tolist()
+        energy, noise_energy, echoing, heard, located = numbers
+        echoes = None
+        if echoing:
+            held = context.get_discrete_state(_ECHOES).value()
+            echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
+        return HearingMemory(energy, noise_energy, echoes, bool(heard)), bool(located)
+
+
+#: Output ports and their sizes.
+_PORTS = (
+    ("source_bearing", 1),
+    ("source_range", 1),
+    ("p_PS_B", 2),
+    ("covariance", 4),
+    ("detected", 1),
+    ("range_valid", 1),
+)
+
+# Groups of the discrete state after those of the ports.
+_MEMORY, _ECHOES = len(_PORTS), len(_PORTS) + 1
+
+#: Values of the output ports where nothing is heard.
+_NOTHING = tuple(np.zeros(size) for _, size in _PORTS)
+
+
+def port_values(
+    fix: SourceFix | None, p_PA_B: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], ...]:
+    """Values of the output ports, in order.
+
+    Args:
+        fix: What was heard.
+        p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+    """
+    if fix is None:
+        return _NOTHING
+    return (
+        np.array([fix.bearing]),
+        np.array([fix.range]),
+        fix.p_AS + p_PA_B if fix.range_valid else fix.p_AS,
+        fix.covariance.ravel(),
+        np.ones(1),
+        np.array([float(fix.range_valid)]),
+    )

@@ -1,0 +1,262 @@
+"""The target from burst to burst: estimates into W, and what is held between."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydantic import Field
+
+from systems.base.robot import RobotParameters
+from systems.framework.parameters import (
+    Duration,
+    Length,
+    NonNegativeLength,
+    Parameters,
+    Speed,
+)
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.hearing.target_filter import (
+    FilterSettings,
+    ages,
+    blank_memory,
+    chosen_track,
+    expected,
+    fold,
+)
+from systems.sound.array_shape import ArrayShape
+from systems.world.geometry import rotate
+
+__all__ = [
+    "Estimate",
+    "Track",
+    "TrackerModel",
+    "TrackerParameters",
+    "past_pose",
+]
+
+
+class TrackerParameters(Parameters):
+    """How the target is tracked."""
+
+    hold: Literal["world", "robot", "motion"] = "motion"
+    """Between bursts the target rests in W, moves with the robot, or goes on
+    with its own velocity, which fades."""
+    maximum_age_s: Duration = 6.0
+    """An older target is lost: three periods of the sound, s."""
+    assumed_range_m: Length = 3.0
+    """Range of the first target when only its bearing is known, m."""
+    resolve_front_back: bool = True
+    """Let the robot's motion tell the source from its mirror image behind a row
+    of microphones; off: every source is in front."""
+    source_top_speed_m_s: Speed = 0.7
+    """Speed of a fast source, m/s: two standard deviations of each component of
+    a velocity that is not known."""
+    velocity_fade_s: Duration = 5.0
+    """Time constant with which a source's velocity is forgotten, s."""
+    measurement_floor_m: NonNegativeLength = 0.01
+    """Standard deviation of what the covariance of an estimate leaves out, m."""
+    gate_floor_m: Length = 0.2
+    """Standard deviation that the gate allows for besides the covariances, m."""
+    believed_outliers: int = Field(default=3, ge=1, le=1_000)
+    """The outlier of this number in a row is believed, if they agree."""
+
+
+class Estimate(NamedTuple):
+    """What a hearing block says; floats or AutoDiffXd."""
+
+    p_PS_B: NDArray[Any]
+    """(2,) source from P, m; a unit vector where only the bearing is known."""
+    covariance: NDArray[Any]
+    """(4,) of p_PS_B, row by row, m^2."""
+    ranged: bool
+    """Whether the range is known."""
+
+
+class Track(NamedTuple):
+    """The tracker's memory; floats or AutoDiffXd."""
+
+    pose_1: NDArray[Any]
+    """(3,) odometry pose one tick ago."""
+    pose_2: NDArray[Any]
+    """(3,) odometry pose two ticks ago."""
+    pose_heard: NDArray[Any]
+    """(3,) odometry pose of the moment of the last estimate."""
+    memory: NDArray[Any]
+    """The filter's, see ``systems.hearing.target_filter``."""
+
+    @classmethod
+    def unpack(cls, state: NDArray[Any]) -> Track:
+        """From the discrete state's vector, of which these are views."""
+        return cls(state[0:3], state[3:6], state[6:9], state[9:])
+
+    def pack(self) -> NDArray[Any]:
+        """To the discrete state's vector."""
+        return np.concatenate(self)
+
+    @property
+    def age(self) -> Any:
+        """Since the measurement behind the target, s."""
+        return chosen_track(self.memory)[0]
+
+
+@register_jitable
+def past_pose(pose_now, pose_1, pose_2, age):
+    """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line."""
+    ticks = age / FRAME_PERIOD_S
+    if ticks <= 1.0:
+        return pose_now + ticks * (pose_1 - pose_now)
+    return pose_1 + (ticks - 1.0) * (pose_2 - pose_1)
+
+
+class _Microphones(NamedTuple):
+    """Where they are on the robot, m."""
+
+    control_point: float
+    """Distance of P ahead of the origin of B."""
+    centre_x: float
+    """Their centroid from P in B axes."""
+    centre_y: float
+    """See centre_x."""
+    ahead_x: float
+    """Normal of their row in B; anything where they are in no row."""
+    ahead_y: float
+    """See ahead_x."""
+
+
+@register_jitable
+def _turned(c, s, x, y):
+    """(x, y) turned by the angle of cosine c and sine s."""
+    return c * x - s * y, s * x + c * y
+
+
+@njit(cache=True)
+def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
+    """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
+
+    Args:
+        p_PS_B: See ``Estimate``.
+        covariance: See ``Estimate``.
+        ranged: 1 where the range is known, or 0.
+        poses: Of the robot now, one tick and two ticks ago, (3,) each.
+        age: Of the estimate, s.
+        microphones: ``_Microphones``.
+
+    Returns:
+        Pose of the robot (3,) at the moment that the estimate is valid for, and
+        the sighting (10,) of ``systems.hearing.target_filter``.
+    """
+    pose = past_pose(*poses, age)
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x_P = pose[0] + microphones.control_point * c
+    y_P = pose[1] + microphones.control_point * s
+    dx, dy = _turned(c, s, microphones.centre_x, microphones.centre_y)
+    nx, ny = _turned(c, s, microphones.ahead_x, microphones.ahead_y)
+    x, y = _turned(c, s, p_PS_B[0], p_PS_B[1])
+    if ranged > 0.0:
+        x, y = x_P + x, y_P + y
+    # R C R^T
+    ax, ay = _turned(c, s, covariance[0], covariance[2])
+    bx, by = _turned(c, s, covariance[1], covariance[3])
+    xx, xy = _turned(c, s, ax, bx)
+    _, yy = _turned(c, s, ay, by)
+    return pose, np.array([x, y, xx, xy, yy, x_P + dx, y_P + dy, nx, ny, ranged])
+
+
+def _of_scalars(memory: NDArray[Any], function: Any) -> Any:
+    """A compiled function as it serves the memory's scalars, floats or AutoDiffXd."""
+    return function.py_func if memory.dtype.hasobject else function
+
+
+class TrackerModel:
+    """The tracker's arithmetic for one robot and one kind of hearing.
+
+    Args:
+        tracker: Parameters.
+        robot: Place of P, and microphones.
+        measurement_age_s: From the moment an estimate is valid for to its
+            arrival, s.
+    """
+
+    def __init__(
+        self,
+        tracker: TrackerParameters,
+        robot: RobotParameters,
+        measurement_age_s: float,
+    ) -> None:
+        self._hold = tracker.hold
+        centre_P = np.mean(robot.microphones_m, axis=0).tolist()
+        ahead = ArrayShape.of(robot.microphones_m).ahead
+        both = tracker.resolve_front_back and ahead is not None
+        self._hypotheses = 2 if both else 1
+        ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
+        self._microphones = _Microphones(robot.control_point_m, *centre_P, *ahead_B)
+        self._tick = FRAME_PERIOD_S * ages(self._hypotheses)
+        self._settings = FilterSettings(
+            speed_std=tracker.source_top_speed_m_s / 2.0,
+            velocity_fade=tracker.velocity_fade_s,
+            floor=tracker.measurement_floor_m,
+            gate_floor=tracker.gate_floor_m,
+            believed_outliers=tracker.believed_outliers,
+            assumed_range=tracker.assumed_range_m,
+            measurement_age=measurement_age_s,
+        )
+
+    def start(self, pose: Any) -> Track:
+        """Nothing heard yet; before time zero the robot was where it starts."""
+        pose = np.asarray(pose)
+        return Track(pose, pose, pose, blank_memory(self._hypotheses))
+
+    def hear(self, track: Track, estimate: Estimate, pose: Any) -> Track:
+        """The track with an estimate folded in that arrives at ``pose``."""
+        poses = np.asarray(pose), track.pose_1, track.pose_2
+        p_PS_B, covariance, ranged = estimate
+        memory = track.memory.copy()
+        age = self._settings.measurement_age
+        measured = p_PS_B, covariance, float(ranged)
+        then, sighting = _of_scalars(memory, _sighting)(
+            *measured, poses, age, self._microphones
+        )
+        believed = _of_scalars(memory, fold)(memory, sighting, self._settings)
+        heard = then if believed else track.pose_heard
+        return track._replace(pose_heard=heard, memory=memory)
+
+    def older(self, track: Track, pose: Any) -> Track:
+        """The track a tick later, when ``pose`` has become the last one."""
+        memory = track.memory + self._tick
+        return Track(np.asarray(pose), track.pose_1, track.pose_heard, memory)
+
+    def position(self, track: Track, pose: Any) -> Any:
+        """The target in W for a robot at ``pose``, (2,) m."""
+        if self._hold == "motion":
+            return self._expected(track)[1:3]
+        held = chosen_track(track.memory)[1:3]
+        if self._hold == "world":
+            return held
+        x_B, y_B, theta = track.pose_heard
+        dx, dy = rotate(pose[2] - theta, held[0] - x_B, held[1] - y_B)
+        return [pose[0] + dx, pose[1] + dy]
+
+    def velocity(self, track: Track) -> Any:
+        """Expected velocity of the source in W, (2,) m/s."""
+        return self._expected(track)[3:5]
+
+    def covariance(self, track: Track, pose: Any) -> Any:
+        """Of the target in W, row by row, (4,) m^2.
+
+        A target that is held elsewhere than the source is expected is off by
+        that distance.
+        """
+        held = self.position(track, pose)
+        _, x, y, _, _, xx, xy, yy = self._expected(track)[:8]
+        dx, dy = held[0] - x, held[1] - y
+        mixed = xy + dx * dy
+        return [xx + dx * dx, mixed, mixed, yy + dy * dy]
+
+    def _expected(self, track: Track) -> Any:
+        """The chosen track as it is expected to be now."""
+        fade, speed_std = self._settings.velocity_fade, self._settings.speed_std
+        return _of_scalars(track.memory, expected)(track.memory, fade, speed_std)

@@ -1,0 +1,1 @@
+"""Virtual impedance: attraction, repulsion, a controller a law."""

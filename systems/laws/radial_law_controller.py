@@ -1,0 +1,67 @@
+"""A user's own law in the place of the papers' laws."""
+
+from __future__ import annotations
+
+from pydrake.systems.framework import LeafSystem_
+
+from systems.framework.scalar_types import define_for_scalars
+from systems.laws.impedance import ImpedanceLoop
+from systems.laws.repulsion import RepulsionParameters
+
+__all__ = ["RadialLawController", "RadialLawController_", "no_force"]
+
+
+def no_force(c, s, repulsion: RepulsionParameters):
+    """No avoidance at all: the lower anchor of every comparison. N."""
+    return 0.0 * c
+
+
+@define_for_scalars("RadialLawController_", __name__)
+def RadialLawController_(T):
+    class Impl(LeafSystem_[T], ImpedanceLoop):
+        """Follows the target; pushes off by any function of c and s.
+
+        .. pydrake_system::
+
+            name: RadialLawController
+            input_ports:
+            - p_WS_estimated [m]
+            - target_valid [0 or 1]
+            - collision_vectors_B [m, three slots of x and y]
+            - features [number of what the vector stands on, 0 an empty slot]
+            - pose_WB_estimated [m, m, rad]
+            - v_WP [m/s, of the virtual mass]
+            output_ports:
+            - acceleration_W [m/s^2]
+            - forces_W [N, attraction then repulsion, x and y each]
+            - obstacle_speeds [m/s, s of each slot]
+
+        Discrete state, 25 ms: the collision vectors of the last round of the
+        sensors, for s. The outputs are functions of state and present input:
+        no latency.
+
+        Args:
+            robot: Mass and place of P.
+            attraction: ``AttractionParameters``.
+            repulsion: ``RepulsionParameters``, handed to the law.
+            sensors: ``UltrasonicParameters``: order of firing.
+            law: ``law(c, s, repulsion)``: force away from the obstacle in N at
+                distance c in m and speed s in m/s. Use pydrake.math, so that
+                it can be differentiated.
+        """
+
+        def _construct(self, *, law=no_force, converter=None, **options):
+            super().__init__(converter=converter)
+            self._law = law
+            self._declare_loop(T, "radial_law_controller", **options)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(self, law=other._law, converter=converter, **other._options)
+
+        def _radial_force(self, c, s):
+            return self._law(c, s, self._repulsion)
+
+    return Impl
+
+
+RadialLawController = RadialLawController_[None]

@@ -1,0 +1,1 @@
+"""Range sensors, and the collision vector that they give."""

@@ -1,0 +1,329 @@
+"""From three ranges to the vector that points at the obstacle."""
+
+from __future__ import annotations
+
+import math
+from typing import Literal
+
+import numpy as np
+from pydrake.systems.framework import LeafSystem_
+
+from systems.base.robot import RobotParameters
+from systems.framework.cache import declare_cache
+from systems.framework.finite import read_lists
+from systems.framework.parameters import NonNegativeLength, Parameters
+from systems.framework.scalar_math import float_of
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.ranging.ultrasonic_array import SENSORS, UltrasonicParameters
+from systems.world.geometry import control_point, rotate
+
+__all__ = [
+    "SLOTS",
+    "CollisionVector",
+    "CollisionVectorParameters",
+    "CollisionVector_",
+    "carried_point",
+    "collision_vectors",
+    "echo_point",
+    "echo_points",
+    "foot_on_segment",
+]
+
+#: Collision vectors that a controller takes at once.
+SLOTS = 3
+
+Aggregation = Literal["paper", "nearest", "sum"]
+
+
+class CollisionVectorParameters(Parameters):
+    """How echoes become collision vectors."""
+
+    aggregation: Aggregation = "paper"
+    """``paper``: nearest echo, joined with its nearer neighbour where close
+    enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
+    own vector, whose forces add."""
+    pair_separation_m: NonNegativeLength = 0.5
+    """Echoes farther apart than this are taken as two obstacles, m."""
+
+
+def echo_point(range_, axis, position):
+    """Where an echo is taken to lie: on the sensor's axis.
+
+    Args:
+        range_: Range r_i, m; float or AutoDiffXd.
+        axis: Direction phi_i of the sensor in B, rad.
+        position: Place p_PU_i of the sensor from P, m.
+
+    Returns:
+        (x, y) from P in B axes, m. Han 2019, eq. 11 prints a minus sign and
+        mixes d with r; eq. 13 swaps the axes.
+    """
+    return (
+        position[0] + range_ * math.cos(axis),
+        position[1] + range_ * math.sin(axis),
+    )
+
+
+def echo_points(ranges, echo, sensors: UltrasonicParameters):
+    """The three points that the sensors see, None where there is no echo."""
+    return [
+        echo_point(range_, axis, position) if heard > 0.5 else None
+        for range_, heard, axis, position in zip(
+            ranges, echo, sensors.axes, sensors.positions_m, strict=True
+        )
+    ]
+
+
+def carried_point(point, pose_then, pose_now, control_point_m):
+    """Where a point that was seen from another pose lies now, if it rests.
+
+    Args:
+        point: (x, y) from P in B axes as seen then, m; floats or AutoDiffXd.
+        pose_then: (x, y, theta) of the robot then, m and rad.
+        pose_now: The same now.
+        control_point_m: Distance of P ahead of the axle, m.
+
+    Returns:
+        (x, y) from P in B axes now, m.
+    """
+    p_then, p_now = (
+        control_point(pose, control_point_m) for pose in (pose_then, pose_now)
+    )
+    x, y = rotate(pose_then[2], *point)
+    dx, dy = p_then[0] - p_now[0] + x, p_then[1] - p_now[1] + y
+    return rotate(-pose_now[2], dx, dy)
+
+
+def foot_on_segment(a, b):
+    """Point of the segment a-b that is nearest to the origin.
+
+    Args:
+        a: (x, y), m; floats or AutoDiffXd.
+        b: (x, y), m.
+
+    Returns:
+        (x, y), m. Han 2019, eq. 14 has a wrong sign and a singular slope, and
+        does not keep the foot on the segment; a foot outside of it points at
+        empty space.
+    """
+    ex, ey = b[0] - a[0], b[1] - a[1]
+    squared = ex * ex + ey * ey
+    if squared == 0.0:
+        return a
+    t = -(a[0] * ex + a[1] * ey) / squared
+    if t <= 0.0:
+        return a
+    if t >= 1.0:
+        return b
+    return a[0] + t * ex, a[1] + t * ey
+
+
+def collision_vectors(points, parameters: CollisionVectorParameters):
+    """Collision vectors from the points that the sensors see.
+
+    Args:
+        points: Three entries, left to right: (x, y) from P in m, or None
+            where there is no echo.
+        parameters: The aggregation rule.
+
+    Returns:
+        Up to three (feature, x, y). The feature names what the vector stands
+        on, so that a jump from one to another is not taken for a motion:
+        1, 2, 3 one sensor (case I, Han 2019, eq. 12), 4 sensors 1 and 2,
+        5 sensors 2 and 3 (case II, eq. 14).
+    """
+    heard = [k for k in range(SENSORS) if points[k] is not None]
+    if not heard:
+        return []
+    if parameters.aggregation == "sum":
+        return _all_vectors(points, parameters.pair_separation_m)
+    nearest = min(heard, key=lambda k: _squared(points[k]))
+    if parameters.aggregation == "paper":
+        partner = _partner(points, nearest, parameters.pair_separation_m)
+        if partner is not None:
+            left = min(nearest, partner)
+            return [_pair(points, left)]
+    return [(1.0 + nearest, *points[nearest])]
+
+
+def _squared(point):
+    return point[0] * point[0] + point[1] * point[1]
+
+
+def _close(a, b, separation):
+    return _squared((b[0] - a[0], b[1] - a[1])) < separation * separation
+
+
+def _pair(points, left):
+    return (4.0 + left, *foot_on_segment(points[left], points[left + 1]))
+
+
+def _partner(points, sensor, separation):
+    """The neighbour to join with: of those close enough the nearer to P."""
+    neighbours = [
+        k
+        for k in (sensor - 1, sensor + 1)
+        if 0 <= k < SENSORS
+        and points[k] is not None
+        and _close(points[sensor], points[k], separation)
+    ]
+    return min(neighbours, key=lambda k: _squared(points[k]), default=None)
+
+
+def _all_vectors(points, separation):
+    vectors = []
+    paired = set()
+    for left in range(SENSORS - 1):
+        a, b = points[left], points[left + 1]
+        if a is not None and b is not None and _close(a, b, separation):
+            vectors.append(_pair(points, left))
+            paired |= {left, left + 1}
+    vectors += [
+        (1.0 + k, *points[k])
+        for k in range(SENSORS)
+        if points[k] is not None and k not in paired
+    ]
+    return vectors
+
+
+def fill_slots(vectors, scalar):
+    """(vectors, mask, features) for the ports: 6, 3 and 3 elements."""
+    zero, one, empty = scalar(0.0), scalar(1.0), SLOTS - len(vectors)
+    out = [component for _, x, y in vectors for component in (x, y)]
+    mask = [one] * len(vectors)
+    features = [zero + feature for feature, _, _ in vectors]
+    blank = [zero] * empty
+    return out + blank + blank, mask + blank, features + blank
+
+
+def declare_collision_ports(system, slots):
+    """Declares the three output ports that every obstacle sensing ends in."""
+    for index, (name, size) in enumerate(
+        (("collision_vectors_B", 2 * SLOTS), ("mask", SLOTS), ("features", SLOTS))
+    ):
+
+        def calc(context, output, index=index):
+            output.SetFromVector(slots.Eval(context)[index])
+
+        system.DeclareVectorOutputPort(
+            name=name,
+            size=size,
+            calc=calc,
+            prerequisites_of_calc={slots.ticket()},
+        )
+
+
+@define_for_scalars("CollisionVector_", __name__)
+def CollisionVector_(T):
+    class Impl(LeafSystem_[T]):
+        """Turns echoes into collision vectors from P (cases I and II).
+
+        .. pydrake_system::
+
+            name: CollisionVector
+            input_ports:
+            - ranges [m]
+            - echo [0 or 1]
+            - range_ages [s]
+            - pose_WB_estimated [m, m, rad]
+            output_ports:
+            - collision_vectors_B [m, three slots of x and y]
+            - mask [0 or 1 a slot]
+            - features [number of the sensor or pair, 0 none]
+
+        Slots are filled from the first; only ``aggregation: sum`` fills more
+        than one. With ``firing: simultaneous`` a function of the present
+        ranges: no state, no latency; the ports of age and pose are not read.
+        With ``firing: sequential`` a range that is held stands for a point
+        that rests in W: it is carried on to the present pose. An obstacle's
+        own motion since that sensor fired, 50 ms at most, remains an error.
+
+        Discrete state, 25 ms, with ``firing: sequential``: the last two poses.
+
+        Args:
+            parameters: ``CollisionVectorParameters``.
+            sensors: Places and order of firing, ``UltrasonicParameters``.
+            robot: Place of P.
+            initial_pose: (x, y, theta) before time zero, m and rad.
+
+        Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
+        """
+
+        def _construct(
+            self,
+            *,
+            parameters=None,
+            sensors=None,
+            robot=None,
+            initial_pose=(0.0, 0.0, 0.0),
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            self._parameters = parameters or CollisionVectorParameters()
+            self._sensors = sensors or UltrasonicParameters()
+            self._robot = robot or RobotParameters()
+            self._initial_pose = tuple(initial_pose)
+            self.set_name("collision_vector")
+            inputs = [
+                self.DeclareVectorInputPort(name=name, size=3)
+                for name in ("ranges", "echo", "range_ages", "pose_WB_estimated")
+            ]
+            self._echoes, self._motion = inputs[:2], inputs[2:]
+            sources = {port.ticket() for port in self._echoes}
+            self._past_poses = self._sensors.round_ticks - 1
+            if self._past_poses:
+                past = [T(v) for v in self._initial_pose] * self._past_poses
+                self.DeclareDiscreteState(past)
+                self.DeclarePeriodicDiscreteUpdateEvent(
+                    period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+                )
+                sources |= {port.ticket() for port in self._motion}
+                sources.add(self.xd_ticket())
+            slots = declare_cache(self, "slots", self._slots, sources)
+            declare_collision_ports(self, slots)
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(
+                self,
+                parameters=other._parameters,
+                sensors=other._sensors,
+                robot=other._robot,
+                initial_pose=other._initial_pose,
+                converter=converter,
+            )
+
+        def _slots(self, context):
+            ranges, echo = read_lists(context, self._echoes)
+            points = echo_points(ranges, echo, self._sensors)
+            if self._past_poses:
+                points = self._carried(context, points)
+            return fill_slots(collision_vectors(points, self._parameters), T)
+
+        def _carried(self, context, points):
+            """The points as they lie from the present pose."""
+            ages, now = read_lists(context, self._motion)
+            poses = self._poses(context, now)
+            ticks = [round(float_of(age) / FRAME_PERIOD_S) for age in ages]
+            return [
+                carried_point(point, poses[k], poses[0], self._robot.control_point_m)
+                if point is not None and k
+                else point
+                for point, k in zip(points, ticks, strict=True)
+            ]
+
+        def _poses(self, context, now):
+            """The pose now, a tick ago, two ticks ago."""
+            past = context.get_discrete_state(0).CopyToVector().tolist()
+            starts = range(0, len(past), 3)
+            return [now, *(past[k : k + 3] for k in starts)]
+
+        def _remember(self, context, discrete_state):
+            _, now = read_lists(context, self._motion)
+            poses = self._poses(context, now)[:-1]
+            discrete_state.set_value(np.array(poses).ravel())
+
+    return Impl
+
+
+CollisionVector = CollisionVector_[None]

@@ -1,0 +1,301 @@
+"""Three ultrasonic range finders at the control point."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Annotated, Literal
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+from pydrake.systems.framework import LeafSystem
+from scipy.special import ndtri
+
+from systems.base.robot import RobotParameters
+from systems.framework.cache import declare_cache
+from systems.framework.finite import check_finite, read_arrays
+from systems.framework.input_error import InputError
+from systems.framework.noise import standard_normals
+from systems.framework.parameters import (
+    Angle,
+    Fraction,
+    Length,
+    NonNegativeLength,
+    Parameters,
+    Point,
+    Size,
+    SoundSpeed,
+)
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.acoustics import AcousticParameters
+from systems.world.geometry import fan_ranges
+
+__all__ = [
+    "SENSORS",
+    "UltrasonicArray",
+    "UltrasonicParameters",
+    "cone_ranges",
+    "measured_ranges",
+    "world_rectangles",
+]
+
+#: The model holds three sensors, numbered from left to right.
+SENSORS = 3
+
+_Triple = Annotated[tuple[Angle, Angle, Angle], Strict(False)]
+_Places = Annotated[tuple[Point, Point, Point], Strict(False)]
+
+
+class UltrasonicParameters(Parameters):
+    """SRF-05 range finders (Han 2019, 4.2)."""
+
+    axes_deg: _Triple = (30.0, 0.0, -30.0)
+    """Directions of the cones in B, left to right, deg CCW from x."""
+    positions_m: _Places = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
+    """Places of the sensors from P, in B axes, m."""
+    beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
+    """Half of each cone's opening angle, deg."""
+    minimum_range_m: Length = 0.03
+    """Nearer surfaces read this range, m."""
+    maximum_range_m: Length = 3.0
+    """Farther surfaces give no echo, m."""
+    noise_m: NonNegativeLength = 0.001
+    """Standard deviation of a range, m."""
+    dropout_probability: Fraction = 0.0
+    """Probability that an echo is missed."""
+    firing: Literal["simultaneous", "sequential"] = "simultaneous"
+    """All sensors at every tick, or one after the other, a tick each."""
+    assumed_sound_speed_m_s: SoundSpeed | None = None
+    """Speed by which the sensors turn time into range, m/s; none: the true one."""
+
+    @model_validator(mode="after")
+    def _check(self) -> UltrasonicParameters:
+        if self.minimum_range_m >= self.maximum_range_m:
+            raise InputError(
+                "minimum_range_m",
+                f"{self.minimum_range_m} must be below "
+                f"maximum_range_m {self.maximum_range_m}",
+            )
+        if not self.axes_deg[0] > self.axes_deg[1] > self.axes_deg[2]:
+            raise InputError(
+                "axes_deg",
+                f"{self.axes_deg} must fall from left to right, as 30, 0, -30",
+            )
+        return self
+
+    @cached_property
+    def axes(self) -> tuple[float, ...]:
+        """Directions of the cones in B, rad."""
+        return tuple(map(math.radians, self.axes_deg))
+
+    @cached_property
+    def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+        """Axes (3,) in B, rad, places (3, 2) from P, m, and half angle, rad."""
+        half_angle = math.radians(self.beam_half_angle_deg)
+        return np.array(self.axes), np.array(self.positions_m), half_angle
+
+    @property
+    def round_ticks(self) -> int:
+        """Ticks from one reading of a sensor to its next."""
+        return SENSORS if self.firing == "sequential" else 1
+
+    @cached_property
+    def least_luck(self) -> float:
+        """Standard normal numbers below this drop an echo."""
+        return float(ndtri(self.dropout_probability))
+
+
+@njit(cache=True)
+def world_rectangles(
+    poses_WO, sizes, pose_WS, source_size
+):  # pragma: no cover  (compiled)
+    """All bodies that can be seen or hit, (n + 1, 5); the master robot is last."""
+    count = len(sizes) // 2
+    rectangles = np.empty((count + 1, 5))
+    for k in range(count):
+        rectangles[k, :3] = poses_WO[3 * k : 3 * k + 3]
+        rectangles[k, 3:] = sizes[2 * k : 2 * k + 2]
+    rectangles[count, :3] = pose_WS
+    rectangles[count, 3], rectangles[count, 4] = source_size
+    return rectangles
+
+
+def cone_ranges(
+    pose_WB, rectangles, parameters: UltrasonicParameters, control_point_m: float
+) -> NDArray[np.float64]:
+    """True distance to the nearest surface in each cone.
+
+    Args:
+        pose_WB: (x, y, theta) of the robot, m and rad.
+        rectangles: (n, 5) bodies in W.
+        parameters: The sensors.
+        control_point_m: Distance of P ahead of the axle, m.
+
+    Returns:
+        (3,) m; infinity where a cone is empty.
+    """
+    pose = np.asarray(pose_WB, dtype=np.float64)
+    return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
+
+
+def measured_ranges(
+    true_ranges: NDArray[np.float64],
+    parameters: UltrasonicParameters,
+    sound_speed: float,
+    numbers: NDArray[np.floating],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """What the sensors report of the true ranges.
+
+    Args:
+        true_ranges: (3,) m, infinity where a cone is empty.
+        parameters: The sensors.
+        sound_speed: True speed of sound, m/s.
+        numbers: (2, 3) standard normal: noise, and luck, which drops an echo
+            where it is below the quantile of the probability of that.
+
+    Returns:
+        (3,) ranges in [minimum, maximum], m, and (3,) echoes, 0 or 1. Without
+        an echo the range is finite and means nothing.
+    """
+    stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
+    limits = parameters.minimum_range_m, parameters.maximum_range_m
+    errors = stretch, parameters.noise_m, parameters.least_luck
+    return _measured_ranges(true_ranges, numbers, *errors, *limits)
+
+
+@njit(cache=True)
+def _measured_ranges(
+    true_ranges, numbers, stretch, noise_m, least_luck, low, high
+):  # pragma: no cover  (compiled)
+    ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
+    for k in range(SENSORS):
+        noise, luck = numbers[0, k], numbers[1, k]
+        if true_ranges[k] <= high and luck >= least_luck:
+            measured = stretch * true_ranges[k] + noise_m * noise
+            ranges[k] = min(max(measured, low), high)
+            echo[k] = 1.0
+    return ranges, echo
+
+
+class UltrasonicArray(LeafSystem):
+    """Ranges of the nearest surfaces in three cones.
+
+    .. pydrake_system::
+
+        name: UltrasonicArray
+        input_ports:
+        - pose_WB [m, m, rad]
+        - poses_WO [m, m, rad each]
+        - sizes [m, m each]
+        - pose_WS [m, m, rad]
+        output_ports:
+        - ranges [m]
+        - echo [0 or 1]
+        - range_ages [s, since each sensor fired]
+
+    The master robot is a body like the obstacles. Surfaces beyond the maximum
+    range give no echo; nearer than the minimum they read the minimum, for
+    dropping the echo at contact would drop the force. A cone reports a range,
+    not a direction.
+
+    State: ranges and echoes of the last tick, for sequential firing.
+    Rate and latency: a function of the present poses; no latency. Noise is
+    drawn once a 25 ms tick. With ``firing: sequential`` one sensor fires a
+    tick, from left to right, and the others hold: ranges are 0, 25 and 50 ms
+    old, and a sensor's next comes after a round of 75 ms.
+
+    Args:
+        parameters: The sensors.
+        robot: Place of P.
+        acoustics: Speed of sound; the time of flight uses it.
+        source_size: Length and width of the master robot, m.
+        obstacle_count: Number of boxes on the obstacle ports.
+        seed: Seed of the noise.
+    """
+
+    def __init__(
+        self,
+        *,
+        parameters: UltrasonicParameters | None = None,
+        robot: RobotParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+        source_size: Size = (0.326, 0.352),
+        obstacle_count: int = 0,
+        seed: int = 0,
+    ) -> None:
+        super().__init__()
+        self._parameters = parameters or UltrasonicParameters()
+        self._control_point = (robot or RobotParameters()).control_point_m
+        self._sound_speed = (acoustics or AcousticParameters()).c
+        self._source_size = source_size
+        self._seed = seed
+        check_finite("UltrasonicArray: source_size", source_size)
+        self.set_name("ultrasonic_array")
+        self._inputs = [
+            self.DeclareVectorInputPort(name=name, size=size)
+            for name, size in (
+                ("pose_WB", 3),
+                ("poses_WO", 3 * obstacle_count),
+                ("sizes", 2 * obstacle_count),
+                ("pose_WS", 3),
+            )
+        ]
+        held = np.r_[np.full(SENSORS, self._parameters.maximum_range_m), np.zeros(3)]
+        self.DeclareDiscreteState(held)
+        if self._parameters.firing == "sequential":
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._hold
+            )
+        sources = {port.ticket() for port in self._inputs}
+        sources |= {self.time_ticket(), self.xd_ticket()}
+        self._readings = declare_cache(self, "readings", self._read, sources)
+        for name, calc in (("ranges", self._calc_ranges), ("echo", self._calc_echo)):
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=SENSORS,
+                calc=calc,
+                prerequisites_of_calc={self._readings.ticket()},
+            )
+        self.DeclareVectorOutputPort(
+            name="range_ages",
+            size=SENSORS,
+            calc=self._calc_ages,
+            prerequisites_of_calc={self.time_ticket()},
+        )
+
+    def _read(self, context) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """(3,) ranges and (3,) echoes as they stand now."""
+        pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
+        tick = _tick(context)
+        numbers = standard_normals((2, SENSORS), self._seed, tick)
+        rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
+        true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
+        ranges, echo = measured_ranges(
+            true, self._parameters, self._sound_speed, numbers
+        )
+        if self._parameters.firing == "simultaneous":
+            return ranges, echo
+        held = context.get_discrete_state(0).CopyToVector().reshape(2, SENSORS)
+        fires = tick % SENSORS
+        held[:, fires] = ranges[fires], echo[fires]
+        return held[0], held[1]
+
+    def _hold(self, context, discrete_state):
+        discrete_state.set_value(np.concatenate(self._readings.Eval(context)))
+
+    def _calc_ranges(self, context, output):
+        output.SetFromVector(self._readings.Eval(context)[0])
+
+    def _calc_echo(self, context, output):
+        output.SetFromVector(self._readings.Eval(context)[1])
+
+    def _calc_ages(self, context, output):
+        tick, round_ = _tick(context), self._parameters.round_ticks
+        ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in range(SENSORS)]
+        output.SetFromVector(ages)
+
+
+def _tick(context) -> int:
+    return round(context.get_time() / FRAME_PERIOD_S)

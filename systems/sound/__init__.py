@@ -1,0 +1,1 @@
+"""From loudspeaker to counts: waveforms, propagation, rooms, microphones, converter."""

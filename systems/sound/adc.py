@@ -1,0 +1,164 @@
+"""From sound pressure to counts: microphone, amplifier and converter."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Annotated, Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+
+from systems.framework.finite import check_finite, total
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Fraction, Parameters, Positive, Time
+from systems.framework.signals import SAMPLE_RATE_HZ
+
+__all__ = ["MicArrayParameters", "channel_skew", "convert"]
+
+
+class MicArrayParameters(Parameters):
+    """Microphones, amplifier and converter (Han 2019, 4.1)."""
+
+    snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the noise, dB.
+
+    The noise is white and Gaussian over 0-50 kHz, of equal power in every
+    channel and independent of distance.
+    """
+    sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
+    """Sensitivity of the microphones, dB re 1 V/Pa."""
+    preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
+    """Gain between microphone and converter, dB."""
+    adc_full_scale_v: Positive = 1.65
+    """Voltage at which the converter clips, V, of either sign."""
+    adc_bits: int = Field(default=10, ge=2, le=16)
+    """Resolution of the converter, bits."""
+    channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
+    """Time by which each channel is sampled later, s; below one sample.
+
+    One time for each microphone, or none where all are sampled at once.
+    """
+
+    ego_noise_file: str | None = None
+    """Recording of the robot's own noise (WAV, FLAC ...), repeated for ever.
+
+    One channel for all microphones, or one for each.
+    """
+    ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the ego noise at top speed, dB."""
+    ego_noise_share_at_rest: Fraction = 1.0
+    """Amplitude of the ego noise at rest over that at top speed; linear between."""
+    position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
+    """Each microphone stands off its place by up to this in x and in y, m.
+
+    This error and the next two are uniform, and drawn once from the seed.
+    """
+    delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
+    """Each channel is sampled up to this earlier or later, s."""
+    gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
+    """The gain of each channel, noise included, is off by up to this, dB."""
+
+    @model_validator(mode="after")
+    def _check(self) -> MicArrayParameters:
+        if not all(0.0 <= skew < 1.0 / SAMPLE_RATE_HZ for skew in self.channel_skew_s):
+            raise InputError(
+                "channel_skew_s",
+                f"{self.channel_skew_s} must lie in [0, "
+                f"{1.0 / SAMPLE_RATE_HZ:g}) s, one sample",
+            )
+        return self
+
+    @cached_property
+    def full_scale(self) -> int:
+        """Counts of the positive full scale."""
+        return 2 ** (self.adc_bits - 1)
+
+    @cached_property
+    def counts_per_pa(self) -> float:
+        """Counts for one pascal."""
+        gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
+        return gain * self.full_scale / self.adc_full_scale_v
+
+
+def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
+    """(count,) s by which each channel is sampled later.
+
+    Raises:
+        InputError: The skew is given for another number of channels.
+    """
+    skew = parameters.channel_skew_s
+    if len(skew) not in (0, count):
+        raise InputError(
+            "microphones.channel_skew_s",
+            f"{skew} has {len(skew)} times for {count} "
+            "microphones; give one for each, or []",
+        )
+    return np.array(skew) if skew else np.zeros(count)
+
+
+@njit(cache=True)
+def _silent_counts(
+    noise, gains, sigma, full_scale, out
+):  # pragma: no cover  (compiled)
+    for m in range(noise.shape[0]):
+        level = np.float32(gains[m] * sigma)
+        for k in range(noise.shape[1]):
+            x = np.rint(level * noise[m, k])
+            out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
+
+
+@njit(cache=True)
+def _counts(
+    pressure, noise, gains, gain, sigma, full_scale, out
+):  # pragma: no cover  (compiled)
+    for m in range(noise.shape[0]):
+        factor, level = np.float32(gains[m] * gain), np.float32(gains[m] * sigma)
+        for k in range(noise.shape[1]):
+            x = np.rint(factor * pressure[m, k] + level * noise[m, k])
+            out[m, k] = np.int16(min(max(x, -full_scale), full_scale - np.float32(1)))
+
+
+def convert(
+    pressure: NDArray[np.float32] | None,
+    noise: NDArray[np.float32],
+    noise_pa: float,
+    parameters: MicArrayParameters,
+    gains: NDArray[np.float64] | None = None,
+) -> NDArray[np.int16]:
+    """Counts of the converter, rounded to nearest and clipped.
+
+    Args:
+        pressure: (m, n) sound pressure, Pa; None for silence.
+        noise: (m, n) noise of unit variance.
+        noise_pa: RMS of the noise, Pa.
+        parameters: Sensitivity, gain and resolution.
+        gains: (m,) true over stated gain of each channel; 1 unless given.
+
+    Returns:
+        (m, n) counts in [-2^(bits - 1), 2^(bits - 1) - 1].
+
+    Raises:
+        ValueError: Pressure, noise or a gain is not finite; a count would not tell.
+    """
+    if gains is None:
+        gains = np.ones(len(noise))
+    _check_parts(pressure=pressure, noise=noise, gains=gains)
+    gain = parameters.counts_per_pa
+    sigma = gain * noise_pa
+    full_scale = np.float32(parameters.full_scale)
+    out = np.empty(noise.shape, dtype=np.int16)
+    if pressure is None:
+        _silent_counts(noise, gains, sigma, full_scale, out)
+    else:
+        _counts(pressure, noise, gains, gain, sigma, full_scale, out)
+    return out
+
+
+def _check_parts(**parts: Any) -> None:
+    """Refuses parts of a frame that are not finite."""
+    for name, values in parts.items():
+        if values is not None and not math.isfinite(total(values.ravel())):
+            check_finite(f"MicArray: {name}", values)

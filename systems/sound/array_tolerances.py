@@ -1,0 +1,87 @@
+"""What is wrong with an array that was built: places, delays and gains."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+from numpy.typing import NDArray
+
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.adc import MicArrayParameters, channel_skew
+
+__all__ = ["RealArray", "Tolerances", "draw_tolerances", "real_array"]
+
+# Spacing of 2.5 ms: even a robot that spins at 4 rad/s bends the delay by
+# less than 1e-4 sample from a cubic in that time.
+_KNOTS = 11
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Errors of the n channels of one array."""
+
+    position_errors: NDArray[np.float64]
+    """(n, 2) true less stated places of the microphones, in B axes, m."""
+    channel_delays: NDArray[np.float64]
+    """(n,) by which each channel is sampled later than stated, s."""
+    gains: NDArray[np.float64]
+    """(n,) true over stated gain of each channel, a ratio of amplitudes."""
+
+
+def draw_tolerances(
+    parameters: MicArrayParameters, count: int, generator: Generator
+) -> Tolerances:
+    """Errors of one array, each uniform within its tolerance of either sign.
+
+    Args:
+        parameters: The tolerances.
+        count: Number of microphones n.
+        generator: Where the errors come from.
+    """
+    places = generator.uniform(-1.0, 1.0, (count, 2))
+    delays = generator.uniform(-1.0, 1.0, count)
+    gains_db = generator.uniform(-1.0, 1.0, count) * parameters.gain_tolerance_db
+    return Tolerances(
+        position_errors=places * parameters.position_tolerance_m,
+        channel_delays=delays * parameters.delay_tolerance_s,
+        gains=10.0 ** (gains_db / 20.0),
+    )
+
+
+class RealArray(NamedTuple):
+    """The array and the air as they are, whatever they are thought to be."""
+
+    p_BM: NDArray[np.float64]
+    """(n, 2) microphones in B, m."""
+    instants: NDArray[np.float64]
+    """(n, knots) of each channel's knots from the frame's start, s."""
+    gains: NDArray[np.float64]
+    """(n,) true over stated gain of each channel."""
+    c: float
+    """Speed of sound, m/s."""
+
+
+def real_array(
+    p_BM: NDArray[np.float64],
+    parameters: MicArrayParameters,
+    tolerances: Tolerances,
+    c: float,
+) -> RealArray:
+    """The array with its errors.
+
+    Args:
+        p_BM: (n, 2) stated places of the microphones in B, m.
+        parameters: Stated skew of the channels.
+        tolerances: The errors of both, and of the gains.
+        c: Speed of sound, m/s.
+
+    Raises:
+        ValueError: The skew is given for another number of channels.
+    """
+    late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
+    knots = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS)
+    instants = knots + late[:, None]
+    return RealArray(p_BM + tolerances.position_errors, instants, tolerances.gains, c)

@@ -1,0 +1,112 @@
+"""The robot's own noise, from a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+import soxr
+from numpy.typing import ArrayLike, NDArray
+
+from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
+from systems.framework.noise import BEFORE_THE_RUN, tick_generator
+from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
+from systems.sound.adc import MicArrayParameters
+from systems.sound.sound_file import read_sound
+from systems.sound.waveforms import MICROPHONE_BAND_HZ, band_limited
+
+__all__ = ["EgoNoise", "driving_share"]
+
+#: The end of the recording fades into its beginning over this time, s.
+FADE_S = 0.05
+#: A shorter loop would be a tone, s.
+LEAST_SECONDS = 0.2
+
+
+def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
+    """The faster wheel's rim speed as a share of the top speed, at most 1.
+
+    Args:
+        velocity: (3,) vx, vy in W and omega, m/s and rad/s.
+        robot: Wheels and top speed.
+    """
+    vx, vy, omega = np.abs(velocity)
+    rim = np.hypot(vx, vy) + omega * robot.wheel_separation_m / 2.0
+    return float(min(rim / robot.top_speed_m_s, 1.0))
+
+
+class EgoNoise:
+    """What the robot's motors and fans add to each channel.
+
+    The recording is brought to 100 kHz and to the band of the microphones, and
+    repeated without a seam. A channel for each microphone is played as it is,
+    coherent as it was recorded; one channel is played to all microphones from
+    places of its own, drawn from the seed, so that channels are incoherent.
+
+    Args:
+        parameters: The file and its level.
+        count: Number of microphones n.
+        seed: Seed of the places where the channels begin.
+
+    Raises:
+        InputError: The file cannot be used; names it and the remedy.
+    """
+
+    def __init__(self, parameters: MicArrayParameters, count: int, seed: int) -> None:
+        self._loops = _read_loops(parameters.ego_noise_file or "", count)
+        self._level = 10.0 ** (-parameters.ego_noise_snr_db_at_1m / 20.0)
+        self._at_rest = parameters.ego_noise_share_at_rest
+        starts = tick_generator(seed, BEFORE_THE_RUN + 1).integers(
+            self._loops.shape[1], size=count
+        )
+        together = len(self._loops) > 1
+        self._starts = np.full(count, starts[0]) if together else starts
+        self._rows = np.arange(count) if together else np.zeros(count, dtype=int)
+
+    def frame(self, tick: int, share: float) -> NDArray[np.float32]:
+        """(n, FRAME_SAMPLES) of the frame that ends at a tick.
+
+        Args:
+            tick: Number of the tick.
+            share: From ``driving_share``.
+
+        Returns:
+            Pressure over the RMS pressure of the source at 1 m.
+        """
+        first = self._starts + (tick - 1) * FRAME_SAMPLES
+        places = (first[:, None] + np.arange(FRAME_SAMPLES)) % self._loops.shape[1]
+        level = self._level * (self._at_rest + (1.0 - self._at_rest) * share)
+        return np.float32(level) * self._loops[self._rows[:, None], places]
+
+
+def _read_loops(file: str, count: int) -> NDArray[np.float32]:
+    """(1 or n, length) samples at 100 kHz, of unit RMS over all channels."""
+    field = "microphones.ego_noise_file"
+    channels, rate = read_sound(file, field)
+    if len(channels) not in (1, count):
+        raise InputError(
+            field,
+            f"{file} has {len(channels)} channels for {count} microphones; "
+            "give one for each, or mix it down to one",
+        )
+    if channels.shape[1] < LEAST_SECONDS * rate:
+        raise InputError(
+            field,
+            f"{file} lasts {channels.shape[1] / rate:.3f} s; give at least "
+            f"{LEAST_SECONDS} s",
+        )
+    centred = channels - channels.mean(axis=1, keepdims=True)
+    resampled = soxr.resample(centred.T, rate, SAMPLE_RATE_HZ, quality="VHQ").T
+    heard = np.array([band_limited(row, *MICROPHONE_BAND_HZ) for row in resampled])
+    if np.std(heard) <= 1e-6 * np.abs(channels).max():
+        low, high = MICROPHONE_BAND_HZ
+        raise InputError(
+            field,
+            f"{file} has nothing between {low:g} and {high:g} Hz, which the "
+            "microphones pass; choose another",
+        )
+    fade = round(FADE_S * SAMPLE_RATE_HZ)
+    angle = np.pi / 2.0 * (np.arange(fade) + 0.5) / fade
+    loops = heard[:, :-fade].copy()
+    loops[:, :fade] *= np.sin(angle)
+    loops[:, :fade] += np.cos(angle) * heard[:, -fade:]
+    return (loops / np.sqrt(np.mean(loops**2))).astype(np.float32)

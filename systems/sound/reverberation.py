@@ -1,0 +1,143 @@
+"""What the walls of a room send to the microphones in one frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, Emission
+from systems.sound.array_tolerances import RealArray
+from systems.sound.room import RoomParameters, room_images, room_impulse_responses
+from systems.world.geometry import rotate
+
+__all__ = ["Reverberation"]
+
+# Responses kept, as spectra of half a megabyte a channel at most; two a source.
+_KEPT = 8
+
+
+def _place(places: NDArray[np.float64], source: int) -> tuple[float, ...]:
+    """x, y, theta of the robot and x, y of one source."""
+    return (*places[:3], *places[3 + 2 * source : 5 + 2 * source])
+
+
+class Reverberation:
+    """Reflections of a source, frame by frame.
+
+    The response of the room is that of robot and source at rest in given
+    places; sound is convolved with it, and where the places change, a frame
+    fades from the response of the old ones to that of the new ones. The last
+    responses are kept: whoever rests has one only.
+
+    Args:
+        room: The room.
+        c: Speed of sound that absorption and length of the responses are
+            worked out for, m/s.
+
+    Raises:
+        InputError: See ``RoomParameters.walls``.
+    """
+
+    def __init__(self, room: RoomParameters, c: float) -> None:
+        self.room = room
+        self._c = c
+        self._images = room_images(room, c)
+        self._needed = self._images.length - 1 + FRAME_SAMPLES
+        self._size = int(fft.next_fast_len(self._needed, real=True))
+        self._spectrum = lru_cache(maxsize=_KEPT)(self._compute_spectrum)
+
+    @property
+    def maximum_range_m(self) -> float:
+        """Longest way of a reflection that is heard, m; of the emitters, too."""
+        return self._images.length / SAMPLE_RATE_HZ * self._c
+
+    def frames(
+        self,
+        emissions: Sequence[Emission],
+        time: float,
+        old: NDArray[np.float64],
+        new: NDArray[np.float64],
+        array: RealArray,
+    ) -> list[NDArray[np.float32] | None]:
+        """Sound pressure of the reflections over the frame that ends now.
+
+        Args:
+            emissions: What has left the k sources; they reach back as far as
+                the response is long.
+            time: Now, s.
+            old: (3 + 2 k,) pose of the robot in W, then x and y of each source,
+                at the beginning of the frame, m and rad.
+            new: The same at its end.
+            array: The array with its errors.
+
+        Returns:
+            For each source (m, FRAME_SAMPLES) Pa, or None where it is silent.
+
+        Raises:
+            InputError: Somebody is outside the room, or an emission does not
+                reach back.
+        """
+        return [
+            self._frame(emission, time, _place(old, k), _place(new, k), array)
+            for k, emission in enumerate(emissions)
+        ]
+
+    def _frame(self, emission, time, old, new, array):
+        end = round((time - emission.start_time) * SAMPLE_RATE_HZ)
+        if end < self._needed:
+            raise InputError(
+                "MicArray",
+                f"reflections come by ways of {self.maximum_range_m:.0f} m, "
+                "longer than the emission reaches back; raise maximum_range_m of "
+                "SoundEmitter",
+            )
+        if not emission.sounding:
+            return None
+        sent = fft.rfft(emission.samples[end - self._needed : end], self._size)
+        after = self._convolved(sent, new, array)
+        if old == new:
+            return after
+        before = self._convolved(sent, old, array)
+        share = (np.arange(FRAME_SAMPLES, dtype=np.float32) + 0.5) / FRAME_SAMPLES
+        return before + share * (after - before)
+
+    def _convolved(
+        self,
+        sent: NDArray[np.complex64],
+        places: tuple[float, ...],
+        array: RealArray,
+    ) -> NDArray[np.float32]:
+        late = array.instants[:, 0]
+        key = (array.p_BM.tobytes(), late.tobytes(), array.c)
+        heard = fft.irfft(sent * self._spectrum(places, *key), self._size)
+        return heard[:, self._needed - FRAME_SAMPLES : self._needed]
+
+    def _compute_spectrum(
+        self, places: tuple[float, ...], p_BM: bytes, late: bytes, c: float
+    ) -> NDArray[np.complex64]:
+        x, y, theta, *p_WS = places
+        dx, dy = rotate(theta, *np.frombuffer(p_BM).reshape(-1, 2).T)
+        p_WM = np.column_stack([x + dx, y + dy])
+        for who, where in (("a microphone", p_WM), ("a source", np.array([p_WS]))):
+            if not self.room.contains(where):
+                at = ", ".join(f"({a:.2f}, {b:.2f})" for a, b in where)
+                raise InputError(
+                    "MicArray",
+                    f"{who} is outside the room, at {at} m; enlarge "
+                    "room.size_m or move room.corner_m",
+                )
+        response = room_impulse_responses(
+            self.room,
+            p_WS,
+            p_WM,
+            c,
+            late=np.frombuffer(late),
+            direct=False,
+            images=self._images,
+        )
+        return fft.rfft(response, self._size)

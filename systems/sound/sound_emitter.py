@@ -1,0 +1,209 @@
+"""The loudspeaker on the master robot."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.finite import check_finite, read_arrays
+from systems.framework.signals import (
+    FRAME_PERIOD_S,
+    SAMPLE_RATE_HZ,
+    Emission,
+    read_only,
+)
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.waveforms import SoundParameters, make_waveform
+
+__all__ = [
+    "MAXIMUM_RANGE_M",
+    "SoundEmitter",
+    "emitted_samples",
+    "history_ticks",
+    "make_emission",
+]
+
+#: Farthest way of sound without a room, m.
+MAXIMUM_RANGE_M = 30.0
+
+#: Samples before and after what the delays need, for the interpolation.
+MARGIN = 64
+
+
+def emitted_samples(
+    waveform: NDArray[np.float32],
+    sound: SoundParameters,
+    first: int,
+    count: int,
+) -> NDArray[np.float32] | None:
+    """Samples ``first`` to ``first + count`` of what the loudspeaker plays.
+
+    Args:
+        waveform: Bursts end to end, from ``make_waveform``.
+        sound: The gate.
+        first: Number of the first sample; sample n is emitted at n / 100 kHz.
+        count: Number of samples.
+
+    Returns:
+        (count,) Pa at 1 m, a part of the waveform where it can be; None where all
+        are zero.
+    """
+    burst = round(sound.on_s * SAMPLE_RATE_HZ)
+    period = round(sound.period_s * SAMPLE_RATE_HZ)
+    start = round(sound.start_s * SAMPLE_RATE_HZ)
+    bursts = len(waveform) // burst
+    out = None
+    number = max(0, (first - start - burst) // period)
+    while (begin := start + number * period) < first + count:
+        low, high = max(begin, first), min(begin + burst, first + count)
+        offset = (number % bursts) * burst - begin
+        if high - low == count:
+            return waveform[low + offset : high + offset]
+        if low < high:
+            if out is None:
+                out = np.zeros(count, dtype=np.float32)
+            out[low - first : high - first] = waveform[low + offset : high + offset]
+        number += 1
+    return out
+
+
+def make_emission(
+    time: float,
+    waveform: NDArray[np.float32],
+    sound: SoundParameters,
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
+) -> Emission:
+    """What has left the loudspeaker up to a time.
+
+    Args:
+        time: Now, a multiple of 10 us, s.
+        waveform: Bursts end to end, from ``make_waveform``.
+        sound: The gate.
+        p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
+        v_WS: (k, 2) its velocity, m/s.
+    """
+    ages, count = _history(len(p_WS))
+    first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
+    samples = emitted_samples(waveform, sound, first, count)
+    emitted = _silence(count) if samples is None else samples
+    knot_times = time - ages
+    read_only(emitted, knot_times, p_WS, v_WS)
+    return Emission(
+        samples=emitted,
+        start_time=first / SAMPLE_RATE_HZ,
+        sample_rate_hz=float(SAMPLE_RATE_HZ),
+        knot_times=knot_times,
+        p_WS=p_WS,
+        v_WS=v_WS,
+        level_pa=sound.level_pa,
+        sounding=samples is not None,
+    )
+
+
+@cache
+def _history(ticks: int) -> tuple[NDArray[np.float64], int]:
+    """Ages of the last ticks, s, and the number of samples of an emission."""
+    ages = FRAME_PERIOD_S * np.arange(ticks - 1.0, -1.0, -1.0)
+    return ages, round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
+
+
+@cache
+def _silence(count: int) -> NDArray[np.float32]:
+    return np.zeros(count, dtype=np.float32)
+
+
+def history_ticks(maximum_range_m: float, c: float) -> int:
+    """Ticks back to when sound left that arrives now from the maximum range."""
+    return math.ceil((FRAME_PERIOD_S + maximum_range_m / c) / FRAME_PERIOD_S) + 1
+
+
+class SoundEmitter(LeafSystem):
+    """Plays the sound from where the source is.
+
+    .. pydrake_system::
+
+        name: SoundEmitter
+        input_ports:
+        - pose_WS [m, m, rad]
+        - v_WS [m/s, m/s, rad/s]
+        output_ports:
+        - emission [Emission]
+
+    Discrete state, 25 ms: position and velocity of the source at the last
+    ticks, as far back as sound from the maximum range was emitted; before
+    time zero the source rests where it starts. The output is a function of
+    time, state and present input: no latency. Before time zero it is silent.
+
+    Args:
+        sound: What to play.
+        acoustics: Speed of sound.
+        maximum_range_m: Longest way to a listener, m, that of reflections included.
+        seed: Seed of noise-like waveforms.
+        suffix: Ends the names of block and ports; empty for the source that is
+            followed.
+
+    Raises:
+        ValueError: The sound file cannot be played, or the range is not finite.
+
+    Reference: Han 2019, section 4.1.
+    """
+
+    def __init__(
+        self,
+        *,
+        sound: SoundParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+        maximum_range_m: float = MAXIMUM_RANGE_M,
+        seed: int = 0,
+        suffix: str = "",
+    ) -> None:
+        super().__init__()
+        self._sound = sound or SoundParameters()
+        self._waveform = make_waveform(self._sound, seed)
+        check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
+        c = (acoustics or AcousticParameters()).c
+        self._ticks = history_ticks(maximum_range_m, c)
+        self.set_name(f"sound_emitter{suffix}")
+        self._inputs = [
+            self.DeclareVectorInputPort(name=f"{name}{suffix}", size=3)
+            for name in ("pose_WS", "v_WS")
+        ]
+        self.DeclareDiscreteState(4 * self._ticks)
+        self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+        )
+        self._emission = self.DeclareAbstractOutputPort(
+            name=f"emission{suffix}",
+            alloc=lambda: Value(object()),
+            calc=self._emit,
+            prerequisites_of_calc={
+                *(port.ticket() for port in self._inputs),
+                self.xd_ticket(),
+                self.time_ticket(),
+            },
+        )
+
+    def _start(self, context, discrete_state) -> None:
+        path = np.zeros((2, self._ticks, 2))
+        path[0] = read_arrays(context, self._inputs)[0][:2]
+        discrete_state.set_value(path.ravel())
+
+    def _remember(self, context, discrete_state):
+        emission = self._emission.Eval(context)
+        path = np.concatenate((emission.p_WS[1:], emission.v_WS[1:]))
+        discrete_state.set_value(path.ravel())
+
+    def _emit(self, context, output):
+        held, split = context.get_discrete_state(0).value(), 2 * self._ticks
+        pose_WS, velocity = read_arrays(context, self._inputs)
+        p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)
+        v_WS = np.concatenate((held[split:], velocity[:2])).reshape(-1, 2)
+        time = context.get_time()
+        output.set_value(make_emission(time, self._waveform, self._sound, p_WS, v_WS))

@@ -1,0 +1,181 @@
+"""Reading recorded sound, with errors that say what is wrong with the file."""
+
+from __future__ import annotations
+
+import struct
+from io import BytesIO
+from pathlib import Path
+from typing import BinaryIO
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+
+from systems.framework.input_error import InputError
+
+__all__ = ["MOST_SAMPLES", "read_sound"]
+
+# Programs that write to a pipe cannot know the length and leave one of these.
+_UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
+
+# What libsndfile makes of a FLAC file that does not say how long it is.
+_UNKNOWN_FRAMES = 2**63 - 1
+
+#: Samples of all channels together, at most: 1 GB of them.
+MOST_SAMPLES = 2**27
+
+# Of a sample, in a file.
+_MOST_BYTES = 8
+
+_RATES_HZ = (1_000, 400_000)
+
+# Samples of a channel that are read at once.
+_BLOCK = 2**16
+
+
+def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
+    """Reads a WAV or FLAC file, of known or unknown length.
+
+    Args:
+        path: The file.
+        field: Name of the parameter that holds the path, for the messages.
+
+    Returns:
+        (channels, n) samples, full scale 1, and the rate in Hz.
+
+    Raises:
+        InputError: The file is missing, not sound, empty, truncated, silent
+            in every channel or not finite; holds more than ``MOST_SAMPLES``; or
+            has a rate outside 1 to 400 kHz.
+    """
+    path = Path(path)
+    where = repr(str(path))
+    if not path.is_file():
+        raise InputError(
+            field, f"{where} is not a file; give the path of a WAV or FLAC file"
+        )
+    if path.stat().st_size == 0:
+        raise InputError(field, f"{where} is empty; record or copy it again")
+    try:
+        with _Stream(_opened(path, field, where)) as sound:
+            announced, rate = sound.frames, sound.samplerate
+            _check_header(announced, sound.channels, rate, field, where)
+            samples = _read_all(sound, field, where)
+    except (soundfile.LibsndfileError, OSError) as error:
+        raise InputError(
+            field, f"{where} is not a readable WAV or FLAC file ({error}); convert it"
+        ) from error
+    if samples.shape[1] < announced != _UNKNOWN_FRAMES:
+        raise InputError(
+            field,
+            f"{where} is truncated: {samples.shape[1]} of {announced} samples; "
+            "record or copy it again",
+        )
+    _check_samples(samples, field, where)
+    return samples, rate
+
+
+class _Stream(soundfile.SoundFile):
+    """A file that is read once from end to end.
+
+    A seekable one is told its place after each block, which fails at the end of
+    a FLAC file of unknown length.
+    """
+
+    def seekable(self) -> bool:
+        return False
+
+
+def _check_header(
+    frames: int, channels: int, rate: int, field: str, where: str
+) -> None:
+    if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
+        raise InputError(
+            field,
+            f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "
+            f"{_RATES_HZ[1]} Hz",
+        )
+    if frames != _UNKNOWN_FRAMES and frames * channels > MOST_SAMPLES:
+        raise InputError(
+            field,
+            f"{where} says that it holds {frames} samples of {channels} channels, "
+            f"above {MOST_SAMPLES} in all; cut it into shorter files, or repair its "
+            "header",
+        )
+
+
+def _too_long(field: str, where: str) -> InputError:
+    return InputError(
+        field,
+        f"{where} holds more than {MOST_SAMPLES} samples in all channels; cut it into "
+        "shorter files",
+    )
+
+
+def _read_all(
+    sound: soundfile.SoundFile, field: str, where: str
+) -> NDArray[np.float64]:
+    """(channels, n) samples."""
+    blocks, count = [], 0
+    while len(block := sound.read(_BLOCK, dtype="float64", always_2d=True)):
+        blocks.append(block)
+        count += len(block)
+        if count * sound.channels > MOST_SAMPLES:
+            raise _too_long(field, where)
+    samples = np.empty((sound.channels, count))
+    first = 0
+    for block in blocks:
+        samples[:, first : first + len(block)] = block.T
+        first += len(block)
+    return samples
+
+
+def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None:
+    if samples.shape[1] == 0:
+        raise InputError(field, f"{where} holds no samples; record or copy it again")
+    if not np.isfinite(samples).all():
+        channel, sample = np.argwhere(~np.isfinite(samples))[0]
+        raise InputError(
+            field,
+            f"{where} holds NaN or infinite samples, the first in channel "
+            f"{channel + 1} as sample {sample}; export it again",
+        )
+    if not samples.any():
+        raise InputError(field, f"{where} is silent throughout; give one that sounds")
+
+
+def _opened(path: Path, field: str, where: str) -> Path | BytesIO:
+    """What libsndfile is to read.
+
+    It reads what is left of a cut WAV file without a word, and nothing of one
+    whose recorder left 0 as the length.
+    """
+    file_size = path.stat().st_size
+    with path.open("rb") as file:
+        header = file.read(12)
+        if header[:4] != b"RIFF":
+            return path
+        size = _data_size(file) if len(header) == 12 else None
+        begins = file.tell()
+        if size is None or (size not in _UNKNOWN_SIZES and begins + size > file_size):
+            raise InputError(field, f"{where} is truncated; record or copy it again")
+        (whole,) = struct.unpack("<I", header[4:8])
+        # Where the file is said to go on after no samples, other chunks follow.
+        if size or (whole not in _UNKNOWN_SIZES and 8 + whole > begins):
+            return path
+        if file_size - begins > _MOST_BYTES * MOST_SAMPLES:
+            raise _too_long(field, where)
+        file.seek(0)
+        content = bytearray(file.read())
+    content[begins - 4 : begins] = struct.pack("<I", _UNKNOWN_SIZES[-1])
+    return BytesIO(content)
+
+
+def _data_size(file: BinaryIO) -> int | None:
+    """Stated bytes of a WAV file's samples, from where it then stands."""
+    while len(chunk := file.read(8)) == 8:
+        name, size = struct.unpack("<4sI", chunk)
+        if name == b"data":
+            return int(size)
+        file.seek(size + size % 2, 1)
+    return None

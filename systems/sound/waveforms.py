@@ -1,0 +1,212 @@
+"""The sound that the loudspeaker plays: synthetic, or from a file."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+import soxr
+from numpy.typing import NDArray
+from pydantic import Field, model_validator
+
+from systems.framework.input_error import InputError
+from systems.framework.parameters import (
+    Duration,
+    Frequency,
+    Parameters,
+    Positive,
+    Time,
+)
+from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.sound.sound_file import read_sound
+
+__all__ = [
+    "MICROPHONE_BAND_HZ",
+    "SoundParameters",
+    "band_limited",
+    "make_waveform",
+]
+
+#: What the microphones pass (Han 2019, 4.1). The filter is applied to the
+#: waveform: a linear filter common to all microphones commutes with
+#: propagation, but for a Doppler factor of a part in a thousand.
+MICROPHONE_BAND_HZ = (50.0, 18_000.0)
+
+#: Raised-cosine edges of every burst, s: no clicks at the gate.
+EDGE_S = 0.004
+#: A file's beginning is cut while it is this far below its peak.
+SILENCE_DB = -50.0
+#: Largest ratio of peak to RMS level that the loudspeaker gives.
+LARGEST_CREST = 4.0
+#: Length of the noise, after which it repeats, s.
+_NOISE_SECONDS = 2.0
+
+
+class SoundParameters(Parameters):
+    """What is played, how loud, and when (Han 2019, 4.1: 0.5 s in every 2 s)."""
+
+    kind: Literal["chirp", "band_noise", "tone", "horn", "wav"] = "chirp"
+    """Waveform; ``wav`` plays ``file``."""
+    file: str | None = None
+    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
+    low_hz: Frequency = 500.0
+    """Lower end of chirp and band noise, Hz."""
+    high_hz: Frequency = 8_000.0
+    """Upper end of chirp and band noise, Hz."""
+    tone_hz: Frequency = 2_000.0
+    """Frequency of the tone and fundamental of the horn, Hz."""
+    level_pa: Positive = 0.05
+    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); less where the
+    peaks would exceed four times this, the loudspeaker's limit."""
+    on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
+    """Length of a burst, s."""
+    period_s: Duration = 2.0
+    """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
+    start_s: Time = 0.0
+    """First burst, s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> SoundParameters:
+        if self.on_s > self.period_s:
+            raise InputError(
+                "on_s",
+                f"{self.on_s} is longer than period_s {self.period_s}; shorten it",
+            )
+        if self.low_hz >= self.high_hz:
+            raise InputError(
+                "low_hz", f"{self.low_hz} is not below high_hz {self.high_hz}; lower it"
+            )
+        top = MICROPHONE_BAND_HZ[1]
+        for name in ("high_hz", "tone_hz"):
+            if getattr(self, name) > top:
+                raise InputError(
+                    f"{name}",
+                    f"{getattr(self, name)} is above the {top:g} Hz that "
+                    "the microphones pass; lower it",
+                )
+        if self.kind == "wav" and self.file is None:
+            raise InputError("file", "kind is wav but no file is given; name one")
+        return self
+
+    def sounds(self, time: Any) -> Any:
+        """Whether the gate is open at a time in s, or at each of an array of them."""
+        phase = time - self.start_s
+        return (phase >= 0.0) & (phase % self.period_s < self.on_s)
+
+
+def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
+    """Sound pressure at 1 m over the sounding time, bursts end to end.
+
+    Args:
+        sound: What to play.
+        seed: Seed of the noise.
+
+    Returns:
+        (m n,) Pa at 100 kHz: m whole bursts of n samples, each with its
+        edges; burst k of the run plays burst k mod m. A file plays on from
+        burst to burst, and begins again at its end.
+
+    Raises:
+        InputError: The file cannot be played; names it and the remedy.
+    """
+    burst = round(sound.on_s * SAMPLE_RATE_HZ)
+    raw = _SYNTHESES[sound.kind](sound, seed)
+    endless = band_limited(raw, *MICROPHONE_BAND_HZ)
+    if np.std(endless) <= 1e-6 * max(np.abs(raw).max(), 1e-3):
+        field = "sound.file" if sound.kind == "wav" else "sound.tone_hz"
+        what = sound.file if sound.kind == "wav" else f"{sound.tone_hz:g} Hz"
+        low, high = MICROPHONE_BAND_HZ
+        raise InputError(
+            field,
+            f"{what} has nothing between {low:g} and {high:g} Hz, which the "
+            "microphones pass; choose another",
+        )
+    bursts = max(1, -(-len(endless) // burst))
+    samples = np.resize(endless, bursts * burst)
+    peak, rms = np.max(np.abs(samples)), np.sqrt(np.mean(samples**2))
+    samples *= sound.level_pa * min(1.0 / rms, LARGEST_CREST / peak)
+    each = samples.reshape(bursts, burst)
+    edge = round(EDGE_S * SAMPLE_RATE_HZ)
+    ramp = 0.5 - 0.5 * np.cos(np.pi * (np.arange(edge) + 0.5) / edge)
+    each[:, :edge] *= ramp
+    each[:, -edge:] *= ramp[::-1]
+    return samples.astype(np.float32)
+
+
+def _time(seconds: float) -> NDArray[np.float64]:
+    return np.arange(round(seconds * SAMPLE_RATE_HZ)) / SAMPLE_RATE_HZ
+
+
+def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    """Sweeps of one frame's length, so that every frame holds the whole band."""
+    import scipy.signal
+
+    time = _time(FRAME_PERIOD_S)
+    sweep = scipy.signal.chirp(
+        time, sound.low_hz, FRAME_PERIOD_S, sound.high_hz, phi=-90.0
+    )
+    return np.tile(sweep, round(sound.on_s / FRAME_PERIOD_S) or 1)
+
+
+def _band_noise(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    length = round(max(sound.on_s, _NOISE_SECONDS) * SAMPLE_RATE_HZ)
+    white = np.random.default_rng(seed).standard_normal(length)
+    return band_limited(white, sound.low_hz, sound.high_hz)
+
+
+def _tone(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    return np.sin(2.0 * np.pi * sound.tone_hz * _time(sound.on_s))
+
+
+def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    """Two reeds a major third apart, rich in harmonics, with a slight tremble."""
+    time = _time(sound.on_s)
+    tremble = 0.004 / 11.0 * np.sin(2.0 * np.pi * 11.0 * time)
+    total = np.zeros_like(time)
+    for fundamental in (380.0, 475.0):
+        for harmonic in range(1, int(12_000.0 // fundamental) + 1):
+            phase = 2.0 * np.pi * fundamental * harmonic * (time + tremble)
+            total += np.sin(phase + harmonic**2) / harmonic**0.7
+    return total
+
+
+def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    channels, rate = read_sound(sound.file or "", "sound.file")
+    if len(channels) != 1:
+        raise InputError(
+            "sound.file",
+            f"{sound.file} has {len(channels)} channels; mix it down to one",
+        )
+    if rate < 2.0 * sound.low_hz:
+        raise InputError(
+            "sound.file",
+            f"{sound.file} has a rate of {rate} Hz, below twice low_hz "
+            f"({sound.low_hz:g} Hz); use a recording of a higher rate",
+        )
+    centred = channels[0] - channels[0].mean()
+    mono = soxr.resample(centred, rate, SAMPLE_RATE_HZ, quality="VHQ")
+    threshold = np.max(np.abs(mono)) * 10.0 ** (SILENCE_DB / 20.0)
+    return mono[np.argmax(np.abs(mono) > threshold) :]
+
+
+def band_limited(
+    samples: NDArray[np.float64], low_hz: float, high_hz: float
+) -> NDArray[np.float64]:
+    """Zero-phase Butterworth band-pass."""
+    import scipy.signal
+
+    sections = scipy.signal.butter(
+        4, (low_hz, high_hz), "bandpass", fs=SAMPLE_RATE_HZ, output="sos"
+    )
+    return scipy.signal.sosfiltfilt(
+        sections, samples, padlen=min(len(samples) - 1, 3 * SAMPLE_RATE_HZ // 100)
+    )
+
+
+_SYNTHESES = {
+    "chirp": _chirp,
+    "band_noise": _band_noise,
+    "tone": _tone,
+    "horn": _horn,
+    "wav": _file,
+}

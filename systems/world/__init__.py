@@ -1,0 +1,1 @@
+"""The plane that robots share: geometry, paths, bodies that move on them."""

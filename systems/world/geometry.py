@@ -1,0 +1,300 @@
+"""Planar geometry of points, rectangles and sensor cones.
+
+A rectangle is (x, y, theta, length, width): centre and heading in the frame of
+the caller, extents along its own x and y axes; m and rad.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from systems.framework.scalar_math import cos, sin, sqrt
+
+__all__ = [
+    "cone_range",
+    "contact_time",
+    "control_point",
+    "control_point_velocity",
+    "fan_ranges",
+    "nearest_point_on_rectangle",
+    "rectangle_clearance",
+    "rectangle_corners",
+    "rotate",
+    "safe_norm",
+]
+
+#: Keeps the norm's gradient finite at zero; far below any length that counts.
+_NORM_FLOOR = 1e-12
+
+
+def safe_norm(x, y):
+    """Length of (x, y); at zero its gradient is zero instead of NaN.
+
+    Accepts floats and AutoDiffXd. Differs from the exact norm by at most
+    1e-12.
+    """
+    return sqrt(x * x + y * y + _NORM_FLOOR**2)
+
+
+def rotate(theta, x, y):
+    """Components in the outer frame of (x, y) given in a frame turned by theta.
+
+    Accepts floats and AutoDiffXd. This is R = [[cos, -sin], [sin, cos]], the
+    transpose of what Han 2019, eq. 15 prints.
+    """
+    c, s = cos(theta), sin(theta)
+    return c * x - s * y, s * x + c * y
+
+
+def control_point(pose, offset):
+    """Position p_WP of the control point of a body, m.
+
+    Args:
+        pose: (x, y, theta) of the body frame in W; floats or AutoDiffXd.
+        offset: Distance epsilon of P ahead of the origin, m.
+    """
+    x, y, theta = pose
+    return x + offset * cos(theta), y + offset * sin(theta)
+
+
+def control_point_velocity(theta, velocity, offset):
+    """Velocity v_WP of the control point of a body, m/s.
+
+    Args:
+        theta: Heading of the body frame in W, rad; a number or an array.
+        velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each as theta.
+        offset: Distance epsilon of P ahead of the origin, m.
+    """
+    vx, vy, omega = velocity
+    turning = omega * offset
+    return vx - turning * np.sin(theta), vy + turning * np.cos(theta)
+
+
+def nearest_point_on_rectangle(point, rectangle):
+    """Vector from a point to the nearest point of a filled rectangle.
+
+    Args:
+        point: (x, y), m; floats or AutoDiffXd.
+        rectangle: (x, y, theta, length, width).
+
+    Returns:
+        (dx, dy) in the frame of the arguments, m; (0, 0) inside.
+    """
+    x, y, theta, length, width = rectangle
+    u, v = rotate(-theta, point[0] - x, point[1] - y)
+    du = _outside(u, length / 2.0)
+    dv = _outside(v, width / 2.0)
+    return rotate(theta, -du, -dv)
+
+
+def _outside(u, half):
+    """How far u lies beyond the interval [-half, half], with its sign."""
+    if u > half:
+        return u - half
+    if u < -half:
+        return u + half
+    return 0.0 * u
+
+
+def rectangle_corners(rectangle: ArrayLike) -> NDArray[np.float64]:
+    """(4, 2) corners, counter-clockwise from front left."""
+    x, y, theta, length, width = np.asarray(rectangle, dtype=float)
+    signs = np.array([[1.0, 1.0], [-1.0, 1.0], [-1.0, -1.0], [1.0, -1.0]])
+    local = signs * np.array([length / 2.0, width / 2.0])
+    c, s = math.cos(theta), math.sin(theta)
+    return local @ np.array([[c, s], [-s, c]]) + np.array([x, y])
+
+
+@njit(cache=True)
+def _corners(rectangle):  # pragma: no cover  (compiled)
+    x, y, theta, length, width = rectangle
+    c, s = math.cos(theta), math.sin(theta)
+    corners = np.empty((4, 2))
+    for k in range(4):
+        u = length / 2.0 if k in (0, 3) else -length / 2.0
+        v = width / 2.0 if k in (0, 1) else -width / 2.0
+        corners[k, 0] = x + c * u - s * v
+        corners[k, 1] = y + s * u + c * v
+    return corners
+
+
+@njit(cache=True)
+def _nearest_on_segment(ax, ay, bx, by):  # pragma: no cover  (compiled)
+    """Distance from the origin to the segment a-b."""
+    ex, ey = bx - ax, by - ay
+    squared = ex * ex + ey * ey
+    t = 0.0 if squared == 0.0 else -(ax * ex + ay * ey) / squared
+    t = min(1.0, max(0.0, t))
+    return math.hypot(ax + t * ex, ay + t * ey)
+
+
+@njit(cache=True)
+def cone_range(x, y, axis, half_angle, rectangles):  # pragma: no cover  (compiled)
+    """Distance to the nearest surface inside a sensor's cone.
+
+    Each edge is cut to the part inside the cone, whose nearest point is then
+    exact; nearer surfaces hide farther ones because only the nearest counts.
+
+    Args:
+        x: Position of the sensor, m.
+        y: Position of the sensor, m.
+        axis: Direction of the cone's axis, rad.
+        half_angle: Half of the opening angle, rad, below pi/2.
+        rectangles: (n, 5) rectangles in the same frame.
+
+    Returns:
+        Range in m; 0 inside a rectangle, infinity where nothing is seen.
+    """
+    best = np.inf
+    ca, sa = math.cos(axis), math.sin(axis)
+    slope = math.tan(half_angle)
+    for k in range(rectangles.shape[0]):
+        corners = _corners(rectangles[k])
+        inside = True
+        for i in range(4):
+            j = (i + 1) % 4
+            dx, dy = corners[i, 0] - x, corners[i, 1] - y
+            fx, fy = corners[j, 0] - x, corners[j, 1] - y
+            if dx * fy - dy * fx < 0.0:
+                inside = False
+            ax, ay = ca * dx + sa * dy, -sa * dx + ca * dy
+            bx, by = ca * fx + sa * fy, -sa * fx + ca * fy
+            low, high = 0.0, 1.0
+            for side in (1.0, -1.0):
+                ga = slope * ax - side * ay
+                gb = slope * bx - side * by
+                if ga < 0.0 and gb < 0.0:
+                    low, high = 1.0, 0.0
+                elif ga < 0.0:
+                    low = max(low, ga / (ga - gb))
+                elif gb < 0.0:
+                    high = min(high, ga / (ga - gb))
+            if low <= high:
+                ex, ey = bx - ax, by - ay
+                distance = _nearest_on_segment(
+                    ax + low * ex, ay + low * ey, ax + high * ex, ay + high * ey
+                )
+                best = min(best, distance)
+        if inside:
+            best = 0.0
+    return best
+
+
+@njit(cache=True)
+def fan_ranges(
+    pose_WB, rectangles, axes, places, half_angle, control_point_m
+):  # pragma: no cover  (compiled)
+    """``cone_range`` of each sensor of a body, (n,) m.
+
+    Args:
+        pose_WB: (3,) x, y, theta of the body, m and rad.
+        rectangles: (m, 5) rectangles in W.
+        axes: (n,) directions of the cones in B, rad.
+        places: (n, 2) sensors from P in B axes, m.
+        half_angle: Half of the opening angle, rad.
+        control_point_m: Distance of P ahead of the origin of B, m.
+    """
+    x, y, theta = pose_WB
+    c, s = math.cos(theta), math.sin(theta)
+    ranges = np.empty(axes.size)
+    for k in range(axes.size):
+        ahead, left = control_point_m + places[k, 0], places[k, 1]
+        ranges[k] = cone_range(
+            x + c * ahead - s * left,
+            y + s * ahead + c * left,
+            theta + axes[k],
+            half_angle,
+            rectangles,
+        )
+    return ranges
+
+
+@njit(cache=True)
+def rectangle_clearance(a, b):  # pragma: no cover  (compiled)
+    """Distance between two rectangles; negative depth where they overlap.
+
+    The depth is that of the separating-axis test: the shortest way to push
+    the rectangles apart.
+
+    Args:
+        a: (5,) rectangle.
+        b: (5,) rectangle in the same frame.
+
+    Returns:
+        Clearance in m.
+    """
+    ca, cb = _corners(a), _corners(b)
+    separation = -np.inf
+    for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
+        nx, ny = math.cos(theta), math.sin(theta)
+        a_low, a_high, b_low, b_high = np.inf, -np.inf, np.inf, -np.inf
+        for k in range(4):
+            u = ca[k, 0] * nx + ca[k, 1] * ny
+            v = cb[k, 0] * nx + cb[k, 1] * ny
+            a_low, a_high = min(a_low, u), max(a_high, u)
+            b_low, b_high = min(b_low, v), max(b_high, v)
+        separation = max(separation, b_low - a_high, a_low - b_high)
+    if separation <= 0.0:
+        return separation
+    distance = np.inf
+    for i in range(4):
+        i2 = (i + 1) % 4
+        for j in range(4):
+            j2 = (j + 1) % 4
+            distance = min(
+                distance,
+                _nearest_on_segment(
+                    ca[i, 0] - cb[j, 0],
+                    ca[i, 1] - cb[j, 1],
+                    ca[i2, 0] - cb[j, 0],
+                    ca[i2, 1] - cb[j, 1],
+                ),
+                _nearest_on_segment(
+                    cb[j, 0] - ca[i, 0],
+                    cb[j, 1] - ca[i, 1],
+                    cb[j2, 0] - ca[i, 0],
+                    cb[j2, 1] - ca[i, 1],
+                ),
+            )
+    return distance
+
+
+@njit(cache=True)
+def contact_time(a, b, vx, vy):  # pragma: no cover  (compiled)
+    """Time until two rectangles touch, the first moving at (vx, vy), unturned.
+
+    Along each side's normal the shadows of both overlap during one interval of
+    time; convex shapes touch while all of these intervals do.
+
+    Args:
+        a: (5,) rectangle.
+        b: (5,) rectangle in the same frame.
+        vx: Velocity of a relative to b, m/s.
+        vy: See vx.
+
+    Returns:
+        s; 0 where they overlap, infinite where they never touch.
+    """
+    ca, cb = _corners(a), _corners(b)
+    enter, leave = 0.0, np.inf
+    for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
+        nx, ny = math.cos(theta), math.sin(theta)
+        a_low, a_high, b_low, b_high = np.inf, -np.inf, np.inf, -np.inf
+        for k in range(4):
+            u = ca[k, 0] * nx + ca[k, 1] * ny
+            v = cb[k, 0] * nx + cb[k, 1] * ny
+            a_low, a_high = min(a_low, u), max(a_high, u)
+            b_low, b_high = min(b_low, v), max(b_high, v)
+        speed = vx * nx + vy * ny
+        if abs(speed) < 1e-12:
+            if a_high < b_low or b_high < a_low:
+                return np.inf
+            continue
+        first, second = (b_low - a_high) / speed, (b_high - a_low) / speed
+        enter = max(enter, min(first, second))
+        leave = min(leave, max(first, second))
+    return enter if enter <= leave else np.inf

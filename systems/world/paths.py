@@ -1,0 +1,329 @@
+"""Path of a body that is drawn through waypoints.
+
+Corners are rounded by circular arcs and the speed ramps up and down with a limited
+acceleration, so that position and velocity are continuous, both in closed form.
+The yaw rate steps at the ends of an arc: such a body is drawn, not driven
+(``systems/base/carrier.py`` is).
+"""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from systems.framework.input_error import InputError
+
+__all__ = ["ACCELERATION_M_S2", "AtEnd", "WaypointPath", "seconds"]
+
+AtEnd = Literal["stop", "shuttle"]
+
+#: How obstacles and master robot start and brake unless told otherwise, m/s^2. Not
+#: printed, ours: a tenth of what wheels hold on a floor, and enough to be at 0.3 m/s
+#: after 45 mm, so that they run 0.15 s behind bodies that step to their speed.
+ACCELERATION_M_S2 = 1.0
+
+#: A body that is slower than this rests, m/s.
+_SLOWEST_M_S = 1e-9
+
+
+class _Segment(NamedTuple):
+    """A line (curvature 0) or an arc, by its start pose and length."""
+
+    x: float
+    y: float
+    theta: float
+    curvature: float
+    length: float
+
+    def pose(self, s: float) -> tuple[float, float, float]:
+        return _along(self.x, self.y, self.theta, self.curvature, s)
+
+
+class _Piece(NamedTuple):
+    """A part of a segment with constant acceleration, by its first instant."""
+
+    begin: float
+    x: float
+    y: float
+    theta: float
+    curvature: float
+    speed: float
+    acceleration: float
+
+
+class WaypointPath:
+    """Pose and velocity on a path through waypoints.
+
+    From rest to rest: the speed along the path rises and falls with the
+    acceleration and is constant in between; a short path sees a triangle.
+
+    Args:
+        waypoints: Points in W, m; one point is a body at rest.
+        speed: Speed along the path, m/s, >= 0.
+        acceleration: Of the speed along the path, m/s^2, > 0.
+        corner_radius: Largest radius of the rounded corners, m, > 0; a corner
+            takes at most half of each leg beside it.
+        start_time: The body rests at the first waypoint until then, s.
+        at_end: ``stop`` rests at the last waypoint, ``shuttle`` goes back
+            and forth without turning round, at rest for an instant at either end.
+        heading: Heading where there is one waypoint, rad; else the path's
+            tangent.
+        top_yaw_rate: Corners are taken as slowly as it asks, rad/s, > 0.
+
+    Raises:
+        InputError: There is no waypoint, two neighbours coincide, the path
+            doubles back on itself, or its corners are sharp.
+    """
+
+    def __init__(
+        self,
+        waypoints: Sequence[tuple[float, float]],
+        *,
+        speed: float,
+        acceleration: float = ACCELERATION_M_S2,
+        corner_radius: float = 0.3,
+        start_time: float = 0.0,
+        at_end: AtEnd = "stop",
+        heading: float = 0.0,
+        top_yaw_rate: float = math.inf,
+    ) -> None:
+        if not waypoints:
+            raise InputError("waypoints_m", "none given; give at least one point")
+        if not corner_radius > 0.0:
+            raise InputError(
+                "corner_radius_m",
+                f"at {corner_radius} m the velocity would jump at each waypoint; give "
+                "a radius above 0",
+            )
+        segments = _segments(waypoints, corner_radius)
+        self._length = math.fsum(segment.length for segment in segments)
+        self._moves = bool(segments) and speed > _SLOWEST_M_S
+        self._start_time = start_time
+        self._shuttles = self._moves and at_end == "shuttle"
+        limits = [
+            min(speed, top_yaw_rate / abs(segment.curvature))
+            if segment.curvature
+            else speed
+            for segment in segments
+        ]
+        pieces, self._duration = (
+            _pieces(segments, limits, acceleration) if self._moves else ([], 0.0)
+        )
+        first = segments[0].pose(0.0) if segments else (*waypoints[0], heading)
+        end = segments[-1].pose(segments[-1].length) if self._moves else first
+        self._pieces = [*pieces, _Piece(self._duration, *end, 0.0, 0.0, 0.0)]
+        self._begins = [piece.begin for piece in self._pieces]
+
+    @property
+    def length(self) -> float:
+        """Length of the path with its rounded corners, m."""
+        return self._length
+
+    @property
+    def duration(self) -> float:
+        """Time from the first waypoint to the last, s; 0 for a body at rest."""
+        return self._duration
+
+    @property
+    def moves(self) -> bool:
+        """Whether the body ever leaves its first waypoint."""
+        return self._moves
+
+    def _find(self, time: float) -> tuple[_Piece, float, float]:
+        """Piece, distance from its start, m, and rate along the path, m/s."""
+        elapsed, direction = max(time - self._start_time, 0.0), 1.0
+        if self._shuttles:
+            laps, elapsed = divmod(elapsed, self._duration)
+            if laps % 2:
+                elapsed, direction = self._duration - elapsed, -1.0
+        piece = self._pieces[bisect_right(self._begins, elapsed) - 1]
+        since = elapsed - piece.begin
+        distance = (piece.speed + 0.5 * piece.acceleration * since) * since
+        return piece, distance, direction * (piece.speed + piece.acceleration * since)
+
+    def pose(self, time: float) -> tuple[float, float, float]:
+        """(x, y, theta) in W at a time in s; m and rad."""
+        piece, s, _ = self._find(time)
+        return _along(piece.x, piece.y, piece.theta, piece.curvature, s)
+
+    def velocity(self, time: float) -> tuple[float, float, float]:
+        """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
+        piece, s, rate = self._find(time)
+        theta = piece.theta + piece.curvature * s
+        return (
+            rate * math.cos(theta),
+            rate * math.sin(theta),
+            rate * piece.curvature,
+        )
+
+    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
+        (x, y, theta, curvature), s, _ = self._find_all(times)
+        # Chord of the arc: its length tends to s as the curvature vanishes.
+        half = 0.5 * curvature * s
+        chord = s * np.sinc(half / np.pi)
+        return np.stack(
+            [
+                x + chord * np.cos(theta + half),
+                y + chord * np.sin(theta + half),
+                theta + 2.0 * half,
+            ],
+            axis=1,
+        )
+
+    def twists(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 2) speeds ahead, negative where a shuttle goes back, and yaw rates.
+
+        In m/s and rad/s.
+        """
+        (_, _, _, curvature), _, rate = self._find_all(times)
+        return np.stack([rate, rate * curvature], axis=1)
+
+    def _find_all(self, times: ArrayLike) -> tuple[Any, Any, Any]:
+        """As ``_find``: starts and curvatures, distances and rates."""
+        elapsed = np.maximum(np.asarray(times, dtype=float) - self._start_time, 0.0)
+        direction = np.ones_like(elapsed)
+        if self._shuttles:
+            laps, elapsed = np.divmod(elapsed, self._duration)
+            back = laps % 2 == 1
+            elapsed = np.where(back, self._duration - elapsed, elapsed)
+            direction[back] = -1.0
+        index = np.searchsorted(self._begins, elapsed, side="right") - 1
+        begin, *start, speed, acceleration = np.array(self._pieces)[index].T
+        since = elapsed - begin
+        distance = (speed + 0.5 * acceleration * since) * since
+        return start, distance, direction * (speed + acceleration * since)
+
+
+def _along(
+    x: float, y: float, theta: float, curvature: float, s: float
+) -> tuple[float, float, float]:
+    """Pose at a distance s along a line or an arc that begins at a pose."""
+    if curvature == 0.0:
+        return x + s * math.cos(theta), y + s * math.sin(theta), theta
+    end = theta + curvature * s
+    return (
+        x + (math.sin(end) - math.sin(theta)) / curvature,
+        y - (math.cos(end) - math.cos(theta)) / curvature,
+        end,
+    )
+
+
+def _pieces(
+    segments: Sequence[_Segment], limits: Sequence[float], acceleration: float
+) -> tuple[list[_Piece], float]:
+    """The fastest way along segments from rest to rest, and how long it takes.
+
+    Args:
+        segments: Lines and arcs end to end.
+        limits: Top speed on each, m/s.
+        acceleration: Of the speed along the path, m/s^2.
+    """
+    # Squares of speeds are linear in the distance.
+    tops = [limit * limit for limit in limits]
+    joints = [0.0, *(min(pair) for pair in pairwise(tops)), 0.0]
+    gains = [2.0 * acceleration * segment.length for segment in segments]
+    for k, gain in enumerate(gains):
+        joints[k + 1] = min(joints[k + 1], joints[k] + gain)
+    for k, gain in reversed(list(enumerate(gains))):
+        joints[k] = min(joints[k], joints[k + 1] + gain)
+    pieces: list[_Piece] = []
+    begin = 0.0
+    for segment, top, gain, (first, last) in zip(
+        segments, tops, gains, pairwise(joints), strict=True
+    ):
+        peak = min(top, 0.5 * (first + last + gain))
+        up = (peak - first) / (2.0 * acceleration)
+        down = (peak - last) / (2.0 * acceleration)
+        ways = (
+            (0.0, up, first, peak, acceleration),
+            (up, segment.length - up - down, peak, peak, 0.0),
+            (segment.length - down, down, peak, last, -acceleration),
+        )
+        for start, way, before, after, rate in ways:
+            if way > 0.0:
+                speed = math.sqrt(before)
+                pose = segment.pose(start)
+                piece = _Piece(begin, *pose, segment.curvature, speed, rate)
+                pieces.append(piece)
+                begin += 2.0 * way / (speed + math.sqrt(after))
+    return pieces, begin
+
+
+def _segments(
+    waypoints: Sequence[tuple[float, float]], corner_radius: float
+) -> list[_Segment]:
+    """Lines between the waypoints, joined by arcs."""
+    legs = []
+    for (x0, y0), (x1, y1) in pairwise(waypoints):
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length < 1e-9:
+            raise InputError(
+                "waypoints_m", f"({x0}, {y0}) stands twice in a row; remove one"
+            )
+        legs.append((x0, y0, math.atan2(y1 - y0, x1 - x0), length))
+
+    segments: list[_Segment] = []
+    trimmed = 0.0
+    for index, (x, y, theta, length) in enumerate(legs):
+        arc = None
+        cut = 0.0
+        if index + 1 < len(legs):
+            _, _, next_theta, next_length = legs[index + 1]
+            turn = math.remainder(next_theta - theta, math.tau)
+            if abs(abs(turn) - math.pi) < 1e-6:
+                raise InputError(
+                    "waypoints_m",
+                    f"the path doubles back at waypoint {index + 1}; "
+                    "move a waypoint aside, or use at_end: shuttle",
+                )
+            arc, cut = _corner(turn, corner_radius, min(length, next_length) / 2)
+        line = length - trimmed - cut
+        if line > 1e-12:
+            segments.append(
+                _Segment(
+                    x + trimmed * math.cos(theta),
+                    y + trimmed * math.sin(theta),
+                    theta,
+                    0.0,
+                    line,
+                )
+            )
+        if arc is not None:
+            curvature, arc_length = arc
+            start = length - cut
+            segments.append(
+                _Segment(
+                    x + start * math.cos(theta),
+                    y + start * math.sin(theta),
+                    theta,
+                    curvature,
+                    arc_length,
+                )
+            )
+        trimmed = cut
+    return segments
+
+
+def _corner(
+    turn: float, radius: float, room: float
+) -> tuple[tuple[float, float] | None, float]:
+    """((curvature, arc length), length cut off each leg) of a corner."""
+    if abs(turn) < 1e-9:
+        return None, 0.0
+    half = math.tan(abs(turn) / 2.0)
+    radius = min(radius, room / half)
+    arc = (math.copysign(1.0 / radius, turn), radius * abs(turn))
+    return arc, radius * half
+
+
+def seconds(context) -> float:
+    """Time of a context as a float, whatever the context's scalar type."""
+    time = context.get_time()
+    return time if isinstance(time, float) else time.value()

@@ -1,0 +1,185 @@
+"""Plans of comparisons, the library's layouts, and a small one from end to end."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from analysis.comparison.compare import (
+    EXPERIMENTS,
+    comparison_plan,
+    library_layouts,
+    prepare_comparison,
+)
+from analysis.comparison.options import comparison_plans
+from analysis.comparison.report import (
+    compare_summary,
+    compare_text,
+    write_comparison,
+)
+from diagrams import load_scenario, simulate
+from systems.framework.input_error import InputError
+
+IDEAL = {"hearing": "ideal"}
+
+
+def test_every_experiment_has_layouts():
+    assert set(EXPERIMENTS) <= set(library_layouts())
+
+
+@pytest.mark.parametrize("name", library_layouts())
+def test_layouts_of_the_library_are_valid_and_differ(name):
+    plan = comparison_plan(name, laws=("none", "active"), runs=20)
+    points = plan.points()
+    drawn = {tuple(p.fields[key] for key in plan.draw) for p in points}
+    assert len(drawn) == 20
+    assert plan.scenario_of(points[0]).name == name
+
+
+@pytest.mark.parametrize("name", EXPERIMENTS)
+def test_sources_and_obstacles_stay_where_sound_and_echoes_reach(name):
+    """Inside the papers' floors, but for where moving obstacles come from."""
+    plan = comparison_plan(name, laws=("none",), runs=50)
+    for point in plan.points():
+        scenario = plan.scenario_of(point)
+        waypoints = np.array(scenario.source.waypoints_m)
+        assert np.all(np.ptp(waypoints, axis=0) <= scenario.arena_m)
+        for obstacle in scenario.obstacles:
+            if not obstacle.path().moves:
+                assert abs(obstacle.waypoints_m[0][1]) <= 0.6
+
+
+def test_laws_meet_the_same_layouts_with_the_same_noise():
+    plan = comparison_plan("one_moving_obstacle", laws=("none", "active"), runs=3)
+    points = plan.points()
+    for none, active in zip(points[::2], points[1::2], strict=True):
+        one, other = plan.scenario_of(none), plan.scenario_of(active)
+        assert (one.law, other.law) == ("none", "active")
+        assert one.model_copy(update={"law": "active"}) == other
+
+
+def test_a_layout_does_not_depend_on_laws_or_runs():
+    few = comparison_plan("two_static_obstacles", laws=("none",), runs=2)
+    many = comparison_plan("two_static_obstacles", laws=("active", "none"), runs=5)
+    for name in few.draw:
+        values = [[p.fields[name] for p in plan.points()] for plan in (few, many)]
+        assert values[1][::2][:2] == values[0]
+
+
+def test_the_recommended_attraction_meets_the_same_layouts():
+    printed, recommended = (
+        comparison_plan(name, laws=("active",), runs=5)
+        for name in ("two_static_obstacles", "two_static_obstacles_recommended")
+    )
+    for one, other in zip(printed.points(), recommended.points(), strict=True):
+        a, b = printed.scenario_of(one), recommended.scenario_of(other)
+        changed = {"name": a.name, "attraction": a.attraction, "repulsion": a.repulsion}
+        assert a.attraction != b.attraction
+        assert b.model_copy(update=changed) == a
+
+
+def test_a_users_own_layouts(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text(
+        "scenario: default\n"
+        "draw:\n  obstacles.0.waypoints_m.0.1: {uniform: [0.5, 0.9]}\n"
+    )
+    plan = comparison_plan(str(file), laws=("none",), runs=2, settings=IDEAL)
+    scenario = plan.scenario_of(plan.points()[0])
+    assert scenario.hearing == "ideal"
+    assert 0.5 <= scenario.obstacles[0].waypoints_m[0][1] <= 0.9
+
+
+def test_a_users_own_scenario_differs_in_noise_alone(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("duration_s: 3\n")
+    plan = comparison_plan(str(file), laws=("none",), runs=2)
+    one, other = (plan.scenario_of(point) for point in plan.points())
+    assert one.seed != other.seed
+    assert one.model_copy(update={"seed": other.seed}) == other
+
+
+def test_layouts_that_set_what_the_comparison_sets_are_refused(tmp_path):
+    file = tmp_path / "mine.yaml"
+    file.write_text("scenario: default\nruns: 3\n")
+    with pytest.raises(InputError, match=r"runs: .*remove it"):
+        comparison_plan(str(file))
+
+
+@pytest.mark.parametrize(
+    ("words", "field"),
+    [
+        ({"scenarios": ["no_such"]}, "scenario"),
+        ({"scenarios": ["default", "default"]}, "scenario"),
+        ({"runs": 0}, "runs"),
+        ({"seed": "one"}, "seed"),
+        ({"laws": "active,active"}, "grid.law"),
+        ({"settings": ["law=none"]}, "grid.law"),
+        ({"settings": ["duration_s"]}, "duration_s"),
+        ({"grid": ["hearing=audio"]}, "hearing"),
+    ],
+)
+def test_mistakes_are_named(words, field):
+    with pytest.raises(InputError) as caught:
+        comparison_plans(**words)
+    assert caught.value.field == field
+
+
+def test_velocity_terms_are_set_or_compared():
+    (one,) = comparison_plans(["default"], velocity_terms="closing").values()
+    assert one.set == {"repulsion.velocity_term": "closing"}
+    (both,) = comparison_plans(["default"], velocity_terms="printed,closing").values()
+    assert len(both.cells()) == 10
+
+
+def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
+    bad = tmp_path / "bad.yaml"
+    draw = "  start.position_m.0: {uniform: [1.5, 1.7]}"
+    bad.write_text(f"scenario: default\ndraw:\n{draw}\n")
+    plans = {
+        "first": comparison_plan("default", runs=1),
+        "bad": comparison_plan(str(bad), runs=20),
+    }
+    with pytest.raises(InputError, match="stands on"):
+        prepare_comparison(plans, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+def test_a_comparison_from_end_to_end(tmp_path):
+    """Two laws on two short layouts; examples run again as they ran."""
+    short = IDEAL | {"duration_s": 3.0}
+    plans = {
+        "two_static_obstacles": comparison_plan(
+            "two_static_obstacles", laws=("none", "active"), runs=2, settings=short
+        )
+    }
+    prepared = prepare_comparison(plans, tmp_path / "out", workers=1)
+    seen: list[int] = []
+    comparisons, pooled = prepared.run(seen.append)
+    assert seen[-1] == prepared.runs == 4
+    summary = compare_summary(prepared, comparisons, pooled)
+    write_comparison(prepared, comparisons, summary)
+    assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
+    cells = summary["cells"]
+    assert [(c["scenario"], c["law"], c["runs"]) for c in cells] == [
+        ("two_static_obstacles", "none", 2),
+        ("two_static_obstacles", "active", 2),
+    ]
+    for cell in cells:
+        for rate in ("success", "collision"):
+            assert cell[rate]["low"] <= cell[rate]["estimate"] <= cell[rate]["high"]
+        for example in cell["examples"]:
+            again = load_scenario(tmp_path / "out" / example["scenario_file"])
+            assert simulate(again).cause == example["cause"]
+            text = compare_text(summary, comparisons, pooled)
+            assert example["command"] in text
+    assert {p.name for p in (tmp_path / "out").iterdir()} == {
+        "summary.json",
+        "rates.png",
+        "two_static_obstacles.png",
+        "two_static_obstacles",
+        "examples",
+    }

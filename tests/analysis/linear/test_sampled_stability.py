@@ -1,0 +1,129 @@
+"""Sampling: conditions, periods and charts against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from analysis.linear.burst_cycle import burst_cycle
+from analysis.linear.burst_gaps import gap_chart
+from analysis.linear.contact_mode import contact_matrix, largest_contact_stiffness
+from analysis.linear.root_locus import contact_slopes, root_loci
+from analysis.linear.sampled_stability import (
+    check_conditions,
+    gain_chart,
+    gain_delay_chart,
+    poles_against_period,
+)
+from analysis.models.equilibria import follow_equilibrium
+from diagrams.scenario import Scenario
+
+M, K, D, T, LAG = 3.94, 2.0, 1.0, 0.025, 0.05
+
+
+def test_closed_form_conditions_hold_for_10_000_pairs_each():
+    for check in check_conditions(10_000):
+        assert check.mismatches == 0, check
+        assert 1000 < check.stable < 9000, "both sides of the boundary are tried"
+
+
+def test_longest_stable_period_is_the_held_velocity_conditions():
+    """2 D T + K T^2 < 4 M where the lag has died out within a period."""
+    quick = Scenario.model_validate({"plant": {"motor_lag_s": 0.01}})
+    periods = np.linspace(0.5, 4.0, 701)
+    found = poles_against_period(quick, periods_s=periods)
+    exact = (-D + math.sqrt(D**2 + 4 * K * M)) / K
+    assert found.longest_stable_s == pytest.approx(exact, abs=0.03)
+
+
+def test_poles_at_todays_period_are_those_of_the_operating_point():
+    point = follow_equilibrium(Scenario(law="none"))
+    found = poles_against_period(Scenario(), periods_s=[T])
+    slow = np.log(found.poles[0][np.abs(found.poles[0]) > 0.7]) / T
+    for pole in slow:
+        assert np.abs(point.eigenvalues - pole).min() < 1e-4
+
+
+def test_gain_charts_boundary_is_the_contact_limit():
+    """At today's damping the chart turns from decay to growth at K_r + K_0."""
+    limit = largest_contact_stiffness(Scenario())
+    chart = gain_chart(
+        Scenario(), stiffnesses_n_m=[0.99 * limit, 1.01 * limit], dampings_n_s_m=[D]
+    )
+    assert chart.growth_per_s[0, 0] < 0.0 < chart.growth_per_s[0, 1]
+    assert chart.today == (K, D)
+
+
+def test_delay_charts_boundary_is_the_delay_margin_of_the_attraction():
+    """K_r = 2 on a position of 0.46 s of age: see the exact delay margin."""
+    chart = gain_delay_chart(Scenario(), delays_s=[0.45, 0.475], stiffnesses_n_m=[K])
+    assert chart.growth_per_s[0, 0] < 0.0 < chart.growth_per_s[0, 1]
+
+
+def test_gap_chart_is_the_burst_cycle_of_each_gap():
+    scenario = Scenario(law="none")
+    point = follow_equilibrium(scenario)
+    chart = gap_chart(
+        scenario, gaps_s=[0.5, 1.5], holds=["robot", "world"], point=point
+    )
+    for row, hold in enumerate(chart.holds):
+        for column, gap in enumerate(chart.gaps_s):
+            cycle = burst_cycle(scenario, hold, on_s=0.5, gap_s=gap, point=point)
+            assert chart.multiplier[row, column] == pytest.approx(
+                cycle.largest, rel=1e-6
+            )
+    assert chart.longest_stable_s("world") == 1.5
+    assert chart.longest_stable_s("robot") == 0.5
+    assert chart.today == (1.5, "motion")
+
+
+def test_root_loci_of_the_attraction_follow_the_cubic():
+    """M s^2 (1 + lag s) + D s (1 + lag s) + K... sampled, to a tick's worth."""
+    stiffness, damping = root_loci(Scenario(law="none"))
+    k = np.argmin(np.abs(stiffness.values - 8.0))
+    exact = np.roots([M * LAG, M + D * LAG * 0.0 + LAG * 0.0, D, stiffness.values[k]])
+    pair = exact[np.abs(exact) < 5.0]
+    for pole in pair:
+        assert np.abs(stiffness.poles[k] - pole).min() < 0.06
+    assert stiffness.limit == pytest.approx(
+        largest_contact_stiffness(Scenario()), rel=0.1
+    )
+    assert damping.today == D
+
+
+def test_contact_slopes_are_the_laws_own():
+    """Conventional: K_0 and D_0. Active: k_ref / e^2 at 2 alpha."""
+    gains = {
+        "conventional": {"stiffness_n_m": 9.0, "damping_n_s_m": 0.7},
+        "active": {"reference_stiffness_n_m": 50.0, "matched_stiffness_n_m": 12.0},
+    }
+    laws = [
+        contact_slopes(Scenario.model_validate({"law": law, "repulsion": gains}))
+        for law in ("conventional", "active")
+    ]
+    assert laws[0].stiffness_n_m == pytest.approx(9.0, rel=1e-6)
+    assert laws[0].approach_damping_n_s_m == pytest.approx(0.7, rel=1e-3)
+    alpha = 0.8 / (2 * math.log(50.0 / 12.0))
+    assert laws[1].stiffness_n_m == pytest.approx(50.0 / math.e**2, rel=1e-3)
+    assert laws[1].distance_m == pytest.approx(2 * alpha, abs=0.01)
+
+
+def test_approaching_obstacles_damp():
+    """D_0 on the change over a tick acts as on a velocity half a tick ago."""
+    damped = np.linalg.eigvals(
+        contact_matrix(Scenario(), 12.0, approach_damping_n_s_m=0.8)
+    )
+    as_velocity = np.linalg.eigvals(contact_matrix(Scenario(), 12.0, damping_n_s_m=1.8))
+    rates = [np.log(np.abs(z).max()) / T for z in (damped, as_velocity)]
+    plain = (
+        np.log(np.abs(np.linalg.eigvals(contact_matrix(Scenario(), 12.0))).max()) / T
+    )
+    # The damper acts on the true motion, behind the motors' lag.
+    assert plain - rates[0] == pytest.approx(plain - rates[1], rel=0.2)
+
+
+def test_without_a_push_there_is_no_contact():
+    with pytest.raises(ValueError, match=r"law: 'none' does not push"):
+        contact_slopes(Scenario(law="none"))

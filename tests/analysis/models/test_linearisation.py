@@ -1,0 +1,94 @@
+"""Models at operating points: two routes, and closed forms."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+from analysis.models.equilibria import follow_equilibrium
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.linearisation import (
+    blockwise_model,
+    check_gradient,
+    compare_routes,
+    continuous_model,
+    sampled_model,
+)
+from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
+from diagrams.scenario import Scenario
+
+LAWS = ["none", "conventional", "active", "conventional2017", "active2017"]
+
+
+def points(law):
+    scenario = Scenario(law=law)
+    return [follow_equilibrium(scenario), moving_equilibrium(scenario)]
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_two_routes_agree_at_rest_and_on_the_move(law):
+    for point in points(law):
+        found = compare_routes(point)
+        assert found.matrix_difference < 1e-8
+        assert found.pole_difference < 1e-8
+        assert len(found.simple_poles) >= 5
+
+
+def test_signals_of_both_routes_are_the_same():
+    (point, _) = points("active")
+    whole, joined = sampled_model(point), blockwise_model(point)
+    assert whole.input_names == joined.input_names
+    assert whole.output_names == joined.output_names
+    np.testing.assert_allclose(whole.D, joined.D, atol=1e-8)
+
+
+def test_autodiff_is_the_slope_of_the_float_diagram():
+    for point in points("conventional"):
+        check = check_gradient(point)
+        assert check.largest_difference < 1e-5
+        assert check.kink < 1e-3  # no obstacle within reach: no corner
+
+
+def test_the_corner_of_the_printed_velocity_term_is_found():
+    """f goes with |dC|, so the slopes to both sides differ by twice its own."""
+    (point, _) = points("active")
+    check = check_gradient(point)
+    assert check.largest_difference < 1e-4
+    assert check.kink > 1.0
+    assert check.kink_at[0].startswith("command.")
+
+
+def test_continuous_target_loop_has_the_closed_forms_poles():
+    """M s^2 (1 + lag s) + D_r s (1 + lag s)... along; the sensor's lag apart."""
+    (point, _) = points("none")
+    poles = continuous_model(point).poles
+    # v' = -(K p + D v)/M and p' = w, w' = (v - w)/lag.
+    along = np.roots([3.94 * 0.05, 3.94 + 0.05, 1.0, 2.0])
+    across = np.roots([3.94 * 0.05, 3.94 + 0.05, 1.0, 0.0])
+    for pole in (*along, *across):
+        assert np.abs(poles - pole).min() < 1e-9
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_sampled_poles_approach_the_continuous_ones(law):
+    """ln(z)/T is within a tick's worth of the continuous pole."""
+    for point in points(law):
+        continuous = continuous_model(point).poles
+        slow = [mode.eigenvalue for mode in point.modes if abs(mode.eigenvalue) < 1.5]
+        for pole in slow:
+            assert np.abs(continuous - pole).min() < 0.025 * abs(pole) ** 2 + 0.001
+
+
+def test_a_linearisation_takes_less_than_50_ms():
+    """The build and its twin are there already."""
+    (point, _) = points("active")
+    loop = ideal_loop(point.loop.scenario)
+    spent = []
+    for _ in range(5):
+        start = time.process_time()
+        again = resting_equilibrium(loop, point.p_WP)
+        sampled_model(again)
+        spent.append(time.process_time() - start)
+    assert min(spent) < 0.05

@@ -1,0 +1,54 @@
+"""Linear models as .mat and .csv."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy.io import loadmat
+
+from analysis.models.linear_models import LinearModel
+from analysis.models.model_export import write_models
+
+MODEL = LinearModel(
+    name="sampled loop, active",
+    A=np.array([[0.1, 1.0 / 3.0], [-2.0, 0.0]]),
+    B=np.array([[1.0], [2.0]]),
+    C=np.array([[1.0, 0.0], [0.0, 1.0], [1.0, 1.0]]),
+    D=np.zeros((3, 1)),
+    state_names=("plant.x", "plant.y"),
+    input_names=("force",),
+    output_names=("x", "y", "sum"),
+    period_s=0.025,
+)
+
+
+def test_mat_file_holds_matrices_and_names(tmp_path):
+    continuous = dataclasses.replace(MODEL, name="target", period_s=None)
+    write_models([MODEL, continuous], tmp_path)
+    data = loadmat(tmp_path / "models.mat", simplify_cells=True)
+    loop = data["sampled_loop_active"]
+    np.testing.assert_array_equal(loop["A"], MODEL.A)
+    np.testing.assert_array_equal(loop["B"].reshape(2, 1), MODEL.B)
+    assert loop["Ts"] == 0.025
+    assert data["target"]["Ts"] == 0.0
+    assert list(loop["StateName"]) == list(MODEL.state_names)
+    assert list(loop["OutputName"]) == list(MODEL.output_names)
+
+
+def test_csv_files_are_exact_and_named(tmp_path):
+    write_models([MODEL], tmp_path)
+    folder = tmp_path / "models"
+    A = pd.read_csv(folder / "sampled_loop_active_A.csv", index_col=0)
+    assert (A.to_numpy() == MODEL.A).all()
+    assert list(A.columns) == list(A.index) == list(MODEL.state_names)
+    C = pd.read_csv(folder / "sampled_loop_active_C.csv", index_col=0)
+    assert list(C.index) == list(MODEL.output_names)
+    assert len(list(folder.iterdir())) == 4
+
+
+def test_models_of_one_name_are_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"models: .* rename one"):
+        write_models([MODEL, MODEL], tmp_path)

@@ -1,0 +1,206 @@
+"""Faults that are put into sound recordings, and recordings without any."""
+
+from __future__ import annotations
+
+import math
+import warnings
+
+import numpy as np
+import pytest
+
+from analysis.recordings.channel_faults import find_channel_faults
+from systems.sound.array_shape import ArrayShape
+
+FS, C, SECONDS = 16_000, 340.0, 3.0
+ROW = ArrayShape.of([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])
+SQUARE = ArrayShape.of([[0.1, 0.1], [-0.1, 0.1], [-0.1, -0.1], [0.1, -0.1]])
+FIVE = ArrayShape.of(
+    [[0.2, 0.3, 0], [0.3, -0.1, 0], [-0.1, -0.3, 0.1], [-0.3, 0.1, 0], [0, 0.05, 0.2]]
+)
+
+
+def place(shape, bearing_deg, distance):
+    angle = math.radians(bearing_deg)
+    u = np.array([math.cos(angle), math.sin(angle), 0.2])[: shape.dimension]
+    return distance * u / np.linalg.norm(u)
+
+
+def recording(shape, p_AS, *, snr_db=20.0, seed=0):
+    """(n, samples) syllables of noise of 0.3-6 kHz, its level in steps of 16 bits."""
+    generator = np.random.default_rng(seed)
+    count = round(SECONDS * FS)
+    f = np.fft.rfftfreq(count, 1 / FS)
+    spectrum = np.fft.rfft(generator.standard_normal(count))
+    spectrum *= (f > 300) & (f < 6000)
+    t = np.arange(count) / FS
+    syllables = np.maximum(np.sin(2 * np.pi * 2.3 * t), 0.02)
+    spectrum = np.fft.rfft(np.fft.irfft(spectrum, count) * syllables)
+    ranges = np.linalg.norm(shape.p_AM - p_AS, axis=1)
+    rows = np.array(
+        [np.fft.irfft(spectrum * np.exp(-2j * np.pi * f * r / C) / r) for r in ranges]
+    )
+    rows += rows.std() * 10 ** (-snr_db / 20) * generator.standard_normal(rows.shape)
+    return np.rint(rows * (0.3 * 2**15 / np.abs(rows).max())) / 2**15
+
+
+def faults(samples, shape=FIVE):
+    found = find_channel_faults(samples, shape, C, sample_rate_hz=FS)
+    return [(fault.kind, fault.channels) for fault in found]
+
+
+@pytest.mark.parametrize("shape", [ROW, SQUARE, FIVE])
+@pytest.mark.parametrize("distance", [0.6, 2.0])
+@pytest.mark.parametrize("snr_db", [5.0, 30.0])
+def test_nothing_is_wrong_with_a_sound_recording(shape, distance, snr_db):
+    for seed, bearing in enumerate((-60.0, 0.0, 25.0)):
+        samples = recording(
+            shape, place(shape, bearing, distance), snr_db=snr_db, seed=seed
+        )
+        assert faults(samples, shape) == []
+
+
+def test_silence_noise_and_tones_are_no_faults():
+    generator = np.random.default_rng(1)
+    noise = 1e-3 * generator.standard_normal((5, 2 * FS))
+    assert faults(noise) == []
+    assert faults(np.rint(noise * 2**10) / 2**15) == []
+    tone = np.sin(2 * np.pi * 997.0 * np.arange(FS) / FS + np.arange(5)[:, None])
+    assert faults(np.rint(tone * 1000.0) / 2**15 + 1e-5 * noise[:, :FS]) == []
+
+
+@pytest.mark.parametrize("k", range(5))
+def test_channels_that_say_nothing(k):
+    samples = recording(FIVE, place(FIVE, 130.0, 1.5))
+    generator = np.random.default_rng(2)
+    for instead in (
+        0.25 * np.ones(samples.shape[1]),
+        samples[k] * 1e-3,
+        samples.std() * generator.standard_normal(samples.shape[1]),
+    ):
+        broken = samples.copy()
+        broken[k] = instead
+        assert faults(broken) == [("dead", (k,))]
+    broken = samples.copy()
+    broken[k, 777] = np.nan
+    assert faults(broken) == [("nan", (k,))]
+
+
+@pytest.mark.parametrize("share", [0.3, 0.7])
+def test_clipping(share):
+    samples = recording(FIVE, place(FIVE, 130.0, 1.5))
+    limit = share * np.abs(samples[3]).max()
+    samples[3] = np.clip(samples[3], -limit, limit)
+    assert faults(samples) == [("clipped", (3,))]
+    stuck = recording(FIVE, place(FIVE, 130.0, 1.5))
+    stuck[1] = np.minimum(stuck[1], 0.5 * stuck[1].max())
+    assert faults(stuck) == [("clipped", (1,))]
+
+
+@pytest.mark.parametrize("shape", [ROW, SQUARE, FIVE])
+def test_inverted_channels(shape):
+    samples = recording(shape, place(shape, 20.0, 1.5))
+    for k in range(shape.count):
+        broken = samples.copy()
+        broken[k] *= -1.0
+        assert faults(broken, shape) == [("inverted", (k,))]
+
+
+def test_an_inverted_channel_does_not_hide_another_fault():
+    samples = recording(FIVE, place(FIVE, 20.0, 1.5))[[0, 3, 2, 1, 4]]
+    samples[2] *= -1.0
+    samples[0, 5] = np.inf
+    assert faults(samples) == [("nan", (0,)), ("inverted", (2,))]
+    samples[0, 5] = 0.0
+    assert faults(samples) == [("inverted", (2,)), ("swapped", (1, 3))]
+
+
+@pytest.mark.parametrize("bearing", [-140.0, 10.0, 70.0])
+def test_every_exchange_in_an_uneven_array(bearing):
+    """Unless the two hear it at one time, or their delays fit another place."""
+    p_AS = place(FIVE, bearing, 1.5)
+    samples = recording(FIVE, p_AS)
+    ranges = np.linalg.norm(FIVE.p_AM - p_AS, axis=1)
+    seen = []
+    for i, j in FIVE.pairs.tolist():
+        broken = samples.copy()
+        broken[[i, j]] = broken[[j, i]]
+        found = faults(broken)
+        assert found in ([], [("swapped", (i, j))])
+        if abs(ranges[i] - ranges[j]) > 0.1:
+            seen.append(bool(found))
+    assert len(seen) >= 6
+    assert np.mean(seen) > 0.5
+
+
+def test_exchanged_neighbours_of_a_row():
+    """They fake a source amid the row, which would be heard at other levels."""
+    samples = recording(ROW, place(ROW, 35.0, 2.0))
+    assert faults(samples[[1, 0, 2]], ROW) == [("swapped", (0, 1))]
+    # The ends: a mirror image, which nothing tells.
+    assert faults(samples[[2, 1, 0]], ROW) == []
+
+
+def test_a_square_names_both_sides():
+    samples = recording(SQUARE, place(SQUARE, 35.0, 2.0))
+    found = find_channel_faults(samples[[1, 0, 2, 3]], SQUARE, C, sample_rate_hz=FS)
+    assert [(f.kind, f.channels) for f in found] == [("swapped", (0, 1, 2, 3))]
+    assert "channels 1 and 2 or 3 and 4" in found[0].message
+    assert faults(samples[[2, 1, 0, 3]], SQUARE) == []
+
+
+def test_a_geometry_that_is_too_small_fits_nothing():
+    samples = recording(FIVE, place(FIVE, 50.0, 1.5))
+    small = ArrayShape.of(0.75 * FIVE.p_AM)
+    assert faults(samples, small) == [("geometry", ())]
+
+
+def test_a_source_at_a_microphone():
+    samples = recording(FIVE, FIVE.p_AM[2] + np.array([0.02, 0.0, 0.0]))
+    assert faults(samples) == [("near", (2,))]
+
+
+def test_a_source_at_one_of_three_microphones_leaves_the_others_alive():
+    """1 mm from the first one, 50 to 60 dB louder there than at the others."""
+    samples = recording(ROW, ROW.p_AM[0] + np.array([0.001, 0.0]), snr_db=80.0)
+    assert faults(samples, ROW) == [("near", (0,))]
+
+
+@pytest.mark.parametrize(
+    ("scale", "kind"), [(1 / 3, "units"), (0.5, "units"), (0.7, "geometry")]
+)
+def test_delays_longer_than_the_array(scale, kind):
+    """Positions given too small: sound would take up to three times as long."""
+    for shape in (ROW, FIVE):
+        samples = recording(shape, place(shape, 50.0, 1.5))
+        found = faults(samples, ArrayShape.of(scale * shape.p_AM))
+        assert found == [(kind, ())]
+
+
+def test_a_channel_that_is_another_ones_copy():
+    samples = recording(FIVE, place(FIVE, 20.0, 1.5))
+    samples[3] = samples[1]
+    assert ("copied", (1, 3)) in faults(samples)
+
+
+def test_rooms_are_no_fault():
+    """Image sources up to a reverberation time of 0.5 s, and a fault in them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import pyroomacoustics as pra
+    dry = recording(ROW, place(ROW, 0.0, 1.0), snr_db=99.0)[1]
+    for seconds in (0.2, 0.5):
+        absorption, order = pra.inverse_sabine(seconds, [6.0, 5.0, 3.0])
+        room = pra.ShoeBox(
+            [6.0, 5.0, 3.0],
+            fs=FS,
+            materials=pra.Material(absorption),
+            max_order=min(order, 12),
+        )
+        p_AM = np.column_stack((FIVE.p_AM, np.zeros(5)))[:, :3]
+        room.add_microphone_array((p_AM + np.array([2.0, 2.2, 1.3])).T)
+        room.add_source([4.0, 3.1, 1.6], signal=dry)
+        room.simulate()
+        samples = room.mic_array.signals
+        assert faults(samples) == []
+        samples[3] *= -1.0
+        assert faults(samples) == [("inverted", (3,))]

@@ -1,0 +1,132 @@
+"""What is made of estimates: medians, the main source, the other candidate."""
+
+from __future__ import annotations
+
+import json
+import math
+
+import numpy as np
+import pytest
+
+from analysis.recordings.locate_plots import plot_locate, write_locate
+from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.locate_text import locate_text
+from systems.sound.array_shape import ArrayShape
+
+SQUARE = [[0.1, 0.1, 0.0], [-0.1, 0.1, 0.0], [-0.1, -0.1, 0.0], [0.1, -0.1, 0.0]]
+ROW = [[0.3, 0.0], [0.0, 0.0], [-0.4, 0.0]]
+UPRIGHT = [[0.1, 0.0, 0.1], [-0.1, 0.0, 0.1], [-0.1, 0.0, -0.1], [0.1, 0.0, -0.1]]
+
+
+def estimate(t, bearing, elevation=None, range_m=None, std=1.0):
+    return SourceEstimate(
+        t_s=t,
+        bearing_deg=bearing,
+        bearing_std_deg=std,
+        elevation_deg=elevation,
+        elevation_std_deg=None if elevation is None else std,
+        range_m=range_m,
+        range_std_m=None if range_m is None else 0.1,
+    )
+
+
+def result(places, estimates, frames=20):
+    return LocateResult({}, ArrayShape.of(places), estimates, frames)
+
+
+def test_bearings_on_either_side_of_180_deg():
+    values = [179.0, -179.0, 178.0, -178.0, 180.0]
+    found = result(ROW, [estimate(k, v) for k, v in enumerate(values)]).summary()
+    assert abs(found["bearing_deg"]) == pytest.approx(180.0)
+    assert found["bearing_std_deg"] == pytest.approx(1.4826)
+
+
+def test_other_sources_do_not_move_the_main_one():
+    bearings = [30.0, 31.0, 29.0, 30.0, 120.0, 125.0, 119.0]
+    found = result(ROW, [estimate(k, b) for k, b in enumerate(bearings)]).summary()
+    assert found["bearing_deg"] == pytest.approx(30.0)
+    assert found["frames_of_main_source"] == 4
+    assert found["frames_heard"] == 7
+
+
+def test_moving_source_has_the_bearing_of_the_middle():
+    bearings = np.linspace(-60.0, 60.0, 41)
+    found = result(ROW, [estimate(k, b) for k, b in enumerate(bearings)]).summary()
+    assert found["bearing_deg"] == pytest.approx(0.0, abs=1e-9)
+    assert found["frames_of_main_source"] == 41
+
+
+def test_few_estimates_do_not_feign_certainty():
+    """One value has no scatter, and values in common error little."""
+    one = result(ROW, [estimate(0, 30.0, std=0.7)]).summary()
+    assert one["bearing_std_deg"] == pytest.approx(0.7)
+    agreed = [estimate(k, 30.0 + 0.01 * k, std=0.7) for k in range(9)]
+    assert result(ROW, agreed).summary()["bearing_std_deg"] == pytest.approx(0.7)
+
+
+def test_certain_estimates_count_more():
+    bearings = [estimate(k, 10.0, std=0.3) for k in range(4)]
+    bearings += [estimate(k, 14.0, std=3.0) for k in range(4, 10)]
+    assert result(ROW, bearings).summary()["bearing_deg"] == pytest.approx(10, abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("places", "bearing", "elevation", "ambiguity", "other"),
+    [
+        (SQUARE, 170.0, 20.0, "mirror", (170.0, -20.0)),
+        (UPRIGHT, 50.0, 20.0, "mirror", (-50.0, 20.0)),
+        (ROW, 50.0, None, "front_back", (-50.0, None)),
+    ],
+)
+def test_alternatives(places, bearing, elevation, ambiguity, other):
+    found = result(places, [estimate(0, bearing, elevation)]).summary()
+    assert found["ambiguity"] == ambiguity
+    (alternative,) = found["alternatives"]
+    assert alternative["bearing_deg"] == pytest.approx(other[0])
+    if other[1] is None:
+        assert alternative["elevation_deg"] is None
+    else:
+        assert alternative["elevation_deg"] == pytest.approx(other[1])
+
+
+def test_flat_array_has_no_alternative():
+    flat = [p[:2] for p in SQUARE]
+    found = result(flat, [estimate(0, 50.0)]).summary()
+    assert (found["ambiguity"], found["alternatives"]) == ("none", [])
+
+
+def test_range_of_few_estimates_is_none():
+    few = [estimate(k, 10.0, range_m=2.0 if k < 4 else None) for k in range(10)]
+    most = [estimate(k, 10.0, range_m=2.0 if k < 6 else None) for k in range(10)]
+    assert result(ROW, few).summary()["range_m"] is None
+    assert "range not observable" in locate_text(result(ROW, few))
+    assert result(ROW, most).summary()["range_m"] == pytest.approx(2.0)
+    assert result(ROW, most).summary()["observable"] == ["bearing", "range"]
+
+
+def test_nothing_heard():
+    silent = result(SQUARE, [])
+    assert silent.summary()["bearing_deg"] is None
+    assert silent.summary()["observable"] == []
+    assert "nothing to locate" in locate_text(silent)
+    assert len(plot_locate(silent).axes) == 1
+
+
+def test_picture_and_files(tmp_path):
+    estimates = [
+        estimate(0.1 * k, math.copysign(179.0, k % 2 - 0.5), 20.0) for k in range(9)
+    ]
+    found = result(SQUARE, estimates)
+    figure = plot_locate(found)
+    bearing, elevation, plan = figure.axes
+    assert bearing.get_ylabel() == "bearing (deg)"
+    assert elevation.get_ylabel() == "elevation (deg)"
+    # Estimates near 180 deg stay together.
+    low, high = bearing.get_ylim()
+    assert high - low < 10.0
+    assert plan.get_aspect() == 1.0
+    assert "range not observable" in figure.get_suptitle()
+    write_locate(found, found.to_dict(), tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {"locate.json", "locate.png"}
+    document = json.loads((tmp_path / "locate.json").read_text())
+    assert document["summary"]["elevation_deg"] == pytest.approx(20.0)

@@ -1,0 +1,77 @@
+"""Which faults are mended, which are said, and which end the work."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.recordings.channel_faults import ChannelFault
+from analysis.recordings.recording_faults import channels_without_faults
+
+SAMPLES = np.arange(12.0).reshape(3, 4) - 5.0
+
+
+def fault(kind, *channels):
+    return ChannelFault(kind, channels, f"{kind} {channels}")
+
+
+def agrees_with(order):
+    """Channels agree best in this order."""
+
+    def agreement(channels):
+        return -float(np.abs(channels - SAMPLES[list(order)]).sum())
+
+    return agreement
+
+
+AS_GIVEN = agrees_with([0, 1, 2])
+
+
+@pytest.mark.parametrize("kind", ["nan", "dead", "copied", "units"])
+def test_nothing_to_locate_with(kind):
+    with pytest.raises(ValueError, match=rf"a.wav: {kind} \(1,\)"):
+        channels_without_faults(
+            SAMPLES, [fault(kind, 1)], agrees_with([0, 1, 2]), "a.wav"
+        )
+
+
+def test_all_channels_that_are_of_no_use_are_named():
+    found = [fault("dead", 1), fault("clipped", 0), fault("copied", 0, 2)]
+    with pytest.raises(ValueError, match=r"dead \(1,\); see to channels 1, 3 as well"):
+        channels_without_faults(SAMPLES, found, AS_GIVEN, "")
+
+
+def test_a_message_names_a_few_of_many_channels():
+    found = [fault("copied", 0, k) for k in range(1, 64)]
+    with pytest.raises(
+        ValueError, match=r"see to channels 1, 3, 4, .*\.\.\."
+    ) as caught:
+        channels_without_faults(SAMPLES, found, AS_GIVEN, "")
+    assert len(str(caught.value)) < 100
+
+
+@pytest.mark.parametrize("kind", ["late", "size", "geometry"])
+def test_doubtful_estimates_are_said(kind):
+    samples, faults = channels_without_faults(SAMPLES, [fault(kind, 1)], AS_GIVEN, "")
+    np.testing.assert_array_equal(samples, SAMPLES)
+    assert [f.kind for f in faults] == [kind]
+
+
+def test_inverted_channel_is_turned_back_and_said():
+    turned = SAMPLES * [[1.0], [1.0], [-1.0]]
+    samples, faults = channels_without_faults(
+        turned, [fault("inverted", 2), fault("clipped", 0)], AS_GIVEN, ""
+    )
+    np.testing.assert_array_equal(samples, SAMPLES)
+    assert [f.kind for f in faults] == ["inverted", "clipped"]
+
+
+def test_exchanged_channels_need_a_second_witness():
+    found = [fault("swapped", 0, 2)]
+    with pytest.raises(ValueError, match="swapped"):
+        channels_without_faults(SAMPLES, found, agrees_with([2, 1, 0]), "")
+    samples, faults = channels_without_faults(
+        SAMPLES, found, agrees_with([0, 1, 2]), ""
+    )
+    np.testing.assert_array_equal(samples, SAMPLES)
+    assert faults == []

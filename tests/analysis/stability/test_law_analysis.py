@@ -1,0 +1,98 @@
+"""Parts of an analysis, and the page and the document that they make."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+
+from analysis.reporting.html_page import paragraph
+from analysis.stability.law_analysis import Part, analyse_law, chosen_laws
+from analysis.stability.report_files import stability_document, stability_text
+from analysis.stability.report_page import stability_page
+from analysis.stability.verdicts import Criterion, judge
+from diagrams import load_scenario
+from systems.framework.input_error import InputError
+
+LIGHT = Criterion("mass", "kg", "below", 4.0, "light", "heavy", "a test")
+
+
+def render(data, name):
+    return [paragraph(f"{name}: {data}")]
+
+
+def refuse(study):
+    raise InputError("law", "cannot; choose another")
+
+
+MASS = Part("mass", "Mass", lambda study: study.scenario.robot.mass_kg, render)
+TWICE = Part("twice", "Twice", lambda study: 2.0 * study.need("mass"), render)
+BUILT = Part("built", "Built", lambda study: study.need("refused"), render)
+REFUSED = Part("refused", "Refused", refuse, render)
+VERDICTS = Part(
+    "verdicts", "Verdicts", lambda study: (judge(LIGHT, study.found["mass"]),), render
+)
+SPREAD = Part(
+    "spread", "Spread", lambda study: 1.5, render, document=lambda x: {"a": x, "b": 2}
+)
+
+
+def test_parts_run_in_order_and_see_what_was_found():
+    titles: list[str] = []
+    analysis = analyse_law(
+        load_scenario(), [MASS, REFUSED, TWICE, BUILT], step=titles.append
+    )
+    assert titles == ["Mass", "Refused", "Twice", "Built"]
+    assert analysis.data("twice") == 2.0 * 3.94
+    assert analysis.findings["refused"].problem == "law: cannot; choose another"
+    assert analysis.data("refused") is None
+    assert analysis.findings["built"].problem.startswith("refused: has no result")
+
+
+def test_nothing_stands_without_the_first_part():
+    with pytest.raises(ValueError, match="law: cannot"):
+        analyse_law(load_scenario(), [REFUSED, MASS])
+
+
+def test_laws_are_chosen_once_each():
+    base = load_scenario("default", ["law=none", "seed=3"])
+    assert [s.law for s in chosen_laws(base, [])] == ["none"]
+    chosen = chosen_laws(base, ["active", "all"])
+    assert [s.law for s in chosen] == [
+        "active",
+        "conventional",
+        "conventional2017",
+        "active2017",
+    ]
+    assert {s.seed for s in chosen} == {3}
+    with pytest.raises(InputError, match="law: 'magic'"):
+        chosen_laws(base, ["magic"])
+
+
+def test_document_of_one_law_has_its_parts_at_the_top():
+    analysis = analyse_law(load_scenario(), [MASS, REFUSED, SPREAD, VERDICTS])
+    document = stability_document([analysis], None)
+    assert document["law"] == "active"
+    assert document["mass"] == 3.94
+    assert document["refused"] == {"problem": "law: cannot; choose another"}
+    assert (document["a"], document["b"]) == (1.5, 2)
+    assert document["verdicts"][0]["verdict"] == "pass"
+    assert document["model"]["seed"] == 1
+    assert "mass" in stability_text(document)
+
+
+def test_page_of_several_laws():
+    parts = [MASS, REFUSED, VERDICTS]
+    analyses = [
+        analyse_law(each, parts)
+        for each in chosen_laws(load_scenario(), ["conventional", "active"])
+    ]
+    page = stability_page(analyses)
+    ids = re.findall(r'\bid="([^"]+)"', page)
+    assert len(ids) == len(set(ids))
+    assert set(re.findall(r'href="#([^"]+)"', page)) <= set(ids)
+    assert page.count("Not computed: law: cannot; choose another.") == 2
+    assert "law0-mass: 3.94" in page
+    assert "All: light." not in page
+    assert "conventional and active: light." in page
+    assert not re.findall(r'(?:src|href)="(?!#|data:)', page)

@@ -1,0 +1,150 @@
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+from scipy import stats
+
+from analysis.sweeps.estimates import (
+    QUANTITIES,
+    Quantity,
+    cell_label,
+    ended,
+    marginal,
+    shown,
+)
+from analysis.sweeps.page import sweep_page
+from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.summary import sweep_summary, sweep_text
+
+SUCCESS, COLLISION, CLEARANCE, _ = QUANTITIES
+SPEED, X = "source.speed_m_s", "obstacles.0.waypoints_m"
+PLACES = [[[2.0, 1.0]], [[3.0, 1.0]]]
+
+
+def made_up(**changes):
+    """A plan, its points and results in which clearance is twice the speed."""
+    plan = SweepPlan.model_validate(
+        {
+            "grid": {"law": ["none", "active"], "duration_s": [10.0, 20.0, 30.0]},
+            "draw": {SPEED: {"uniform": [0.1, 0.5]}, X: {"choice": PLACES}},
+            "runs": 40,
+            **changes,
+        }
+    )
+    points = plan.points()
+    table = pd.DataFrame(
+        {
+            "index": [point.index for point in points],
+            "cell": [point.cell for point in points],
+            "run": [point.run for point in points],
+            "seed": [point.seed for point in points],
+            "redraws": 0,
+            "law": [point.fields.get("law", "none") for point in points],
+            SPEED: [point.fields[SPEED] for point in points],
+            X: [str(point.fields[X]) for point in points],
+            "cause": "completed",
+            "collision_object": None,
+            "collision_fault": None,
+            "minimum_clearance_m": [2.0 * point.fields[SPEED] for point in points],
+            "simulated_s": 10.0,
+            "wall_s": 0.1,
+            "error": None,
+        }
+    )
+    active = (table["law"] == "active") & (table["run"] < 10)
+    table.loc[active, ["cause", "collision_object", "collision_fault"]] = [
+        "collision",
+        "box",
+        "robot",
+    ]
+    failed = table["index"] == 0
+    table.loc[failed, "cause"] = "failed"
+    table.loc[failed, "minimum_clearance_m"] = np.nan
+    table.loc[failed, "error"] = "ValueError: <broken>"
+    return plan, points, table
+
+
+def test_rates_count_runs_that_ended():
+    _, _, table = made_up()
+    runs = ended(table)
+    assert len(runs) == 239
+    value, low, high = COLLISION.estimate(runs)
+    assert value == 30 / 239
+    reference = stats.binomtest(30, 239).proportion_ci(method="wilson")
+    assert (low, high) == pytest.approx((reference.low, reference.high))
+    assert SUCCESS.estimate(runs).value == 209 / 239
+
+
+def test_medians_leave_out_missing_values():
+    values = [3.0, np.nan, 1.0, 2.0]
+    runs = pd.DataFrame({"cause": "reached", "time": values})
+    estimate = Quantity("time", "time", metric="time").estimate(runs)
+    assert estimate == (2.0, 1.0, 3.0)
+    assert np.isnan(Quantity("x", "x", metric="x").estimate(runs)).all()
+    assert np.isnan(SUCCESS.estimate(runs.iloc[:0])).all()
+    assert shown(SUCCESS, SUCCESS.estimate(runs)) == "100 % (51 to 100)"
+    assert shown(SUCCESS, SUCCESS.estimate(runs.iloc[:0])) == "-"
+
+
+def test_marginal_of_a_number_follows_it():
+    plan, _, table = made_up()
+    found = marginal(plan, SPEED, ended(table), CLEARANCE)
+    assert len(found.places) == 8
+    medians = [estimate.value for estimate in found.estimates]
+    np.testing.assert_allclose(medians, 2.0 * found.places)
+    assert np.all(np.diff(found.places) > 0.0)
+
+
+def test_marginal_of_a_choice_has_its_values():
+    plan, _, table = made_up()
+    found = marginal(plan, X, ended(table), SUCCESS)
+    assert found.labels == ("[[2.0, 1.0]]", "[[3.0, 1.0]]")
+    for label, estimate in zip(found.labels, found.estimates, strict=True):
+        runs = table[(table[X] == label) & (table["cause"] != "failed")]
+        assert estimate.value == (runs["cause"] == "completed").mean()
+
+
+def test_labels_are_short():
+    assert cell_label({"repulsion.term": "printed", "a.b": [1, 2]}) == (
+        "term printed, b [1, 2]"
+    )
+    assert cell_label({}) == "all runs"
+
+
+def test_summary_counts_and_names_failures(tmp_path):
+    plan, points, table = made_up()
+    summary = sweep_summary(plan, points, table, tmp_path)
+    assert (summary["runs"], summary["failed"]) == (240, 1)
+    causes = [cell["causes"] for cell in summary["cells"]]
+    assert causes == [
+        {"completed": 39, "failed": 1},
+        {"completed": 40},
+        {"completed": 40},
+        *[{"completed": 30, "collision": 10}] * 3,
+    ]
+    (failure,) = summary["failures"]
+    assert failure["seed"] == points[0].seed
+    assert f"--seed {points[0].seed}" in failure["command"]
+    metrics = summary["cells"][0]["metrics"]
+    assert set(metrics) == {"minimum_clearance_m", "simulated_s"}
+    assert "1 of 240 runs failed" in sweep_text(plan, table)
+
+
+@pytest.mark.parametrize(
+    ("changes", "figures"),
+    [
+        ({}, 3),
+        ({"grid": {"law": ["none", "active"]}}, 3),
+        ({"grid": {}}, 2),
+        ({"grid": {"law": ["none", "active"], "duration_s": [1, 2],
+                   "attraction.stiffness_n_m": [1, 2, 3]}}, 4),
+    ],
+)  # fmt: skip
+def test_page_has_a_figure_for_each_field(tmp_path, changes, figures):
+    plan, points, table = made_up(**changes)
+    summary = sweep_summary(plan, points, table, tmp_path)
+    page = sweep_page(plan, points, table, summary)
+    assert page.count("<figure>") == figures
+    assert "ValueError: &lt;broken&gt;" in page
+    assert "<broken>" not in page

@@ -1,0 +1,143 @@
+"""From acceleration to wheels: P must move as the virtual mass does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from systems.base.diff_drive_plant import (
+    PlantNumbers,
+    PlantParameters,
+    body_twist,
+    plant_derivatives,
+)
+from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import (
+    WheelSpeedCommand,
+    hand_position_twist,
+    integrate_velocity,
+    limited_wheel_speeds,
+)
+from systems.world.geometry import control_point
+
+ROBOT = RobotParameters()
+angle = st.floats(-math.pi, math.pi)
+
+
+def wheels_for(v_WP, theta):
+    v, omega = hand_position_twist(v_WP, theta, 0.175)
+    return limited_wheel_speeds(v, omega, ROBOT)
+
+
+@given(angle, angle, st.floats(0.0, 0.2))
+def test_control_point_moves_with_the_virtual_mass(theta, direction, speed):
+    """P differentiated through the plant, its motors settled."""
+    v_WP = (speed * math.cos(direction), speed * math.sin(direction))
+    wheels = wheels_for(v_WP, theta)
+    state = np.array([0.3, -0.2, theta, 0.0, 0.0, *wheels])
+    numbers = PlantNumbers.of(ROBOT, PlantParameters())
+    rates = plant_derivatives(np.array(state), np.array(wheels), *numbers)
+    h = 1e-6
+    ahead = control_point((state + h * rates)[:3], 0.175)
+    behind = control_point((state - h * rates)[:3], 0.175)
+    v_P = np.subtract(ahead, behind) / (2 * h)
+    np.testing.assert_allclose(v_P, v_WP, atol=1e-8)
+
+
+def test_sideways_motion_turns_on_the_spot():
+    v, omega = hand_position_twist((0.0, 0.1), 0.0, 0.2)
+    assert (v, omega) == (0.0, pytest.approx(0.5))
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(-9, 9), st.floats(-9, 9))
+def test_speed_is_clamped_in_its_direction(vx, vy, ax, ay):
+    free = np.array([vx + 0.025 * ax, vy + 0.025 * ay])
+    clamped = np.array(integrate_velocity((vx, vy), (ax, ay), 0.025, 0.72))
+    speed = np.linalg.norm(free)
+    expected = free if speed <= 0.72 else free * 0.72 / speed
+    np.testing.assert_allclose(clamped, expected, atol=1e-11)
+
+
+@given(st.floats(-2, 2), st.floats(-10, 10))
+def test_wheel_limit_keeps_the_curvature(v, omega):
+    wheels = limited_wheel_speeds(v, omega, ROBOT)
+    assert max(map(abs, wheels)) <= 12.0 + 1e-12
+    limited_v, limited_omega = body_twist(wheels, ROBOT)
+    assert limited_v * omega == pytest.approx(v * limited_omega, abs=1e-12)
+    assert limited_v * v >= 0.0
+    assert limited_omega * omega >= 0.0
+
+
+@given(st.floats(-0.3, 0.3), st.floats(-1, 1))
+def test_wheels_within_the_limit_give_the_twist(v, omega):
+    twist = body_twist(limited_wheel_speeds(v, omega, ROBOT), ROBOT)
+    assert twist == pytest.approx((v, omega), abs=1e-12)
+
+
+def test_a_full_turn_to_the_side_is_scaled():
+    """P at top speed across: 4.11 rad/s would need 14.06 rad/s of each wheel."""
+    left, right = wheels_for((0.0, 0.72), 0.0)
+    assert (left, right) == (pytest.approx(-12.0), pytest.approx(12.0))
+
+
+def test_acts_from_the_tick_on_and_not_before(bench):
+    at = bench(
+        WheelSpeedCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0]
+    )
+    np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
+    at.tick()
+    np.testing.assert_allclose(at.output("v_WP"), [0.05, 0.0])
+    np.testing.assert_allclose(at.output("wheel_speeds"), [0.05 / 0.06] * 2)
+
+
+def test_constant_push_does_not_wind_up(bench):
+    at = bench(
+        WheelSpeedCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0]
+    )
+    for _ in range(100):
+        at.tick()
+    assert at.output("v_WP")[0] == pytest.approx(0.72)
+    at.block.GetInputPort("acceleration_W").FixValue(at.context, [-2.0, 0.0])
+    at.tick()
+    assert at.output("v_WP")[0] == pytest.approx(0.67)
+
+
+def test_own_dimensions_are_used(bench):
+    robot = RobotParameters(
+        wheel_radius_m=0.1, wheel_separation_m=0.5, control_point_m=0.25
+    )
+    at = bench(
+        WheelSpeedCommand(robot=robot),
+        acceleration_W=[4.0, 2.0],
+        pose_WB_estimated=[0, 0, 0],
+    ).tick()
+    # v = 0.1, omega = 0.05 / 0.25 = 0.2: rims at 0.1 -+ 0.05.
+    np.testing.assert_allclose(at.output("wheel_speeds"), [0.5, 1.5])
+
+
+@pytest.mark.parametrize(
+    "point",
+    [
+        [0.1, -0.05, 0.5, 0.3, 0.4],
+        [0.6, 0.5, 2.0, -1.0, 0.6],
+        [0.1, 0.7, 0.5, 0.3, -0.4],
+    ],
+)
+def test_gradient(bench, check_gradient, point):
+    """Free, clamped, and with the wheels scaled."""
+
+    def respond(block, x):
+        at = bench(
+            block,
+            state=[x[0], x[1], 0.0, 0.0],
+            acceleration_W=x[2:4],
+            pose_WB_estimated=[0.0, 0.0, x[4]],
+        )
+        return [*at.updated(), *at.output("v_WP")]
+
+    robot = RobotParameters(control_point_m=0.2, top_speed_m_s=0.7)
+    check_gradient(WheelSpeedCommand(robot=robot), respond, point)

@@ -1,0 +1,162 @@
+"""Exact hearing: geometry, the tick of latency, the gate, the noise."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from systems.base.robot import RobotParameters
+from systems.hearing.ideal_source_sensor import (
+    IdealHearingParameters,
+    IdealSourceSensor,
+    relative_position,
+)
+from systems.sound.waveforms import SoundParameters
+
+ALWAYS = IdealHearingParameters(burst_gaps=False)
+place = st.floats(-5.0, 5.0)
+angle = st.floats(-3.0, 3.0)
+
+#: P at (1, 1.175), facing north; the source 2 m ahead and 1 m to the left.
+POSES = {"pose_WB": [1.0, 1.0, math.pi / 2], "pose_WS": [0.0, 3.175, 0.3]}
+
+
+def test_position_bearing_and_range_a_tick_later(bench):
+    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES)
+    assert at.output("detected")[0] == 0.0
+    at.tick()
+    np.testing.assert_allclose(at.output("p_PS_B"), [2.0, 1.0], atol=1e-12)
+    assert at.output("source_bearing")[0] == pytest.approx(math.atan2(1, 2))
+    assert at.output("source_range")[0] == pytest.approx(math.sqrt(5))
+    assert at.output("detected")[0] == at.output("range_valid")[0] == 1.0
+
+
+def test_present_poses_do_not_show_before_the_tick(bench):
+    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES).tick()
+    port = at.block.GetInputPort("pose_WS")
+    port.FixValue(at.context, [9.0, 9.0, 0.0])
+    np.testing.assert_allclose(at.output("p_PS_B"), [2.0, 1.0], atol=1e-12)
+    at.tick()
+    np.testing.assert_allclose(at.output("p_PS_B"), [7.825, -8.0], atol=1e-12)
+
+
+def test_tells_front_from_back(bench):
+    poses = {"pose_WB": [0, 0, 0], "pose_WS": [-1.825, 0.5, 0]}
+    at = bench(IdealSourceSensor(hearing=ALWAYS), **poses).tick()
+    np.testing.assert_allclose(at.output("p_PS_B"), [-2.0, 0.5], atol=1e-12)
+    assert abs(at.output("source_bearing")[0]) > math.pi / 2
+
+
+@given(place, place, angle, place, place, angle, place, place)
+def test_relative_position_does_not_depend_on_the_frame(x, y, th, xs, ys, turn, dx, dy):
+    here = relative_position((x, y, th), (xs, ys), 0.175)
+    c, s = math.cos(turn), math.sin(turn)
+
+    def moved(a, b):
+        return c * a - s * b + dx, s * a + c * b + dy
+
+    there = relative_position((*moved(x, y), th + turn), moved(xs, ys), 0.175)
+    assert there == pytest.approx(here, abs=1e-9)
+
+
+def heard_ticks(bench, ticks: int, **gate) -> list[int]:
+    """Ticks whose update hears the source."""
+    at = bench(IdealSourceSensor(**gate), **POSES)
+    heard = []
+    for tick in range(ticks):
+        at.context.SetTime(tick * 0.025)
+        if at.updated()[2] > 0.5:
+            heard.append(tick)
+    return heard
+
+
+def test_hears_the_frames_that_end_within_the_burst(bench):
+    """0.5 s in 2 s: frames 1 to 20, then 81 to 100."""
+    expected = [*range(1, 21), *range(81, 101)]
+    assert heard_ticks(bench, 140) == expected
+
+
+def test_gate_is_set_by_its_parameters(bench):
+    heard = heard_ticks(
+        bench, 90, sound=SoundParameters(on_s=0.1, period_s=1.0, start_s=0.5)
+    )
+    assert heard == [*range(21, 25), *range(61, 65)]
+
+
+def test_a_source_too_far_is_not_heard(bench):
+    hearing = IdealHearingParameters(burst_gaps=False, maximum_range_m=2.2)
+    at = bench(IdealSourceSensor(hearing=hearing), **POSES)
+    np.testing.assert_array_equal(at.updated(), [0, 0, 0])
+
+
+def test_noise_has_the_covariance_that_the_block_gives(bench):
+    """First-order covariance of a bearing (2 deg) and a range (5 %) at 2.24 m."""
+    hearing = IdealHearingParameters(
+        burst_gaps=False, bearing_noise_deg=2.0, range_noise_fraction=0.05
+    )
+    at = bench(IdealSourceSensor(hearing=hearing, seed=5), **POSES)
+    samples = []
+    for tick in range(3000):
+        at.context.SetTime(tick * 0.025)
+        samples.append(at.updated()[:2])
+    measured = np.cov(np.transpose(samples))
+    axis = np.array([2.0, 1.0]) / math.sqrt(5)
+    across = np.array([-axis[1], axis[0]])
+    along_std = 0.05 * math.sqrt(5)
+    across_std = math.radians(2.0) * math.sqrt(5)
+    expected = np.outer(axis, axis) * along_std**2
+    expected += np.outer(across, across) * across_std**2
+    np.testing.assert_allclose(measured, expected, atol=0.15 * along_std**2)
+
+    at.context.SetDiscreteState(0, [2.0, 1.0])
+    at.context.SetDiscreteState(1, [1.0])
+    np.testing.assert_allclose(at.output("covariance"), expected.ravel())
+    np.testing.assert_allclose(np.mean(samples, axis=0), [2.0, 1.0], atol=0.01)
+
+
+def test_noise_is_the_seed_s_and_the_tick_s(bench):
+    hearing = IdealHearingParameters(burst_gaps=False, range_noise_fraction=0.1)
+
+    def heard(seed, tick):
+        block = IdealSourceSensor(hearing=hearing, seed=seed)
+        return tuple(bench(block, time=0.025 * tick, **POSES).updated())
+
+    assert heard(1, 7) == heard(1, 7)
+    assert len({heard(1, 7), heard(1, 8), heard(2, 7)}) == 3
+
+
+def test_exact_hearing_claims_no_error(bench):
+    at = bench(IdealSourceSensor(hearing=ALWAYS), **POSES).tick()
+    np.testing.assert_array_equal(at.output("covariance"), np.zeros(4))
+
+
+def test_noise_has_no_derivative():
+    hearing = IdealHearingParameters(bearing_noise_deg=1.0)
+    with pytest.raises(ValueError, match="set bearing_noise_deg and range_noise"):
+        IdealSourceSensor(hearing=hearing).ToAutoDiffXd()
+
+
+def test_gradient_of_the_measurement(bench, check_gradient):
+    def respond(block, x):
+        at = bench(block, pose_WB=x[:3], pose_WS=[x[3], x[4], 0.0], time=0.1)
+        return at.updated()
+
+    robot = RobotParameters(control_point_m=0.2)
+    block = IdealSourceSensor(
+        robot=robot, sound=SoundParameters(on_s=0.2, period_s=1.0)
+    )
+    check_gradient(block, respond, [0.3, -0.2, 0.8, 2.0, 1.1])
+
+
+def test_gradient_of_the_outputs(bench, check_gradient):
+    names = ("source_bearing", "source_range", "p_PS_B", "covariance")
+
+    def respond(block, x):
+        at = bench(block, state=[x[0], x[1], 1.0], **POSES)
+        return [value for name in names for value in at.output(name)]
+
+    check_gradient(IdealSourceSensor(), respond, [1.4, -0.9])

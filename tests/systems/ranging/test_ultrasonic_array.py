@@ -1,0 +1,164 @@
+"""Range finders: cones in closed form, limits, noise, order of firing."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from systems.ranging.ultrasonic_array import UltrasonicArray, UltrasonicParameters
+from systems.sound.acoustics import AcousticParameters
+
+QUIET = UltrasonicParameters(noise_m=0.0)
+FAR = [50.0, 0.0, 0.0]
+
+
+def make_array(parameters=QUIET, **settings) -> UltrasonicArray:
+    return UltrasonicArray(parameters=parameters, obstacle_count=1, **settings)
+
+
+def wall_ahead(distance: float, *, pose_WB=(0.0, 0.0, 0.0)) -> dict[str, object]:
+    """Inputs for a long wall at a distance ahead of P."""
+    x, y, theta = pose_WB
+    ahead = 0.175 + distance + 0.5
+    pose = [x + ahead * math.cos(theta), y + ahead * math.sin(theta), theta]
+    sizes = [1.0, 30.0]
+    return {"pose_WB": pose_WB, "poses_WO": pose, "sizes": sizes, "pose_WS": FAR}
+
+
+@pytest.mark.parametrize("pose_WB", [(0.0, 0.0, 0.0), (-1.0, 2.0, 2.5)])
+def test_wall_across_the_path(bench, pose_WB):
+    """The side cones see the wall along their inner borders, 15 deg off."""
+    at = bench(make_array(), **wall_ahead(1.2, pose_WB=pose_WB))
+    side = 1.2 / math.cos(math.radians(15))
+    np.testing.assert_allclose(at.output("ranges"), [side, 1.2, side])
+    np.testing.assert_array_equal(at.output("echo"), [1, 1, 1])
+
+
+def test_left_sensor_comes_first(bench):
+    left = [0.175 + math.cos(math.pi / 6), math.sin(math.pi / 6), math.pi / 6]
+    at = bench(
+        make_array(),
+        pose_WB=[0, 0, 0],
+        poses_WO=left,
+        sizes=[0.2, 0.2],
+        pose_WS=FAR,
+    )
+    np.testing.assert_array_equal(at.output("echo"), [1, 0, 0])
+    assert at.output("ranges")[0] == pytest.approx(0.9)
+
+
+def test_master_robot_is_seen(bench):
+    at = bench(
+        make_array(source_size=(0.326, 0.352)),
+        pose_WB=[0, 0, 0],
+        poses_WO=FAR,
+        sizes=[0.1, 0.1],
+        pose_WS=[1.5, 0.0, 0.0],
+    )
+    assert at.output("ranges")[1] == pytest.approx(1.5 - 0.163 - 0.175)
+
+
+@pytest.mark.parametrize(
+    ("distance", "reading", "echo"),
+    [
+        (2.99, 2.99, 1),
+        (3.01, 3.0, 0),
+        (0.03, 0.03, 1),
+        (0.01, 0.03, 1),
+        (-0.2, 0.03, 1),
+    ],
+)
+def test_limits(bench, distance, reading, echo):
+    """Nothing near enough is no echo; too near, inside even, reads 3 cm."""
+    at = bench(make_array(), **wall_ahead(distance))
+    assert at.output("ranges")[1] == pytest.approx(reading)
+    assert at.output("echo")[1] == echo
+
+
+def test_time_of_flight_at_the_true_speed_of_sound(bench):
+    """Sensors that assume 340 m/s in air of 25 deg C (346.5 m/s) read short."""
+    parameters = UltrasonicParameters(noise_m=0.0, assumed_sound_speed_m_s=340.0)
+    warm = AcousticParameters(temperature_c=25.0)
+    at = bench(make_array(parameters, acoustics=warm), **wall_ahead(1.2))
+    assert at.output("ranges")[1] == pytest.approx(1.2 * 340.0 / 346.5)
+    at = bench(make_array(acoustics=warm), **wall_ahead(1.2))
+    assert at.output("ranges")[1] == pytest.approx(1.2)
+
+
+def readings(bench, parameters, ticks: int, *, seed: int = 3) -> np.ndarray:
+    at = bench(make_array(parameters, seed=seed), **wall_ahead(1.0))
+    rows = []
+    for tick in range(ticks):
+        at.context.SetTime(tick * 0.025)
+        rows.append(np.r_[at.output("ranges"), at.output("echo")])
+    return np.array(rows)
+
+
+def test_noise_has_the_set_deviation(bench):
+    noisy = readings(bench, UltrasonicParameters(noise_m=0.02), 1500)[:, :3]
+    side = 1.0 / math.cos(math.radians(15))
+    errors = noisy - [side, 1.0, side]
+    # Five standard errors of a mean and of a deviation from 4500 draws.
+    assert abs(errors.mean()) < 5 * 0.02 / math.sqrt(4500)
+    assert errors.std() == pytest.approx(0.02, rel=5 / math.sqrt(2 * 4500))
+    correlation = np.corrcoef(errors.T)[np.triu_indices(3, 1)]
+    assert np.all(np.abs(correlation) < 5 / math.sqrt(1500))
+
+
+def test_dropouts_come_at_the_set_rate(bench):
+    rows = readings(bench, UltrasonicParameters(dropout_probability=0.3), 1500)
+    echo = rows[:, 3:]
+    assert (1 - echo).mean() == pytest.approx(0.3, abs=5 * math.sqrt(0.21 / 4500))
+    np.testing.assert_array_equal(rows[:, :3][echo == 0], 3.0)
+
+
+def test_seed_decides_the_noise(bench):
+    parameters = UltrasonicParameters(noise_m=0.02)
+    first, again = (readings(bench, parameters, 20) for _ in range(2))
+    other = readings(bench, parameters, 20, seed=4)
+    np.testing.assert_array_equal(first, again)
+    assert not np.any(first[:, :3] == other[:, :3])
+
+
+def test_sensors_fire_one_after_the_other(bench):
+    parameters = UltrasonicParameters(noise_m=0.0, firing="sequential")
+    at = bench(make_array(parameters), **wall_ahead(1.0))
+    side = 1.0 / math.cos(math.radians(15))
+    expected = [
+        ([side, 3.0, 3.0], [1, 0, 0]),
+        ([side, 1.0, 3.0], [1, 1, 0]),
+        ([side, 1.0, side], [1, 1, 1]),
+    ]
+    for ranges, echo in expected:
+        np.testing.assert_allclose(at.output("ranges"), ranges)
+        np.testing.assert_array_equal(at.output("echo"), echo)
+        at.tick()
+
+
+def test_a_sensor_keeps_its_reading_until_it_fires_again(bench):
+    parameters = UltrasonicParameters(noise_m=0.0, firing="sequential")
+    at = bench(make_array(parameters), **wall_ahead(1.0)).tick().tick().tick()
+    nearer = wall_ahead(0.5)
+    port = at.block.GetInputPort("poses_WO")
+    port.FixValue(at.context, nearer["poses_WO"])
+    side = 1.0 / math.cos(math.radians(15))
+    np.testing.assert_allclose(at.output("ranges"), [side / 2, 1.0, side])
+    at.tick()
+    np.testing.assert_allclose(at.output("ranges"), [side / 2, 0.5, side])
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ({"minimum_range_m": 3.0}, "minimum_range_m: 3.0 must be below"),
+        ({"axes_deg": (-30.0, 0.0, 30.0)}, "axes_deg: .* must fall from left"),
+        ({"beam_half_angle_deg": 90.0}, "less than 90"),
+        ({"dropout_probability": 1.5}, "less than or equal to 1"),
+    ],
+)
+def test_impossible_sensors_are_refused(settings, message):
+    with pytest.raises(ValidationError, match=message):
+        UltrasonicParameters(**settings)

@@ -1,0 +1,164 @@
+"""Ego noise: level, colour, coherence and seam of a recording that repeats."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy.signal
+import soundfile
+from hypothesis import given
+from hypothesis import strategies as st
+from pydrake.common.value import Value
+
+from systems.base.robot import RobotParameters
+from systems.framework.signals import FRAME_PERIOD_S, FRAME_SAMPLES
+from systems.sound.adc import MicArrayParameters
+from systems.sound.ego_noise import EgoNoise, driving_share
+from systems.sound.mic_array import MicArray
+from systems.sound.sound_emitter import make_emission
+from systems.sound.waveforms import SoundParameters, make_waveform
+
+RATE = 16_000
+ROBOT = RobotParameters()
+
+
+def recording(path, *, channels=1, seconds=1.0, low_hz=300.0, high_hz=600.0):
+    """Noise between two frequencies."""
+    sections = scipy.signal.butter(
+        4, (low_hz, high_hz), "bandpass", fs=RATE, output="sos"
+    )
+    white = np.random.default_rng(0).standard_normal((round(seconds * RATE), channels))
+    soundfile.write(path, 0.3 * scipy.signal.sosfilt(sections, white, axis=0), RATE)
+    return str(path)
+
+
+def ego_noise(file, *, snr_db=0.0, at_rest=1.0, count=3, seed=4):
+    parameters = MicArrayParameters(
+        ego_noise_file=file,
+        ego_noise_snr_db_at_1m=snr_db,
+        ego_noise_share_at_rest=at_rest,
+    )
+    return EgoNoise(parameters, count, seed)
+
+
+def played(noise, ticks):
+    return np.concatenate([noise.frame(tick, 1.0) for tick in range(1, ticks + 1)], 1)
+
+
+def test_level_is_below_the_source_at_one_metre(tmp_path):
+    noise = ego_noise(recording(tmp_path / "fan.wav"), snr_db=20.0, at_rest=0.25)
+    rms = np.std(played(noise, 38))  # once through
+    assert rms == pytest.approx(0.1, rel=0.02)
+    resting, half = noise.frame(7, 0.0), noise.frame(7, 0.5)
+    fast = noise.frame(7, 1.0)
+    np.testing.assert_allclose(resting, 0.25 * fast, rtol=1e-6)
+    np.testing.assert_allclose(half, 0.625 * fast, rtol=1e-6)
+
+
+def test_colour_is_that_of_the_recording(tmp_path):
+    noise = played(ego_noise(recording(tmp_path / "fan.wav", seconds=3.0)), 100)
+    frequencies, density = scipy.signal.welch(noise[0], 100_000, nperseg=8192)
+    band = (frequencies > 250.0) & (frequencies < 700.0)
+    assert density[band].sum() > 0.98 * density.sum()
+
+
+def test_one_channel_is_incoherent_at_the_microphones(tmp_path):
+    noise = played(ego_noise(recording(tmp_path / "fan.wav", seconds=3.0)), 100)
+    # 2.5 s of 300 Hz bandwidth: a correlation's error is 1 / sqrt(2 B T) = 3 %.
+    assert np.abs(np.corrcoef(noise) - np.eye(3)).max() < 0.12
+
+
+def test_a_channel_for_each_microphone_stays_coherent(tmp_path):
+    """The second channel follows the first by 10 samples, 0.625 ms."""
+    mono, _ = soundfile.read(recording(tmp_path / "fan.wav"))
+    rows = np.array([mono, np.roll(mono, 10), 0.5 * mono])
+    soundfile.write(tmp_path / "array.wav", rows.T, RATE, subtype="FLOAT")
+    noise = played(ego_noise(str(tmp_path / "array.wav")), 30)
+    late = 62  # samples at 100 kHz, and a half
+    middle = 0.5 * (noise[0, 1000:-1000] + noise[0, 999:-1001])
+    follower = noise[1, 1000 + late : -1000 + late]
+    assert np.corrcoef(middle, follower)[0, 1] > 0.999
+    np.testing.assert_allclose(noise[2], 0.5 * noise[0], atol=1e-4)
+
+
+def test_it_repeats_without_a_seam(tmp_path):
+    """0.25 s less the fade are eight frames; nothing clicks at their joints."""
+    noise = played(ego_noise(recording(tmp_path / "fan.wav", seconds=0.25)), 24)
+    np.testing.assert_array_equal(noise[:, : 8 * FRAME_SAMPLES], noise[:, -20_000:])
+    smooth = scipy.signal.sosfiltfilt(
+        scipy.signal.butter(4, 2_000.0, fs=100_000, output="sos"), noise
+    )
+    # Above 2 kHz there is little of the recording; a jump would leave half its height.
+    assert np.abs(noise - smooth)[:, 2_000:-2_000].max() < 0.01
+
+
+def test_same_seed_same_noise(tmp_path):
+    file = recording(tmp_path / "fan.wav")
+    first, again, other = (ego_noise(file, seed=seed) for seed in (4, 4, 5))
+    np.testing.assert_array_equal(first.frame(9, 1.0), again.frame(9, 1.0))
+    assert np.abs(first.frame(9, 1.0) - other.frame(9, 1.0)).max() > 0.1
+
+
+def test_microphones_hear_it_beside_the_converters_noise(tmp_path):
+    """The source is silent and far below: ego noise at 14 dB, white noise at 40."""
+    parameters = MicArrayParameters(
+        ego_noise_file=recording(tmp_path / "fan.wav"),
+        ego_noise_snr_db_at_1m=14.0,
+        ego_noise_share_at_rest=0.5,
+        snr_db_at_1m=40.0,
+        adc_bits=16,
+    )
+    sound = SoundParameters(start_s=100.0)
+    block = MicArray(parameters=parameters, seed=3)
+    levels = []
+    for speed in (0.0, ROBOT.top_speed_m_s):
+        counts = []
+        for tick in range(8, 48):
+            time = tick * FRAME_PERIOD_S
+            p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
+            sent = make_emission(time, make_waveform(sound), sound, p_WS, v_WS)
+            context = block.CreateDefaultContext()
+            context.SetTime(time)
+            block.GetInputPort("emission").FixValue(context, Value(sent))
+            block.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
+            block.GetInputPort("velocity_WB").FixValue(context, [speed, 0.0, 0.0])
+            audio: Any = block.GetOutputPort("audio").Eval(context)
+            counts.append(audio.counts)
+        levels.append(np.std(counts) / parameters.counts_per_pa / sound.level_pa)
+    white, ego = 10 ** (-40 / 20), 10 ** (-14 / 20)
+    assert levels[0] == pytest.approx(np.hypot(white, 0.5 * ego), rel=0.03)
+    assert levels[1] == pytest.approx(np.hypot(white, ego), rel=0.03)
+
+
+@given(st.floats(-0.72, 0.72), st.floats(-3.5, 3.5), st.floats(-3.0, 3.0))
+def test_share_is_that_of_the_faster_wheel(speed, omega, heading):
+    velocity = [speed * np.cos(heading), speed * np.sin(heading), omega]
+    rims = [speed + side * omega * ROBOT.wheel_separation_m / 2 for side in (1, -1)]
+    expected = min(1.0, max(map(abs, rims)) / ROBOT.top_speed_m_s)
+    assert driving_share(velocity, ROBOT) == pytest.approx(expected)
+
+
+def too_short(path):
+    return recording(path, seconds=0.1)
+
+
+def constant(path):
+    soundfile.write(path, np.full(RATE, 0.3), RATE, subtype="FLOAT")
+    return str(path)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (str, "is not a file"),
+        (lambda path: recording(path, channels=2), "2 channels for 3 microphones"),
+        (too_short, r"lasts 0\.100 s"),
+        (constant, "nothing between 50 and 18000 Hz"),
+    ],
+)
+def test_unusable_recordings_are_refused(tmp_path, make, message):
+    file = make(tmp_path / "fan.wav")
+    with pytest.raises(ValueError, match=rf"microphones\.ego_noise_file.*{message}"):
+        ego_noise(file)

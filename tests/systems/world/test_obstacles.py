@@ -1,0 +1,69 @@
+"""Boxes: two of them, moving and at rest, in the ports' order."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from systems.world.obstacles import ObstacleParameters, Obstacles
+
+RESTING = ObstacleParameters(
+    name="box", waypoints_m=((3.0, -1.0),), heading_deg=30.0, size_m=(0.4, 0.1)
+)
+MOVING = ObstacleParameters(
+    name="cart",
+    waypoints_m=((0.0, 4.0), (0.0, 0.0)),
+    speed_m_s=0.5,
+    acceleration_m_s2=2.0,
+    size_m=(0.2, 0.3),
+)
+#: What a ramp costs, v^2 / 2a.
+RAMP_M = 0.0625
+
+
+def test_ports_hold_obstacle_after_obstacle(bench):
+    at = bench(Obstacles(obstacles=(RESTING, MOVING)), time=2.0)
+    poses = [3.0, -1.0, math.pi / 6, 0.0, 3.0 + RAMP_M, -math.pi / 2]
+    np.testing.assert_allclose(at.output("poses_WO"), poses, atol=1e-15)
+    velocities = [0.0, 0.0, 0.0, 0.0, -0.5, 0.0]
+    np.testing.assert_allclose(at.output("velocities_WO"), velocities, atol=1e-15)
+    np.testing.assert_array_equal(at.output("sizes"), [0.4, 0.1, 0.2, 0.3])
+
+
+def test_moving_boxes_follow_time_in_one_context(bench):
+    at = bench(Obstacles(obstacles=(MOVING,)), time=2.0)
+    at.output("poses_WO")
+    at.context.SetTime(4.0)
+    assert at.output("poses_WO")[1] == pytest.approx(2.0 + RAMP_M)
+
+
+def test_shuttling_box_returns(bench):
+    shuttle = MOVING.model_copy(update={"at_end": "shuttle"})
+    at = bench(Obstacles(obstacles=(shuttle,)), time=10.25)  # 8.25 s, 2 s back
+    np.testing.assert_allclose(
+        at.output("poses_WO"), [0.0, 1.0 - RAMP_M, -math.pi / 2], atol=1e-12
+    )
+    assert at.output("velocities_WO")[1] == pytest.approx(0.5)
+
+
+def test_no_obstacles_no_elements():
+    block = Obstacles()
+    ports = [block.get_output_port(k) for k in range(3)]
+    assert [port.size() for port in ports] == [0, 0, 0]
+
+
+def test_converted_block_has_the_same_boxes(bench):
+    block = Obstacles(obstacles=(RESTING, MOVING))
+    floats, duals = bench(block, time=2.0), bench(block.ToAutoDiffXd(), time=2.0)
+    for name in ("poses_WO", "velocities_WO", "sizes"):
+        values = [x.value() for x in duals.output(name)]
+        np.testing.assert_array_equal(values, floats.output(name))
+
+
+@pytest.mark.parametrize("size", [(0.0, 0.1), (0.1, -0.1)])
+def test_a_box_has_two_extents(size):
+    with pytest.raises(ValidationError, match="greater than"):
+        ObstacleParameters(size_m=size)
