@@ -1,1 +1,23 @@
 """Starts from which no collision happens, with proofs."""
+
+from analysis.certificates.certificate_trials import try_certificate
+from analysis.certificates.diagram_trials import try_diagram
+from analysis.certificates.disturbance_bounds import (
+    DisturbanceBounds,
+    disturbance_bounds,
+)
+from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
+from analysis.certificates.lag_model import lag_model
+from analysis.certificates.sos_region import SosRegion, sos_region
+
+__all__ = [
+    "DisturbanceBounds",
+    "EnergyCertificate",
+    "SosRegion",
+    "certify_energy",
+    "disturbance_bounds",
+    "lag_model",
+    "sos_region",
+    "try_certificate",
+    "try_diagram",
+]

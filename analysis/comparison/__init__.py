@@ -1,1 +1,29 @@
 """Laws side by side on the same layouts, and the papers' claims judged."""
+
+from analysis.comparison.claims import CLAIMS, claims_table
+from analysis.comparison.compare import (
+    EXPERIMENTS,
+    comparison_plan,
+    library_layouts,
+    prepare_comparison,
+)
+from analysis.comparison.laws_in_pairs import compare_runs
+from analysis.comparison.mechanisms import failure_mechanisms
+from analysis.comparison.paired_statistics import paired_median, paired_rate
+from analysis.comparison.report import compare_summary, compare_text, write_comparison
+
+__all__ = [
+    "CLAIMS",
+    "EXPERIMENTS",
+    "claims_table",
+    "compare_runs",
+    "compare_summary",
+    "compare_text",
+    "comparison_plan",
+    "failure_mechanisms",
+    "library_layouts",
+    "paired_median",
+    "paired_rate",
+    "prepare_comparison",
+    "write_comparison",
+]

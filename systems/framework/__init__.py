@@ -1,1 +1,29 @@
 """What every block rests on: parameters, checks, noise, scalars, compiled code."""
+
+from systems.framework.cache import declare_cache
+from systems.framework.finite import check_finite
+from systems.framework.input_error import InputError
+from systems.framework.noise import frame_noise
+from systems.framework.parameters import Parameters
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import (
+    FRAME_PERIOD_S,
+    FRAME_SAMPLES,
+    SAMPLE_RATE_HZ,
+    AudioFrame,
+    Emission,
+)
+
+__all__ = [
+    "FRAME_PERIOD_S",
+    "FRAME_SAMPLES",
+    "SAMPLE_RATE_HZ",
+    "AudioFrame",
+    "Emission",
+    "InputError",
+    "Parameters",
+    "check_finite",
+    "declare_cache",
+    "define_for_scalars",
+    "frame_noise",
+]

@@ -1,1 +1,50 @@
 """Virtual impedance: attraction, repulsion, a controller a law."""
+
+from systems.laws.active_impedance_2017_controller import (
+    ActiveImpedance2017Controller,
+    ActiveImpedance2017Controller_,
+    active_2017_force,
+)
+from systems.laws.active_impedance_controller import (
+    ActiveImpedanceController,
+    ActiveImpedanceController_,
+    active_force,
+)
+from systems.laws.conventional_impedance_2017_controller import (
+    ConventionalImpedance2017Controller,
+    ConventionalImpedance2017Controller_,
+    conventional_2017_force,
+)
+from systems.laws.conventional_impedance_controller import (
+    ConventionalImpedanceController,
+    ConventionalImpedanceController_,
+    conventional_force,
+)
+from systems.laws.impedance import (
+    AttractionParameters,
+    attraction_force,
+    repulsion_force,
+)
+from systems.laws.radial_law_controller import RadialLawController, RadialLawController_
+from systems.laws.repulsion import RepulsionParameters
+
+__all__ = [
+    "ActiveImpedance2017Controller",
+    "ActiveImpedance2017Controller_",
+    "ActiveImpedanceController",
+    "ActiveImpedanceController_",
+    "AttractionParameters",
+    "ConventionalImpedance2017Controller",
+    "ConventionalImpedance2017Controller_",
+    "ConventionalImpedanceController",
+    "ConventionalImpedanceController_",
+    "RadialLawController",
+    "RadialLawController_",
+    "RepulsionParameters",
+    "active_2017_force",
+    "active_force",
+    "attraction_force",
+    "conventional_2017_force",
+    "conventional_force",
+    "repulsion_force",
+]

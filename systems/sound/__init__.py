@@ -1,1 +1,39 @@
 """From loudspeaker to counts: waveforms, propagation, rooms, microphones, converter."""
+
+from systems.sound.acoustics import AcousticParameters, sound_speed
+from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.array_shape import ArrayShape
+from systems.sound.array_tolerances import RealArray, Tolerances
+from systems.sound.ego_noise import EgoNoise
+from systems.sound.interferers import InterfererParameters
+from systems.sound.mic_array import MicArray, microphones_B, record_frame
+from systems.sound.propagation import propagate
+from systems.sound.reverberation import Reverberation
+from systems.sound.room import RoomParameters, room_images
+from systems.sound.sound_emitter import SoundEmitter, make_emission
+from systems.sound.sound_file import read_sound
+from systems.sound.waveforms import SoundParameters, make_waveform
+
+__all__ = [
+    "AcousticParameters",
+    "ArrayShape",
+    "EgoNoise",
+    "InterfererParameters",
+    "MicArray",
+    "MicArrayParameters",
+    "RealArray",
+    "Reverberation",
+    "RoomParameters",
+    "SoundEmitter",
+    "SoundParameters",
+    "Tolerances",
+    "convert",
+    "make_emission",
+    "make_waveform",
+    "microphones_B",
+    "propagate",
+    "read_sound",
+    "record_frame",
+    "room_images",
+    "sound_speed",
+]
