@@ -176,6 +176,16 @@ def test_delays_longer_than_the_array(scale, kind):
         assert found == [(kind, ())]
 
 
+def test_short_recordings_are_looked_at_within_a_short_reach():
+    """Of 0.4 s, cut as 3 m need it (12 crossings), three frames are left: too few.
+
+    An array of 0.7 m across that is said to be a tenth of that.
+    """
+    samples = recording(FIVE, place(FIVE, 50.0, 1.5))[:, : round(0.4 * FS)]
+    assert len(samples[0]) // (12 * 3.0 / C * FS) == 3
+    assert faults(samples, ArrayShape.of(0.1 * FIVE.p_AM)) == [("units", ())]
+
+
 def test_a_channel_that_is_another_ones_copy():
     samples = recording(FIVE, place(FIVE, 20.0, 1.5))
     samples[3] = samples[1]
