@@ -155,9 +155,11 @@ def test_a_range_that_is_hardly_known_is_that_of_least_squares_too():
     assert fix.range_valid
     assert fix.range_std > 0.6 * fix.range
     root = np.linalg.inv(np.linalg.cholesky(covariance))
-    other = least_squares(
-        lambda x: root @ (delays(shape, x) - tau), p_AS, xtol=1e-15, gtol=1e-15
-    )
+
+    def residuals(x):
+        return root @ (delays(shape, x) - tau)
+
+    other = least_squares(residuals, p_AS, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     assert fix.p_AS == pytest.approx(other.x, abs=1e-6)
 
 
