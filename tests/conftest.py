@@ -12,6 +12,8 @@ import hypothesis
 import numpy as np
 import pytest
 
+from diagrams import Scenario, load_scenario
+
 # An environment variable, so that subprocesses draw without a window too.
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -107,3 +109,36 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
         return "".join(line for line in lines if "source: chrome://" not in line)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def two_boxes() -> Callable[..., Scenario]:
+    """``two_boxes(law, *overrides)``: a resting source behind two boxes.
+
+    All gains are stated, so that other defaults change nothing here.
+    """
+
+    def make(law: str, *overrides: str) -> Scenario:
+        gains = (
+            f"law={law}",
+            "attraction.stiffness_n_m=2.0",
+            "attraction.damping_n_s_m=1.0",
+            "attraction.follow_distance_m=1.2",
+            "repulsion.conventional.stiffness_n_m=16",
+            "repulsion.conventional.damping_n_s_m=0.8",
+            "repulsion.conventional.reach_m=0.8",
+            "repulsion.active.reference_stiffness_n_m=64",
+            "repulsion.active.matched_stiffness_n_m=16",
+            "repulsion.active.reach_m=0.8",
+            "repulsion.active.reference_damping_n_s_m=0.2",
+            "repulsion.active.matched_damping_n_s_m=0.8",
+            "repulsion.active.speed_limit_m_s=0.6",
+            "robot.top_speed_m_s=0.72",
+            "repulsion.conventional2017.distance_gain_j=1.1",
+            "repulsion.active2017.distance_gain_j=1.1",
+            "repulsion.active2017.saturation_distance_m=0.1",
+            "repulsion.active2017.damping_n_s_m=0.8",
+        )
+        return load_scenario("two_static_obstacles", [*gains, *overrides])
+
+    return make

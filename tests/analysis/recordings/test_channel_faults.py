@@ -154,9 +154,27 @@ def test_a_geometry_that_is_too_small_fits_nothing():
     assert faults(samples, small) == [("geometry", ())]
 
 
-def test_a_source_at_a_microphone():
+@pytest.mark.parametrize("order", [[0, 1, 2, 3, 4], [3, 1, 2, 0, 4]])
+def test_a_source_at_a_microphone(order):
+    """It hides the order: levels tell of the place, and one is far from all others."""
     samples = recording(FIVE, FIVE.p_AM[2] + np.array([0.02, 0.0, 0.0]))
-    assert faults(samples) == [("near", (2,))]
+    assert faults(samples[order]) == [("near", (2,))]
+
+
+@pytest.mark.parametrize(
+    ("places", "p_AS", "where"),
+    [
+        (ROW.p_AM, (8.0, 0.0), "straight ahead of it"),
+        (np.pad(SQUARE.p_AM, ((0, 0), (0, 1))), (0.0, 0.0, 2.0), "above or below it"),
+    ],
+)
+def test_a_source_straight_ahead_or_above_says_little_of_the_size(places, p_AS, where):
+    shape = ArrayShape.of(places)
+    (fault,) = find_channel_faults(
+        recording(shape, np.array(p_AS)), shape, C, sample_rate_hz=FS
+    )
+    assert fault.kind == "size"
+    assert where in fault.message
 
 
 def test_a_source_at_one_of_three_microphones_leaves_the_others_alive():
@@ -174,6 +192,34 @@ def test_delays_longer_than_the_array(scale, kind):
         samples = recording(shape, place(shape, 50.0, 1.5))
         found = faults(samples, ArrayShape.of(scale * shape.p_AM))
         assert found == [(kind, ())]
+
+
+def test_short_recordings_are_looked_at_within_a_short_reach():
+    """Of 0.4 s, cut as 3 m need it (12 crossings), three frames are left: too few.
+
+    An array of 0.7 m across that is said to be a tenth of that.
+    """
+    samples = recording(FIVE, place(FIVE, 50.0, 1.5))[:, : round(0.4 * FS)]
+    assert len(samples[0]) // (12 * 3.0 / C * FS) == 3
+    assert faults(samples, ArrayShape.of(0.1 * FIVE.p_AM)) == [("units", ())]
+
+
+def test_rumble_of_one_channel_is_not_its_level():
+    """40 dB above the sound, but at 40 Hz: below the band."""
+    samples = recording(FIVE, place(FIVE, 50.0, 1.5))
+    t = np.arange(samples.shape[1]) / FS
+    samples[2] += 140.0 * samples.std() * np.sin(2 * np.pi * 40.0 * t)
+    assert faults(samples) == []
+
+
+def test_the_loudest_frames_of_a_long_recording_are_looked_at():
+    """3 s of sound at the end of 20 s; 64 frames are 3.2 s."""
+    heard = recording(FIVE, place(FIVE, 50.0, 1.5))
+    heard[1] *= -1.0
+    generator = np.random.default_rng(3)
+    samples = 1e-3 * generator.standard_normal((5, 20 * FS))
+    samples[:, -heard.shape[1] :] += heard
+    assert faults(samples) == [("inverted", (1,))]
 
 
 def test_a_channel_that_is_another_ones_copy():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,6 +33,14 @@ def test_levels_of_a_near_source():
     assert not levels_contradict(gains, fix.without_range(), ROW)
     fix, ranges = fix_at(20.0 * near)
     assert not levels_contradict(ranges, fix, ROW)
+
+
+def test_nearer_than_a_millimetre_counts_as_one():
+    """Of 1 mm, 0.4 m and 0.8 m: 58 dB, of which equal levels have nothing."""
+    fix, _ = fix_at(np.array([0.1, 0.3]))
+    at_one = replace(fix, p_AS=ROW.p_AM[0])
+    assert levels_contradict(np.ones(3), at_one, ROW)
+    assert not levels_contradict(1.0 / np.array([1e-3, 0.4, 0.8]), at_one, ROW)
 
 
 @given(

@@ -8,7 +8,7 @@ from numpy.random import Generator, Philox
 
 from systems.delays.delay_plan import DelayPlan
 from systems.delays.delay_search import amdf
-from systems.delays.delays import METHODS, estimate_delays
+from systems.delays.delays import METHODS, estimate_delays, look
 from systems.sound.array_shape import ArrayShape
 
 FS = 100_000.0
@@ -62,6 +62,24 @@ def test_known_shifts(method, shifts):
     )
     assert found.correlation > 0.98
     assert found.ambiguity < 0.5
+
+
+def test_the_band_of_a_long_frame_is_found_in_hertz():
+    """2 s at 8 kHz: bins are less than 1 Hz apart; smoothing adds 200 Hz a side.
+
+    The frame's ends add some more.
+    """
+    rate, count = 8_000.0, 16_000
+    plan = DelayPlan(ROW, 340.0, rate, count, 100.0, 4_000.0)
+    spectrum = np.fft.rfft(Generator(Philox(key=3)).standard_normal(count))
+    f = np.fft.rfftfreq(count, 1 / rate)
+    spectrum[(f < 1_000.0) | (f > 2_000.0)] = 0.0
+    rows = noisy(np.tile(np.fft.irfft(spectrum, count), (3, 1)), 40.0, 4)
+    seen = look(rows, plan, find_band=True)
+    assert seen is not None
+    hertz = rate / plan.length
+    assert seen[1].start * hertz == pytest.approx(800.0, abs=25.0)
+    assert seen[1].stop * hertz == pytest.approx(2_200.0, abs=25.0)
 
 
 def test_amdf_finds_whole_samples_of_either_sign():

@@ -64,3 +64,11 @@ def test_level_does_not_matter(level):
     assert occupied_band(spectra(level * rows), BIN_HZ) == occupied_band(
         spectra(rows), BIN_HZ
     )
+
+
+@pytest.mark.parametrize(("bin_hz", "beside"), [(80.0, 2), (72.86, 2), (400.0, 0)])
+def test_band_ends_half_the_smoothing_beside_the_sound(bin_hz, beside):
+    """400 Hz are 5 bins, 5.49 or one: two on either side, or none."""
+    rows = np.full((2, 600), 1e-3, dtype=np.complex64)
+    rows[:, 100:201] = 1j
+    assert occupied_band(rows, bin_hz) == (100 - beside, 201 + beside)

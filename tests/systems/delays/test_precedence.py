@@ -155,3 +155,11 @@ def test_a_click_in_noise_is_as_it_was_and_the_noise_is_gone():
     noisy, *_ = keep_first_wave_front(frame(at(CLICK) + noise), None, SIZES, 0.01**2)
     assert energy(noisy[0], CLICK) == pytest.approx(energy(clean[0], CLICK), rel=0.2)
     assert energy(noisy[0], ECHO) < 0.02 * energy(noisy[0], CLICK)
+
+
+def test_the_taper_is_even_and_its_square_adds_up():
+    """Over four hops to 1: half of sin^2 has mean 1/4."""
+    sizes = EchoMemory(3, 50_000.0)
+    np.testing.assert_allclose(sizes.taper, sizes.taper[::-1], atol=1e-6)
+    hops = sizes.taper.reshape(4, sizes.hop)
+    np.testing.assert_allclose(np.sum(hops**2, axis=0), 1.0, rtol=1e-5)

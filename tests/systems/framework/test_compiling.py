@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import numba
 import pytest
 
 from systems.framework.compiling import provide_cache
@@ -27,6 +28,8 @@ def test_a_read_only_installation_gets_a_folder_of_its_own(tmp_path):
     assert made is not None
     assert made.is_dir()
     assert os.environ["NUMBA_CACHE_DIR"] == str(made)
+    told = vars(numba.config)["CACHE_DIR"]
+    assert told == str(made), "numba was loaded before"
 
 
 def test_a_folder_that_the_user_chose_stays(monkeypatch, tmp_path):

@@ -202,6 +202,17 @@ def test_noise_between_sounds_becomes_the_memory():
     assert memory.echoes is None
 
 
+def test_a_knock_raises_the_level_of_the_noise_by_a_sixteenth():
+    """As a noise of 1.5 times the level would: half of it over eight frames."""
+    localiser = listener()
+    before = after_noise(localiser)
+    knock = 10.0 * Generator(Philox(key=9)).standard_normal((3, N))
+    fix, after = localiser.localise(knock.astype(np.float32), before)
+    assert fix is None
+    assert after.noise_energy == pytest.approx(17 / 16 * before.noise_energy)
+    assert after.energy == pytest.approx(17 / 16 * before.energy)
+
+
 def searched_share(monkeypatch, localiser, sound_level, frames=400):
     """Of frames of noise, and of a sound in the band so far above it, in variance.
 

@@ -144,6 +144,25 @@ def test_agrees_with_scipy_and_its_covariance(name):
         assert std == pytest.approx(math.sqrt(gradient @ expected @ gradient), rel=5e-3)
 
 
+def test_a_range_that_is_hardly_known_is_that_of_least_squares_too():
+    """0.5 m, and nearly as much its standard deviation: by another solver."""
+    shape, p_AS = case("circle")[0], np.array([0.3, -0.4])
+    covariance = noise_of(6, 1e-4)
+    generator = np.random.default_rng(2)
+    tau = delays(shape, p_AS)
+    tau = tau + 0.2 * generator.multivariate_normal(np.zeros(5), covariance)
+    fix = locate_source(tau, covariance, shape, C)
+    assert fix.range_valid
+    assert fix.range_std > 0.6 * fix.range
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+
+    def residuals(x):
+        return root @ (delays(shape, x) - tau)
+
+    other = least_squares(residuals, p_AS, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    assert fix.p_AS == pytest.approx(other.x, abs=1e-6)
+
+
 @cases
 def test_stated_errors_are_the_actual_ones(name):
     """Normalised squares of the errors, and of the residuals, over 300 trials."""

@@ -45,6 +45,17 @@ def test_left_is_positive():
     assert source_from_delays(tau_12, tau_13, L, C)[0] > 0.0
 
 
+def test_channels_in_another_order():
+    """M3, M1, M2: the delays are those of M1 and M2 less that of M3."""
+    bearing, distance = 0.4, 1.5
+    tau_12, tau_13 = delays(bearing, distance)
+    row = EqualRow(L, np.array([[-1.0, 1.0], [-1.0, 0.0]]), np.eye(2))
+    tau = np.array([-tau_13, tau_12 - tau_13])
+    fix = locate_source(tau, 1e-16 * np.eye(2), row, C)
+    assert fix.bearing == pytest.approx(bearing)
+    assert fix.range == pytest.approx(distance)
+
+
 def test_two_metres_broadside_in_numbers():
     """R1 = sqrt(4.16): a = 2 - R1, b = 0."""
     a = 2.0 - math.sqrt(4.16)

@@ -120,6 +120,7 @@ def test_many_microphones_have_a_grid_of_4_deg(count, dimension):
     # A sphere is covered by caps of 4 deg at 4 pi / 0.0698^2 = 2579 points.
     assert len(far) <= (2_600 if dimension == 3 else 180)
     assert len(grid.lags) < 1.5 * 3_900
+    assert len(np.unique(np.round(far, 6), axis=0)) == len(far), "each once"
     for _ in range(50):
         u = rng.standard_normal(dimension)
         u /= np.linalg.norm(u)

@@ -61,6 +61,20 @@ def test_master_robot_is_seen(bench):
     assert at.output("ranges")[1] == pytest.approx(1.5 - 0.163 - 0.175)
 
 
+def test_each_of_several_boxes_is_seen(bench):
+    """Three in a row ahead; each is the nearest when the ones before it are away."""
+    sizes = [0.2, 0.3, 0.4, 0.5, 0.6, 0.7]
+    faces = [1.0 - 0.1, 1.5 - 0.2, 2.0 - 0.3]
+    block = UltrasonicArray(parameters=QUIET, obstacle_count=3)
+    for gone, face in enumerate(faces):
+        places = np.array([[1.0, 0.0, 0.0], [1.5, 0.0, 0.0], [2.0, 0.0, 0.0]])
+        places[:gone, 0] += 40.0
+        at = bench(
+            block, pose_WB=[0] * 3, poses_WO=places.ravel(), sizes=sizes, pose_WS=FAR
+        )
+        assert at.output("ranges")[1] == pytest.approx(face - 0.175)
+
+
 @pytest.mark.parametrize(
     ("distance", "reading", "echo"),
     [

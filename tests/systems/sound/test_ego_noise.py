@@ -101,6 +101,23 @@ def test_same_seed_same_noise(tmp_path):
     assert np.abs(first.frame(9, 1.0) - other.frame(9, 1.0)).max() > 0.1
 
 
+SILENT = SoundParameters(start_s=100.0)
+
+
+def counts_at(block, tick, speed):
+    """What the microphones record at a tick while the source is silent."""
+    time = tick * FRAME_PERIOD_S
+    p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
+    sent = make_emission(time, make_waveform(SILENT), SILENT, p_WS, v_WS)
+    context = block.CreateDefaultContext()
+    context.SetTime(time)
+    block.GetInputPort("emission").FixValue(context, Value(sent))
+    block.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
+    block.GetInputPort("velocity_WB").FixValue(context, [speed, 0.0, 0.0])
+    audio: Any = block.GetOutputPort("audio").Eval(context)
+    return audio.counts
+
+
 def test_microphones_hear_it_beside_the_converters_noise(tmp_path):
     """The source is silent and far below: ego noise at 14 dB, white noise at 40."""
     parameters = MicArrayParameters(
@@ -110,26 +127,30 @@ def test_microphones_hear_it_beside_the_converters_noise(tmp_path):
         snr_db_at_1m=40.0,
         adc_bits=16,
     )
-    sound = SoundParameters(start_s=100.0)
     block = MicArray(parameters=parameters, seed=3)
     levels = []
     for speed in (0.0, ROBOT.top_speed_m_s):
-        counts = []
-        for tick in range(8, 48):
-            time = tick * FRAME_PERIOD_S
-            p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
-            sent = make_emission(time, make_waveform(sound), sound, p_WS, v_WS)
-            context = block.CreateDefaultContext()
-            context.SetTime(time)
-            block.GetInputPort("emission").FixValue(context, Value(sent))
-            block.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
-            block.GetInputPort("velocity_WB").FixValue(context, [speed, 0.0, 0.0])
-            audio: Any = block.GetOutputPort("audio").Eval(context)
-            counts.append(audio.counts)
-        levels.append(np.std(counts) / parameters.counts_per_pa / sound.level_pa)
+        counts = [counts_at(block, tick, speed) for tick in range(8, 48)]
+        levels.append(np.std(counts) / parameters.counts_per_pa / SILENT.level_pa)
     white, ego = 10 ** (-40 / 20), 10 ** (-14 / 20)
     assert levels[0] == pytest.approx(np.hypot(white, 0.5 * ego), rel=0.03)
     assert levels[1] == pytest.approx(np.hypot(white, ego), rel=0.03)
+
+
+def test_it_plays_on_from_frame_to_frame(tmp_path):
+    """Of 300 to 600 Hz next to nothing lies above 2 kHz, at the frames' joints too."""
+    parameters = MicArrayParameters(
+        ego_noise_file=recording(tmp_path / "fan.wav"),
+        ego_noise_snr_db_at_1m=0.0,
+        snr_db_at_1m=150.0,
+        adc_bits=16,
+    )
+    block = MicArray(parameters=parameters, seed=3)
+    frames = [counts_at(block, tick, ROBOT.top_speed_m_s) for tick in range(8, 16)]
+    noise = np.concatenate(frames, axis=1) / np.std(frames)
+    sections = scipy.signal.butter(4, 2_000.0, "high", fs=100_000, output="sos")
+    above = scipy.signal.sosfiltfilt(sections, noise)
+    assert np.abs(above)[:, 2_000:-2_000].max() < 0.03
 
 
 @given(st.floats(-0.72, 0.72), st.floats(-3.5, 3.5), st.floats(-3.0, 3.0))

@@ -249,6 +249,23 @@ def test_frame_starts_from_the_pose_of_the_last_tick():
     np.testing.assert_allclose(counts, expected, atol=2e-3 * expected.max())
 
 
+def test_a_pose_of_an_older_tick_is_no_start_of_a_frame():
+    """The robot stood elsewhere two ticks ago, and has rested for this frame."""
+    array = MicArray(parameters=quiet())
+    context = array.CreateDefaultContext()
+    array.GetInputPort("emission").FixValue(context, Value(emission((3.0, 0.0))))
+    array.GetInputPort("pose_WB").FixValue(context, [-0.05, 0.0, 0.0])
+    array.GetInputPort("velocity_WB").FixValue(context, np.zeros(3))
+    context.SetTime(TIME - 0.05)
+    context.SetDiscreteState(array.EvalUniquePeriodicDiscreteUpdate(context).Clone())
+    context.SetTime(TIME)
+    array.GetInputPort("pose_WB").FixValue(context, np.zeros(3))
+    audio: Any = array.GetOutputPort("audio").Eval(context)
+    phases, _ = phase_and_amplitude(audio.counts)
+    expected = np.exp(-2j * np.pi * TONE * (3.0 - 0.175) / 340.0)
+    np.testing.assert_allclose(np.exp(1j * phases[1]), expected, atol=1e-3)
+
+
 def test_skew_of_another_number_of_channels_is_refused():
     with pytest.raises(ValueError, match=r"microphones\.channel_skew_s.*3 microph"):
         MicArray(parameters=MicArrayParameters(channel_skew_s=(0.0, 1e-6)))

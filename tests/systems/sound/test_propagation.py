@@ -204,10 +204,18 @@ def test_source_out_of_reach_is_an_error():
         hear(sound, (0.0, 0.0))
 
 
-@pytest.mark.parametrize(("distance", "heard"), [(33.0, True), (35.0, False)])
-def test_reach_is_what_sound_travels_in_the_time(distance, heard):
+@pytest.mark.parametrize(
+    ("distance", "speed", "heard"),
+    [
+        (33.0, 0.0, True),
+        (35.0, 0.0, False),
+        (31.0, -20.0, False),  # it was at 35 m when its path begins, 0.2 s ago
+        (37.0, 20.0, True),
+    ],
+)
+def test_reach_is_what_sound_travels_in_the_time(distance, speed, heard):
     """The emission begins 0.1 s before the frame: 34 m less 2 cm."""
-    sound = emission(np.cos, (distance, 0.0), reach=0.1)
+    sound = emission(np.cos, (distance, 0.0), (speed, 0.0), reach=0.1)
     begin = sound.start_time + 0.1
     with nullcontext() if heard else pytest.raises(ValueError, match="away"):
         check_reach(sound, begin, np.zeros(2), C)

@@ -17,7 +17,7 @@ from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import draw_tolerances, real_array
 from systems.sound.mic_array import MicArray, microphones_B
 from systems.sound.propagation import microphone_paths, propagate
-from systems.sound.reverberation import Reverberation
+from systems.sound.reverberation import Reverberation, _place
 from systems.sound.room import RoomParameters, room_images, room_impulse_responses
 
 FS = 100_000
@@ -213,6 +213,13 @@ def test_who_rests_needs_one_response(monkeypatch):
         time = TIME + tick * FRAME_PERIOD_S
         room.frames([emission((1.6, 0.9), time=time)], time, old, new, ARRAY)
     assert len(computed) == 2
+
+
+def test_each_source_has_its_own_place():
+    """After the robot's pose come x and y of one source after the other."""
+    places = np.array([1.0, 2.0, 3.0, 10.0, 11.0, 20.0, 21.0])
+    assert _place(places, 0) == (1.0, 2.0, 3.0, 10.0, 11.0)
+    assert _place(places, 1) == (1.0, 2.0, 3.0, 20.0, 21.0)
 
 
 def test_silent_source_has_no_reflections():

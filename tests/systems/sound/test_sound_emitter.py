@@ -8,6 +8,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from systems.base.source_robot import SourceRobot, SourceRobotParameters
+from systems.sound.acoustics import AcousticParameters
 from systems.sound.sound_emitter import SoundEmitter, emitted_samples
 from systems.sound.waveforms import SoundParameters, make_waveform
 
@@ -66,6 +67,14 @@ def test_reaches_back_a_frame_and_the_largest_travel():
     assert end > 1.0
     assert emission.knot_times[0] <= emission.start_time + 1e-3
     assert emission.knot_times[-1] == pytest.approx(1.0)
+
+
+def test_reaches_back_30_m_and_no_farther_unless_told():
+    """At 301 m/s they take 99.7 ms, just below four ticks; and there is the frame."""
+    air = AcousticParameters(sound_speed_m_s=301.0)
+    context = SoundEmitter(acoustics=air).CreateDefaultContext()
+    # x, y and their rates at five past ticks, and at the one that they end on.
+    assert context.get_discrete_state(0).size() == 4 * (1 + 4 + 1)
 
 
 def test_path_is_that_of_the_source():

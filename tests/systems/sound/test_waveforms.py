@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import soundfile
 from pydantic import ValidationError
+from scipy.special import j0
 
 from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
 
@@ -49,6 +50,31 @@ def test_level_length_and_type(kind):
 def test_within_the_band_of_the_microphones(kind):
     samples = make_waveform(SoundParameters(kind=kind))[:50_000].astype(float)
     assert share_outside(samples, 50.0, 18_000.0) < 1e-3
+
+
+def lines(samples, *frequencies):
+    """Amplitudes of lines at whole Hz, in the second second of three."""
+    spectrum = np.abs(np.fft.rfft(samples[FS : 2 * FS].astype(float)))
+    return spectrum[list(frequencies)]
+
+
+def test_the_microphones_pass_half_at_the_ends_of_their_band(tmp_path):
+    """A Butterworth filter passes 1/sqrt(2) there, and forth and back a half."""
+    t = np.arange(3 * FS) / FS
+    tones = sum(np.sin(2 * np.pi * f * t) for f in (50.0, 1_000.0, 18_000.0))
+    sound = recording(tmp_path, 0.2 * tones, FS, on_s=3.0, period_s=3.0)
+    low, middle, high = lines(make_waveform(sound), 50, 1_000, 18_000)
+    np.testing.assert_allclose([low / middle, high / middle], 0.5, rtol=0.01)
+
+
+def test_horn_is_two_reeds_a_major_third_apart():
+    """Phase modulation by b leaves J_0(b) of a line; harmonics fall with n^-0.7."""
+    samples = make_waveform(SoundParameters(kind="horn", on_s=3.0, period_s=3.0))
+    n = np.array([1, 2, 3, 1, 2, 3])
+    f = np.array([380] * 3 + [5 * 380 // 4] * 3) * n
+    expected = n**-0.7 * np.abs(j0(2 * np.pi * f * 0.004 / 11.0))
+    found = lines(samples, *f)
+    np.testing.assert_allclose(found / found[0], expected / expected[0], rtol=0.01)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -49,6 +49,11 @@ def test_shuttling_box_returns(bench):
     assert at.output("velocities_WO")[1] == pytest.approx(0.5)
 
 
+def test_a_box_without_a_name_is_refused():
+    with pytest.raises(ValidationError, match="name"):
+        ObstacleParameters(name="")
+
+
 def test_no_obstacles_no_elements():
     block = Obstacles()
     ports = [block.get_output_port(k) for k in range(3)]
