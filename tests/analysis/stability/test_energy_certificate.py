@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from types import SimpleNamespace as Made
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -82,6 +83,11 @@ def test_no_certified_start_collides_and_some_other_does(certificates, law):
     assert trials.ratio <= 1.0
 
 
+def made(**fields: Any) -> Any:
+    """Stands in for what the levels do not depend on."""
+    return SimpleNamespace(**fields)
+
+
 def test_speeds_and_shares_of_made_up_levels():
     """2 kg, 1.5 m/s at most: v^2 = E - W of the worse body; five free cells, one not.
 
@@ -89,13 +95,13 @@ def test_speeds_and_shares_of_made_up_levels():
     other being safe at any speed, less than none, and less than none but safe.
     """
     certificate = EnergyCertificate(
-        scenario=None,
-        model=Made(
+        scenario=made(),
+        model=made(
             mass_kg=2.0, top_speed_m_s=1.5, top_kinetic_energy_j=2.25,
-            law=Made(name="made up"), p_WP=(0.0, 0.0),
+            law=made(name="made up"), p_WP=(0.0, 0.0),
             clearances=lambda p: np.ones(len(p)), energy=lambda x: np.zeros(len(x)),
         ),
-        passivity=Made(covered=True, velocity_term="printed", to_dict=dict),
+        passivity=made(covered=True, velocity_term="printed", to_dict=dict),
         contact_m=0.1,
         cell_m=0.5,
         x_m=np.array([0.0, 0.5]),
