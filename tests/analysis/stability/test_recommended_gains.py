@@ -99,6 +99,7 @@ def test_recommended_gains_meet_everything_and_less_damping_does_not():
         assert figures.sensitivity_peak <= limits.sensitivity_peak
         assert figures.disk_margin >= limits.disk_margin
         assert figures.contact_radius < 1.0
+        assert figures.damping_n_s_m == round(figures.damping_n_s_m, 2)
         less = load_scenario(
             "default",
             [
