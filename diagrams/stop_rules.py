@@ -66,6 +66,7 @@ class StopRules:
     _ticks_since_heard: int = 0
     _following_ticks: int = 0
     _time: float = 0.0
+    _tick: int = -1
 
     def __post_init__(self) -> None:
         scenario = self.follower.scenario
@@ -87,10 +88,12 @@ class StopRules:
         ]
 
     def __call__(self, context: Any) -> EventStatus:
-        """Called after every step of the simulator."""
+        """Called after every step of the simulator, which may be finer than ticks."""
         time = context.get_time()
-        if self._pose is not None and time - self._time < 0.5 * FRAME_PERIOD_S:
+        tick = round(time / FRAME_PERIOD_S)
+        if tick == self._tick or abs(time - tick * FRAME_PERIOD_S) > ROUNDING_S:
             return _GO_ON
+        self._tick = tick
         if context is not self._root:
             self._root = context
             self._contexts = (

@@ -147,7 +147,7 @@ _CRITERIA: tuple[tuple[Criterion, Callable[[Study], Reading]], ...] = (
             "places to jam", "", "at most", 0.0,
             "it rests near the follow distance only",
             "it can come to rest away from the source",
-            "none is wanted; away: beyond `stop.following_band_m`",
+            "none is wanted; away: outside the goal of a run",
         ),
         read_jams,
     ),

@@ -86,10 +86,11 @@ def read_cycle(study: Study) -> Reading:
 
 
 def read_jams(study: Study) -> Reading:
-    """Sinks farther than the following band beyond the follow distance."""
-    points = study.need("equilibria")
-    band = study.scenario.stop.following_band_m
-    return float(sum(p.stable and p.offset_m > band for p in points.search.points))
+    """Sinks outside the goal: a run that ends there is stuck or out of time."""
+    points = study.need("equilibria").search.points
+    scenario = study.scenario
+    margin = scenario.goal_radius_m - scenario.attraction.follow_distance_m
+    return float(sum(p.stable and p.offset_m > margin for p in points))
 
 
 def read_offset(study: Study) -> Reading:

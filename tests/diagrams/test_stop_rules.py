@@ -268,6 +268,21 @@ def test_box_that_drives_into_a_waiting_robot_is_at_fault():
     assert touch <= result.collision.time <= touch + 0.0051
 
 
+def test_a_finer_integration_is_judged_no_more_often():
+    """The cart comes at 2.702 s: 2.705 s by fifths of ticks, and 2.725 s is a tick."""
+    cart = {
+        "name": "cart",
+        "waypoints_m": [[1.501, 0.1], [-1.0, 0.1]],
+        "size_m": [0.2, 0.1],
+        "speed_m_s": 0.5,
+    }
+    for step_s in (0.025, 0.005):
+        result = run(**WAITING, obstacles=[cart], integrator={"step_s": step_s})
+        assert result.collision is not None
+        assert result.collision.time == pytest.approx(2.705)
+        assert result.simulated_s == pytest.approx(2.725)
+
+
 def test_turning_into_a_box_at_rest_is_the_robots_fault():
     """The bar's left end sweeps back onto a box behind it, and the centre leaves."""
     box = {"name": "box", "waypoints_m": [[-0.3, 0.3]], "size_m": [0.1, 0.1]}

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.energy_certificate import certify_energy
+from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
 from systems.world.geometry import rectangle_corners
 
 LAWS = ("conventional", "active", "active2017")
@@ -79,6 +81,47 @@ def test_no_certified_start_collides_and_some_other_does(certificates, law):
     assert trials.inside.energy_rises_j.max() < 1e-3
     assert 0.0 < trials.energy_share <= trials.certified_share
     assert trials.ratio <= 1.0
+
+
+def made(**fields: Any) -> Any:
+    """Stands in for what the levels do not depend on."""
+    return SimpleNamespace(**fields)
+
+
+def test_speeds_and_shares_of_made_up_levels():
+    """2 kg, 1.5 m/s at most: v^2 = E - W of the worse body; five free cells, one not.
+
+    Spare are 4 J (2 m/s: the top), 0.25 J, and of the rest 0.25 J of one body, the
+    other being safe at any speed, less than none, and less than none but safe.
+    """
+    certificate = EnergyCertificate(
+        scenario=made(),
+        model=made(
+            mass_kg=2.0, top_speed_m_s=1.5, top_kinetic_energy_j=2.25,
+            law=made(name="made up"), p_WP=(0.0, 0.0),
+            clearances=lambda p: np.ones(len(p)), energy=lambda x: np.zeros(len(x)),
+        ),
+        passivity=made(covered=True, velocity_term="printed", to_dict=dict),
+        contact_m=0.1,
+        cell_m=0.5,
+        x_m=np.array([0.0, 0.5]),
+        y_m=np.array([1.0, 1.5, 2.0]),
+        potential_j=np.array([[1.0, 4.75, 4.75], [6.0, 6.0, 0.0]]),
+        free=np.array([[True, True, True], [True, True, False]]),
+        escape_j=np.array(
+            [[[5.0, 9.0, 5.0], [5.0, 5.0, 0.0]], [[7.0, 5.0, 4.0], [9.0, 5.0, 0.0]]]
+        ),
+        any_speed=np.array([[[0, 0, 0], [0, 1, 1]], [[0, 0, 1], [1, 1, 1]]]) > 0,
+    )  # fmt: skip
+    nan = math.nan
+    speeds = [[1.5, 0.5, 0.5], [nan, 1.5, nan]]
+    np.testing.assert_allclose(certificate.largest_speed(), speeds)
+    document = certificate.to_dict()
+    assert document["contact_energy_j"] == 4.0
+    assert document["certified_at_rest_share"] == pytest.approx(4 / 5)
+    assert document["certified_at_any_speed_share"] == pytest.approx(1 / 5)
+    assert document["workspace_m"] == [0.0, 0.5, 1.0, 2.0]
+    assert not document["start_certified"], "it is off the grid"
 
 
 def test_finer_cells_certify_more(two_boxes):

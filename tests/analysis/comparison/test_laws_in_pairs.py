@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import pandas as pd
@@ -125,6 +126,13 @@ def test_pooled_pairs_are_those_of_all_experiments():
     name = "minimum_obstacle_clearance_m"
     assert twice.metrics[name].difference == once.metrics[name].difference
     assert twice.metrics[name].pairs == 8
+
+
+def test_one_experiment_pooled_is_itself():
+    plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5)
+    pairs = compare_runs(plan, table(), "here").pairs
+    expected = [replace(pair, scenario="all", fields={}) for pair in pairs]
+    assert pooled_pairs([(plan, table())]) == expected
 
 
 def test_pairs_differ_in_one_field_alone():

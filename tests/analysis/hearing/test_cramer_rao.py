@@ -10,7 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
-from analysis.hearing.cramer_rao import SlopeEnergy, arrival_information, position_bound
+from analysis.hearing.cramer_rao import (
+    LocalizationBound,
+    SlopeEnergy,
+    arrival_information,
+    position_bound,
+)
 from systems.sound.waveforms import SoundParameters, make_waveform
 
 RATE, C, FRAME_S = 100_000.0, 340.0, 0.025
@@ -153,6 +158,35 @@ def test_silence_has_no_bound():
         energy, 0.0, FRAME_S, [2.0, 0.0], ROW, 1e-3, sample_rate_hz=RATE, c=C
     )
     assert bound.bearing_std == bound.range_std == math.inf
+
+
+def test_silence_in_space_has_no_bound_on_the_elevation_either():
+    energy = SlopeEnergy(np.zeros(100), 0.0, RATE)
+    p_AM = np.vstack((np.zeros(3), np.eye(3)))
+    bound = position_bound(
+        energy, 0.0, FRAME_S, [2.0, 0.0, 1.0], p_AM, 1e-3, sample_rate_hz=RATE, c=C
+    )
+    assert bound.elevation_std == math.inf
+
+
+@pytest.mark.parametrize(
+    ("elevations", "mean"), [((2.0, 14.0), 10.0), ((None,) * 2, None)]
+)
+def test_mean_bound_is_that_of_the_squares(elevations, mean):
+    """(1 + 7^2)/2 = 5^2, (2^2 + 14^2)/2 = 10^2, (3^2 + 21^2)/2 = 15^2."""
+    bounds = [
+        LocalizationBound(
+            size * np.eye(2), size * np.eye(3), part, elevation, 3.0 * part
+        )
+        for size, part, elevation in zip(
+            (1.0, 4.0), (1.0, 7.0), elevations, strict=True
+        )
+    ]
+    found = LocalizationBound.mean(bounds)
+    np.testing.assert_allclose(found.delays, 2.5 * np.eye(2))
+    np.testing.assert_allclose(found.covariance, 2.5 * np.eye(3))
+    assert (found.bearing_std, found.range_std) == pytest.approx((5.0, 15.0))
+    assert found.elevation_std == (mean and pytest.approx(mean))
 
 
 def test_maximum_likelihood_reaches_the_bound():

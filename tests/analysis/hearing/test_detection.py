@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 
 import numpy as np
 
+from analysis.hearing import detection
 from analysis.hearing.detection import detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
 from systems.base.robot import RobotParameters
@@ -73,6 +75,46 @@ def test_what_is_off_by_more_than_it_says_is_wrong():
     assert sum(error > 1.1 * limit for error in errors) <= point.wrong
     assert point.wrong <= sum(error > 0.9 * limit for error in errors)
     assert 0 < point.wrong < point.heard
+
+
+#: What a made-up estimator is off by, and states, deg; then: is that wrong?
+ANSWERS = [
+    (4.9, 0.1, False),
+    (-5.1, 0.1, True),
+    (5.1, 1.01, True),
+    (-5.1, 1.03, False),
+    (9.0, 2.0, False),
+]
+
+
+def test_frames_of_a_made_up_estimator_are_counted(monkeypatch):
+    """Of six trials it hears five, two of them with a range; noise came before."""
+    heard, fixes = [], []
+    for trial, (off, std, _) in enumerate(ANSWERS):
+        bearing = tick_generator(2, trial).uniform(-math.pi / 3.0, math.pi / 3.0)
+        fix = {"bearing": bearing + math.radians(off), "bearing_std": math.radians(std)}
+        fixes.append(SimpleNamespace(**fix, range_valid=trial in (1, 4)))
+
+    class MadeUp:
+        plan = SimpleNamespace(shape=SHAPE)
+
+        def __init__(self, *_):
+            self.answers = iter([None] * 8 + [*fixes, None])
+
+        def blank(self):
+            return None
+
+        def localise(self, frame, _):
+            heard.append(frame)
+            return next(self.answers), None
+
+    monkeypatch.setattr(detection, "Localiser", MadeUp)
+    (point,) = curve([20.0], 6, range_m=4.0)
+    assert (point.heard, point.ranged) == (5, 2)
+    assert point.wrong == sum(wrong for *_, wrong in ANSWERS)
+    noise = np.array(heard[:8]).reshape(8, -1)
+    np.testing.assert_allclose(noise.std(axis=1), CHIRP.level_pa / 40.0, rtol=0.05)
+    assert np.abs(np.corrcoef(noise) - np.eye(8)).max() < 0.1, "noise of its own each"
 
 
 def test_a_stricter_rate_hears_less():

@@ -33,7 +33,7 @@ def test_intervals_cover_as_often_as_they_say():
 
 def test_nothing_known_without_errors():
     ratio = rms_ratio([], [])
-    assert (ratio.low, ratio.high) == (0.0, math.inf)
+    assert (ratio.value, ratio.low, ratio.high) == (math.inf, 0.0, math.inf)
 
 
 def test_stated_over_actual():
@@ -51,6 +51,7 @@ def test_consistency_knows_right_from_wrong(dimension):
     right = consistency(errors, covariances)
     assert right.holds
     assert chi2.cdf(500 * right.low, 500 * dimension) == pytest.approx(0.025)
+    assert chi2.cdf(500 * right.high, 500 * dimension) == pytest.approx(0.975)
     assert not consistency(1.2 * errors, covariances).holds
     assert consistency(1.2 * errors, covariances).mean == pytest.approx(
         1.44 * right.mean

@@ -142,13 +142,21 @@ def test_share_put_back_by_a_damper_is_that_of_the_dampings():
     assert injected_share("active2017", scenario) == pytest.approx(0.6)
 
 
-def test_share_put_back_by_the_active_law():
-    """The term's steepest secant from rest; at mu_0/2 it is D_0 - 2 d_ref."""
-    gains = SCENARIO.repulsion.active
+@pytest.mark.parametrize(
+    ("limit", "steepest"), [(0.72, (0.0, 0.72)), (1.8, (0.8, 1.4))]
+)
+def test_share_put_back_by_the_active_law(limit, steepest):
+    """The term's steepest secant from rest; at mu_0/2 it is D_0 - 2 d_ref.
+
+    A body that comes at the robot is up to twice as fast as its top of 0.72 m/s.
+    """
+    scenario = with_gains(SCENARIO, "active", speed_limit_m_s=limit)
+    gains = scenario.repulsion.active
     d, b, m = gains.reference_damping_n_s_m, gains.beta_m_s, gains.speed_limit_m_s
     s = np.linspace(1e-4, m, 20_000)
     secants = (d * np.exp(s / b) * (m - s) - d * m) / s
-    share = injected_share("active", SCENARIO)
+    assert steepest[0] < s[secants.argmax()] < steepest[1]
+    share = injected_share("active", scenario)
     assert share == pytest.approx(secants.max(), rel=1e-4)
     assert share >= gains.matched_damping_n_s_m - 2.0 * d
 

@@ -8,14 +8,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from analysis.linear.delay_margin import DELAY_PLACES, DelayedLoop, delay_margin
+from analysis.linear.delay_margin import (
+    DELAY_PLACES,
+    DelayedLoop,
+    DelayMargin,
+    delay_margin,
+)
 from analysis.linear.delayed_run import (
     check_delay_margin,
     fitted_oscillation,
     simulate_delayed,
 )
 from analysis.models.equilibria import follow_equilibrium
-from analysis.models.operating_points import moving_equilibrium
+from analysis.models.ideal_loop import ideal_loop, ideal_scenario
+from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario import Scenario
 
 M, K, D, LAG, T = 3.94, 2.0, 1.0, 0.05, 0.025
@@ -73,6 +79,20 @@ def test_margin_separates_decay_from_growth(at, direction):
     loop = DelayedLoop(point, at, direction)
     assert loop.spectral_radius(0.99 * margin.delay_s) < 1.0
     assert loop.spectral_radius(1.01 * margin.delay_s) > 1.0
+
+
+def test_margin_in_ticks_of_25_ms():
+    assert DelayMargin("wheels", "along", 0.06, 0.7).ticks == pytest.approx(2.4)
+
+
+def test_what_swings_without_a_delay_has_no_margin():
+    """K_r = 30 N/m: beyond 20.2 N/m lag and sampling leave no damping of 1 N s/m."""
+    stiff = Scenario.model_validate(
+        {"law": "none", "attraction": {"stiffness_n_m": 30}}
+    )
+    point = resting_equilibrium(ideal_loop(ideal_scenario(stiff)), np.array([0.8, 0.0]))
+    with pytest.raises(ValueError, match="wheels, along: the loop is unstable without"):
+        delay_margin(point, "wheels")
 
 
 def test_no_loop_has_any_delay_margin():

@@ -46,6 +46,44 @@ def test_poles_at_todays_period_are_those_of_the_operating_point():
         assert np.abs(point.eigenvalues - pole).min() < 1e-4
 
 
+def growth(stiffness: float, damping: float, ticks: int = 0, period=T) -> float:
+    """1/s, of K on a position some ticks old, D and the lag: roots of a polynomial."""
+    decay = math.exp(-period / LAG)
+    # v+ = v + T a; w+ = decay w + (1 - decay) v+; p+ = p + b w + (T - b) v+.
+    z, b = np.poly1d([1.0, 0.0]), LAG * (1.0 - decay)
+    k, d = period / M * stiffness, period / M * damping
+    moved = (period - b) * (z - decay) + b * (1.0 - decay)
+    motion = (z - 1.0 + d) * (z - 1.0) * (z - decay) * z**ticks + k * moved * z
+    return math.log(np.abs(motion.roots).max()) / period
+
+
+def test_charts_hold_the_growth_of_the_difference_equation():
+    """A row a damping or spring, a column a spring or delay in whole ticks."""
+    springs, dampings = [1.0, 12.0, 60.0], [0.5, 3.0]
+    chart = gain_chart(Scenario(), stiffnesses_n_m=springs, dampings_n_s_m=dampings)
+    expected = [[growth(k, d) for k in springs] for d in dampings]
+    np.testing.assert_allclose(chart.growth_per_s, expected, atol=1e-6)
+    assert chart.stable_share == np.mean(np.array(expected) < 0.0)
+    chart = gain_delay_chart(
+        Scenario(), delays_s=[0.0, 0.06, 0.1], stiffnesses_n_m=springs
+    )
+    np.testing.assert_allclose(chart.x, [0.0, 0.05, 0.1])
+    expected = [[growth(k, D, n) for n in (0, 2, 4)] for k in springs]
+    np.testing.assert_allclose(chart.growth_per_s, expected, atol=1e-6)
+    assert chart.today == (0.0, K)
+
+
+def test_growth_over_the_period_and_none_or_all_stable():
+    periods = [0.01, 0.1, 0.3]
+    found = poles_against_period(Scenario(), periods_s=periods)
+    expected = [growth(K, D, period=period) for period in periods]
+    np.testing.assert_allclose(found.growth_per_s, expected, atol=1e-6)
+    assert found.longest_stable_s == 0.3
+    stiff = poles_against_period(Scenario(), stiffness_n_m=500.0, periods_s=periods)
+    assert growth(500.0, D, period=0.01) > 0.0
+    assert stiff.longest_stable_s == 0.0
+
+
 def test_gain_charts_boundary_is_the_contact_limit():
     """At today's damping the chart turns from decay to growth at K_r + K_0."""
     limit = largest_contact_stiffness(Scenario())

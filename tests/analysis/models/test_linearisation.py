@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from analysis.models import linearisation
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.linearisation import (
@@ -20,6 +24,10 @@ from analysis.models.operating_points import moving_equilibrium, resting_equilib
 from diagrams.scenario import Scenario
 
 LAWS = ["none", "conventional", "active", "conventional2017", "active2017"]
+
+
+def made(**fields: Any) -> Any:
+    return SimpleNamespace(**fields)
 
 
 def points(law):
@@ -42,6 +50,53 @@ def test_signals_of_both_routes_are_the_same():
     assert whole.input_names == joined.input_names
     assert whole.output_names == joined.output_names
     np.testing.assert_allclose(whole.D, joined.D, atol=1e-8)
+
+
+def test_P_lies_175_mm_ahead_of_a_robot_that_looks_aside():
+    aside = {"law": "none", "source": {"waypoints_m": [[1.5, 1.5]]}}
+    point = follow_equilibrium(Scenario.model_validate(aside))
+    pose = point.loop.indices("plant")[:3]
+    across = 0.175 * np.array([-np.sin(point.theta_WB), np.cos(point.theta_WB)])
+    expected = [[1.0, 0.0, across[0]], [0.0, 1.0, across[1]], [0.0, 0.0, 1.0]]
+    assert abs(across).min() > 0.05
+    for model in (sampled_model(point), blockwise_model(point)):
+        np.testing.assert_allclose(model.C[:3, pose], expected, atol=1e-9)
+    continuous = continuous_model(point).C[:, :3]
+    np.testing.assert_allclose(continuous, expected, atol=1e-9)
+
+
+def test_routes_that_differ_are_told_by_how_much(monkeypatch):
+    """All of A 1 % off, which moves the poles by as much, and an element of D."""
+    (point, _) = points("active")
+    true = blockwise_model(point)
+    D = true.D.copy()
+    D[2, 1] -= 40.0
+    off = replace(true, A=1.01 * true.A, D=D)
+    monkeypatch.setattr(linearisation, "blockwise_model", lambda _: off)
+    found = compare_routes(point)
+    assert found.matrix_difference == pytest.approx(40.0)
+    moved = [min(abs(1.01 * true.poles - pole)) for pole in found.simple_poles]
+    assert found.pole_difference == pytest.approx(max(moved), rel=1e-5)
+    assert max(moved) > 1.1 * min(moved)
+    assert found.states == len(true.A)
+
+
+def test_gradient_of_a_made_up_map_with_a_corner():
+    """4 |x| in the last element; what is no state to step does not count."""
+    names = ("plant.x", "controller.feature_1", "tracker.P_1", "tracker.pose_x")
+
+    def step(x, _):
+        return np.array([3 * x[0] + 90 * x[1], 0, 90 * x[2], 2 * x[3] + 4 * abs(x[0])])
+
+    A = np.diag([3.0, 0.0, 0.0, 2.0])
+    A[0, 3] = -0.25
+    loop = made(
+        state_names=names, period_map=step, period_derivatives=lambda *_: made(A=A)
+    )
+    found = check_gradient(made(loop=loop, state=np.zeros(4), time_s=0.0), step=0.5)
+    assert (found.step, found.largest_difference, found.kink) == (0.5, 0.25, 8.0)
+    assert found.largest_at == ("plant.x", "tracker.pose_x")
+    assert found.kink_at == ("tracker.pose_x", "plant.x")
 
 
 def test_autodiff_is_the_slope_of_the_float_diagram():

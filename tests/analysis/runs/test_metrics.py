@@ -385,6 +385,29 @@ def test_smoothness_is_of_movements_of_4_s_and_not_of_rests():
     assert metrics["ldlj"] == pytest.approx(sum(ldlj) / 2.0)
 
 
+@pytest.mark.parametrize(("ripple_hz", "counts"), [(7.0, True), (12.0, False)])
+def test_ripples_count_up_to_10_hz(ripple_hz, counts):
+    """Spectrum of the bell e^(-5 t^2): e^(-pi^2 f^2/5), and 0.15 of it at the ripple's.
+
+    SPARC is the length of that curve up to where it last is at a twentieth.
+    """
+    time = np.arange(-80, 80) * TICK
+    ripple = 1.0 + 0.3 * np.sin(2.0 * math.pi * ripple_hz * time)
+    speed = 0.4 * np.exp(-5.0 * time**2) * ripple
+    run = motion(np.cumsum(speed) * TICK, 0 * time, 0 * time, columns={"v_WB_x": speed})
+
+    def bell(f):
+        return np.exp(-((math.pi * f) ** 2) / 5.0)
+
+    last = math.sqrt(5.0 * math.log(20.0)) / math.pi
+    if counts:
+        last = ripple_hz + math.sqrt(5.0 * math.log(3.0)) / math.pi
+    x = np.linspace(0.0, 1.0, 10_000)
+    curve = bell(last * x) + counts * 0.15 * bell(last * x - ripple_hz)
+    length = np.sum(np.hypot(np.diff(x), np.diff(curve)))
+    assert run_metrics(run)["sparc"] == pytest.approx(-length, rel=0.01)
+
+
 def test_reaction_is_to_the_obstacle_and_not_to_the_source():
     """The push exceeds 0.5 N when P is 0.8 m from the box's near face, 0.95."""
     ticks = 81

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+
+import control
 import numpy as np
 import pytest
 
@@ -46,6 +49,44 @@ def test_loop_without_lag_is_the_closed_form():
     np.testing.assert_allclose(inner, spring / (1.0 + damper), rtol=1e-3)
 
 
+def largest_root(spring: float, damper: float, ticks: int) -> float:
+    """|z| of a spring on a position some ticks old, a damper, and 50 ms of lag."""
+    mass, lag, T = 3.94, 0.05, 0.025
+    decay = math.exp(-T / lag)
+    # v+ = v + T a; w+ = decay w + (1 - decay) v+; p+ = p + b w + (T - b) v+.
+    z, b = np.poly1d([1.0, 0.0]), lag * (1.0 - decay)
+    moved = (T - b) * (z - decay) + b * (1.0 - decay)
+    motion = (z - 1.0 + T / mass * damper) * (z - 1.0) * (z - decay) * z**ticks
+    return float(np.abs((motion + T / mass * spring * moved * z).roots).max())
+
+
+def test_figures_are_the_worse_of_both_cuts():
+    """Of phase and modulus by control, of the rest by the difference equation."""
+    scenario = load_scenario("default", [*ALONE, "attraction.damping_n_s_m=3"])
+    figures = gain_figures(scenario, GainThresholds(spare_ticks=2))
+    found = []
+    for at in ("sensor", "actuator"):
+        L = attraction_loop(scenario, at)
+        system = control.ss(L.A, L.B, L.C, L.D, dt=L.period_s)
+        found.append(control.stability_margins(system, method="frd"))
+    _, phase, modulus, _, crossover, _ = np.array(found).T
+    # At the actuator the gain is of spring and damper, at the sensor of the spring.
+    gain = 10.0 ** (figures.gain_margin_db / 20.0)
+    border = largest_root(2.0 * gain, 3.0 * gain, 0), largest_root(2.0 * gain, 3.0, 0)
+    assert max(border) == pytest.approx(1.0, abs=1e-8)
+    assert figures.phase_margin_deg == pytest.approx(phase.min(), rel=2e-3)
+    assert figures.sensitivity_peak == pytest.approx(1.0 / modulus.min(), rel=2e-3)
+    delays = np.radians(phase) / crossover
+    assert figures.delay_margin_s == pytest.approx(delays.min(), rel=2e-3)
+    assert border[0] < border[1], "the sensor's gain margin is the lesser one"
+    assert phase[1] < phase[0], "but the actuator's phase margin"
+    slowest = -np.log(largest_root(2.0, 3.0, 0)) / 0.025
+    assert figures.settling_s == pytest.approx(4.0 / slowest)
+    assert figures.contact_radius == pytest.approx(largest_root(2.0, 3.0, 2))
+    limit = 2.0 + figures.largest_law_stiffness_n_m
+    assert largest_root(limit, 3.0, 0) == pytest.approx(1.0, abs=1e-8)
+
+
 def test_recommended_gains_meet_everything_and_less_damping_does_not():
     scenario = load_scenario("default", ["law=conventional"])
     found = recommend_gains(scenario, springs=(1.0, 2.0))
@@ -58,6 +99,7 @@ def test_recommended_gains_meet_everything_and_less_damping_does_not():
         assert figures.sensitivity_peak <= limits.sensitivity_peak
         assert figures.disk_margin >= limits.disk_margin
         assert figures.contact_radius < 1.0
+        assert figures.damping_n_s_m == round(figures.damping_n_s_m, 2)
         less = load_scenario(
             "default",
             [

@@ -90,7 +90,7 @@ def study(**parts):
         "linear_models": Made(routes=Made(matrix_difference=3e-12)),
         "step": Made(frequency_error=-0.03, damping_error=0.01),
     }  # fmt: skip
-    settings = {"law": "conventional", "stop": {"following_band_m": 1.0}}
+    settings = {"law": "conventional", "stop": {"goal_margin_m": 1.0}}
     return Study(Scenario.model_validate(settings), {**found, **parts})
 
 
@@ -166,6 +166,17 @@ def test_contact_growth_is_a_root_of_the_difference_equation(ticks):
     named = verdicts(Study(scenario, study().found))
     name = ("growth where the law is stiffest", "the same with echoes a tick late")
     assert named[name[ticks]].value == read_contact(Study(scenario), ticks)
+
+
+@pytest.mark.parametrize(
+    ("waypoints", "margin"), [([[2, 0]], 0.3), ([[2, 0], [5, 0]], 0.8)]
+)
+def test_a_jam_is_a_sink_where_a_run_is_not_in_its_goal(waypoints, margin):
+    """0.3 m beyond the follow distance of a resting source, 0.8 m of a moving one."""
+    places = [place(sign * margin + step) for sign in (-1, 1) for step in (-0.01, 0.01)]
+    source = {"source": {"waypoints_m": waypoints}}
+    found = {"equilibria": Made(search=Made(points=places))}
+    assert read_jams(Study(Scenario.model_validate(source), found)) == 1.0
 
 
 def test_signs_and_sides_do_not_hide():
