@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -64,7 +65,8 @@ def fail(*_args, **_options):
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
     """One line with kind and place, status 1; --debug prints the traceback."""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(place, fail)
+    module, _, function = place.rpartition(".")
+    monkeypatch.setattr(import_module(module), function, fail)
     status, printed, complaint = call(capsys, *words)
     assert (status, printed) == (1, "")
     assert complaint.count("\n") == 1

@@ -34,19 +34,18 @@ def test_failures_page_holds_the_whole_table_of_the_committed_result():
 
 
 @pytest.mark.parametrize(
-    ("module", "page", "results"),
+    ("script", "page", "results"),
     [
-        ("claims", "claims", ["laws", "following", "slip"]),
-        ("failure_shares", "failures", ["laws"]),
+        ("analysis/comparison/claims.py", "claims", ["laws", "following", "slip"]),
+        ("docs/tables/failure_shares.py", "failures", ["laws"]),
     ],
 )
 def test_command_prints_the_table_of_the_page(
-    module, page, results, monkeypatch, capsys
+    script, page, results, monkeypatch, capsys
 ):
     files = [str(RESULTS / f"{name}.json") for name in results]
-    monkeypatch.setattr(sys, "argv", [module, *files])
-    script = ROOT / "analysis" / "sweeps" / f"{module}.py"
-    runpy.run_path(str(script), run_name="__main__")
+    monkeypatch.setattr(sys, "argv", [script, *files])
+    runpy.run_path(str(ROOT / script), run_name="__main__")
     text = (ROOT / "docs" / f"{page}.md").read_text("utf-8")
     assert f"\n\n{capsys.readouterr().out}\n" in text
 

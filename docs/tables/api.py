@@ -1,0 +1,49 @@
+"""The names that each room exports; ``python -m docs.tables.api`` prints the page."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from importlib import import_module
+from pkgutil import iter_modules
+
+import analysis
+import diagrams
+import systems
+
+__all__ = ["api_page"]
+
+_TOP = """# Names to import
+
+Each room exports what is meant for others; modules below a room may move. Blocks are in
+`systems` itself, too. `python -m docs.tables.api` prints this page.
+"""
+
+
+def rooms() -> list[str]:
+    """Packages with names of their own, those that others rest on first."""
+    found = ["systems"]
+    for package in (systems, diagrams, analysis):
+        if package is diagrams:
+            found.append("diagrams")
+        found += [
+            f"{package.__name__}.{part.name}"
+            for part in iter_modules(package.__path__)
+            if part.ispkg
+        ]
+    return found
+
+
+def api_page() -> str:
+    """The page, as Markdown."""
+    parts = [_TOP]
+    for name in rooms():
+        room = import_module(name)
+        about = (inspect.getdoc(room) or "").partition("\n")[0]
+        names = ", ".join(f"`{x}`" for x in room.__all__ if not x.endswith("_"))
+        parts.append(f"## {name}\n\n{about}\n\n{names}\n")
+    return "\n".join(parts)
+
+
+if __name__ == "__main__":
+    sys.stdout.write(api_page())
