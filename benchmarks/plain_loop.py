@@ -25,7 +25,7 @@ from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_gener
 from systems.framework.signals import FRAME_PERIOD_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
-from systems.hearing.tracker_model import Estimate, Track, TrackerModel
+from systems.hearing.tracker_model import Measurement, Track, TrackerModel
 from systems.laws.active_impedance_controller import active_force
 from systems.laws.impedance import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points
@@ -116,7 +116,7 @@ class PlainLoop:
     def _track(self, track: Track, fix: Any, pose: Any) -> Any:
         if fix is not None:
             ports = port_values(fix, self.p_PA_B)
-            estimate = Estimate(ports[2], ports[3], fix.range_valid)
+            estimate = Measurement(ports[2], ports[3], fix.range_valid)
             track = self.tracker.hear(track, estimate, pose)
         target = self.tracker.position(track, pose)
         return self.tracker.older(track, pose), target

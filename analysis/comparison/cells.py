@@ -14,20 +14,20 @@ from analysis.reporting.intervals import bootstrap_interval, wilson_interval
 from analysis.runs.run_table import (
     ALL_RUNS,
     SUCCESSES,
+    bootstrap_seed,
     collisions,
-    figure,
-    stream,
+    column,
     successes,
 )
 
-__all__ = ["Cell", "Estimate", "ExampleRun", "Median", "make_cell"]
+__all__ = ["ExampleRun", "LawCell", "Mean", "Median", "make_cell"]
 
 ExampleKind = Literal["worst", "typical", "best"]
 EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
 
 
 @dataclass(frozen=True)
-class Estimate:
+class Mean:
     """A rate or a mean with its interval."""
 
     estimate: float
@@ -57,7 +57,7 @@ class ExampleRun:
 
 
 @dataclass(frozen=True)
-class Cell:
+class LawCell:
     """All runs of one law on one experiment's layouts."""
 
     scenario: str
@@ -69,9 +69,9 @@ class Cell:
     """How many runs ended so; collisions with whose fault it was in brackets."""
     mechanisms: dict[str, int]
     """How many runs failed so; see ``failure_mechanisms``."""
-    success: Estimate
-    collision: Estimate
-    spl: Estimate | None
+    success: Mean
+    collision: Mean
+    spl: Mean | None
     """Success weighted by path length; none where the source moves."""
     metrics: dict[str, Median]
     examples: tuple[ExampleRun, ...]
@@ -84,7 +84,7 @@ class Cell:
 
 def make_cell(
     scenario: str, fields: dict[str, Any], rows: pd.DataFrame, seed: int
-) -> Cell:
+) -> LawCell:
     """Summarises a cell of a sweep.
 
     Args:
@@ -95,17 +95,17 @@ def make_cell(
     """
     others = {key: value for key, value in fields.items() if key != "law"}
     success, collision = successes(rows), collisions(rows)
-    spl = figure(rows, "spl")
+    spl = column(rows, "spl")
     metrics = {}
     for name in (*ALL_RUNS, *SUCCESSES):
-        values = figure(rows, name)
+        values = column(rows, name)
         if name in SUCCESSES:
             values = values[success]
         values = values[np.isfinite(values)]
         if len(values):
-            interval = bootstrap_interval(values, seed=stream(seed, name))
+            interval = bootstrap_interval(values, seed=bootstrap_seed(seed, name))
             metrics[name] = Median(float(np.median(values)), *interval, len(values))
-    return Cell(
+    return LawCell(
         scenario=scenario,
         law=str(fields["law"]),
         fields=others,
@@ -114,7 +114,7 @@ def make_cell(
         mechanisms=_mechanisms(rows),
         success=_rate(success),
         collision=_rate(collision),
-        spl=_mean(spl[np.isfinite(spl)], stream(seed, "spl")),
+        spl=_mean(spl[np.isfinite(spl)], bootstrap_seed(seed, "spl")),
         metrics=metrics,
         examples=_examples(rows, success),
     )
@@ -122,7 +122,7 @@ def make_cell(
 
 def _examples(rows: pd.DataFrame, success: NDArray[np.bool_]) -> tuple[ExampleRun, ...]:
     """First, middle and last of the runs by success, then by clearance."""
-    clearance = figure(rows, "minimum_clearance_m")
+    clearance = column(rows, "minimum_clearance_m")
     order = np.lexsort((clearance, success))
     # A run that raised an error has no clearance, and nothing to look at.
     order = order[np.isfinite(clearance[order])]
@@ -153,13 +153,13 @@ def _mechanisms(rows: pd.DataFrame) -> dict[str, int]:
     return {str(name): int(count) for name, count in counts.items()}
 
 
-def _rate(flags: NDArray[np.bool_]) -> Estimate:
+def _rate(flags: NDArray[np.bool_]) -> Mean:
     interval = wilson_interval(int(np.sum(flags)), len(flags))
-    return Estimate(float(np.mean(flags)), *interval)
+    return Mean(float(np.mean(flags)), *interval)
 
 
-def _mean(values: NDArray[np.float64], seed: int) -> Estimate | None:
+def _mean(values: NDArray[np.float64], seed: int) -> Mean | None:
     if len(values) == 0:
         return None
     interval = bootstrap_interval(values, np.mean, seed=seed)
-    return Estimate(float(np.mean(values)), *interval)
+    return Mean(float(np.mean(values)), *interval)

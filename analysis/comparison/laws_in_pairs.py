@@ -15,7 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.comparison.cells import Cell, make_cell
+from analysis.comparison.cells import LawCell, make_cell
 from analysis.comparison.paired_statistics import (
     PairedMedian,
     PairedRate,
@@ -25,9 +25,9 @@ from analysis.comparison.paired_statistics import (
 from analysis.runs.run_table import (
     ALL_RUNS,
     SUCCESSES,
+    bootstrap_seed,
     collisions,
-    figure,
-    stream,
+    column,
     successes,
 )
 from analysis.sweeps.plan import SweepPlan
@@ -58,7 +58,7 @@ class Pair:
 class Comparison:
     """A sweep's cells and pairs."""
 
-    cells: list[Cell]
+    cells: list[LawCell]
     pairs: list[Pair]
 
 
@@ -155,7 +155,7 @@ def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
 
 def _pushed(rows: pd.DataFrame) -> NDArray[np.bool_]:
     """(n,) whether the law pushed back from an obstacle at all."""
-    return np.isfinite(figure(rows, "reaction_distance_m"))
+    return np.isfinite(column(rows, "reaction_distance_m"))
 
 
 def _medians(
@@ -168,9 +168,9 @@ def _medians(
     """Figures of the chosen pairs; those that no pair has are left out."""
     medians = {
         name: paired_median(
-            figure(first, name)[chosen],
-            figure(second, name)[chosen],
-            seed=stream(seed, name),
+            column(first, name)[chosen],
+            column(second, name)[chosen],
+            seed=bootstrap_seed(seed, name),
         )
         for name in names
     }

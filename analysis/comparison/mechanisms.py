@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pandas as pd
 
-from analysis.runs.run_table import figure
+from analysis.runs.run_table import column
 from diagrams.stop_rules import SUCCESSFUL
 from systems.framework.signals import FRAME_PERIOD_S
 
@@ -41,7 +41,7 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))
     names = names.replace({"stuck": "jam", "timeout": "jam", "unsettled": "swings"})
-    came = np.isfinite(figure(rows, "time_to_goal_s"))
+    came = np.isfinite(column(rows, "time_to_goal_s"))
     names = names.mask((cause == "stuck") & came, "held off")
     hits = cause == "collision"
     warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from matplotlib.ticker import MaxNLocator
 
-from analysis.comparison.cells import Cell, Estimate
+from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison
 from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import bounds
@@ -59,7 +59,7 @@ def plot_rates(comparisons: Sequence[Comparison]) -> Figure:
 
 
 def _rate_panel(
-    axes: Axes, cells: Sequence[Cell], rates: Sequence[Estimate], colour: str
+    axes: Axes, cells: Sequence[LawCell], rates: Sequence[Mean], colour: str
 ) -> None:
     places = np.arange(len(cells))
     values = np.array([100.0 * rate.estimate for rate in rates])
@@ -73,7 +73,7 @@ def _rate_panel(
     _label_laws(axes, cells)
 
 
-def _median_panel(axes: Axes, cells: Sequence[Cell], name: str) -> None:
+def _median_panel(axes: Axes, cells: Sequence[LawCell], name: str) -> None:
     for place, cell in enumerate(cells):
         median = cell.metrics.get(name)
         if median is not None:
@@ -83,14 +83,14 @@ def _median_panel(axes: Axes, cells: Sequence[Cell], name: str) -> None:
     _label_laws(axes, cells)
 
 
-def _label_laws(axes: Axes, cells: Sequence[Cell]) -> None:
+def _label_laws(axes: Axes, cells: Sequence[LawCell]) -> None:
     axes.set_yticks(np.arange(len(cells)), [cell.label for cell in cells])
     axes.set_ylim(len(cells) - 0.5, -0.5)
     axes.grid(axis="x", color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)
 
 
-def plot_examples(rows: Sequence[tuple[Cell, Sequence[RunResult]]]) -> Figure:
+def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure:
     """Worst, typical and best run of each cell, seen from above, in W, m."""
     results = [result for _, runs in rows for result in runs]
     limits = np.array([bounds(result, margin=0.6) for result in results])

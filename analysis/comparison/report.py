@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analysis.comparison.cells import Cell, Estimate, Median
+from analysis.comparison.cells import LawCell, Mean, Median
 from analysis.comparison.compare import PreparedComparison
 from analysis.comparison.laws_in_pairs import Comparison, Pair
 from analysis.reporting.provenance import versions
@@ -81,7 +81,7 @@ def write_comparison(
     plot_rates(list(comparisons.values())).savefig(out / "rates.png", dpi=150)
     done = 0
     for name, comparison in comparisons.items():
-        rows: list[tuple[Cell, list[RunResult]]] = []
+        rows: list[tuple[LawCell, list[RunResult]]] = []
         for cell in comparison.cells:
             results = []
             for result in _run_examples(prepared, cell):
@@ -95,7 +95,7 @@ def write_comparison(
     (out / "summary.json").write_text(text + "\n")
 
 
-def _run_examples(prepared: PreparedComparison, cell: Cell) -> Iterator[RunResult]:
+def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunResult]:
     """Runs a cell's examples again, and keeps their scenarios."""
     sweep = prepared.sweeps[cell.scenario]
     for example in cell.examples:
@@ -109,12 +109,12 @@ def _run_examples(prepared: PreparedComparison, cell: Cell) -> Iterator[RunResul
         yield simulate(scenario)
 
 
-def _example_file(cell: Cell, kind: str) -> str:
+def _example_file(cell: LawCell, kind: str) -> str:
     label = re.sub(r"[^\w.]+", "-", f"{cell.scenario} {cell.label} {kind}")
     return f"examples/{label}.yaml"
 
 
-def _command(out: Path, cell: Cell, kind: str) -> str:
+def _command(out: Path, cell: LawCell, kind: str) -> str:
     file = str(out / _example_file(cell, kind))
     return shlex.join(["phonotaxis", "simulate", file])
 
@@ -144,7 +144,7 @@ def compare_text(
     return "\n".join(lines)
 
 
-def _cell_lines(cells: list[Cell]) -> Iterator[str]:
+def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
     width = max(len("law"), *(len(cell.label) for cell in cells))
     headings = "".join(f"{title:>21}" for title, *_ in _COLUMNS)
     yield f"{'law':<{width}}{'success %':>17}{'collision %':>17}{headings}"
@@ -164,7 +164,7 @@ def _counts(counts: dict[str, int]) -> str:
     return ", ".join(f"{name} {count}" for name, count in counts.items())
 
 
-def _rate(rate: Estimate) -> str:
+def _rate(rate: Mean) -> str:
     low, high = 100.0 * rate.low, 100.0 * rate.high
     return f"{100.0 * rate.estimate:.0f} ({low:.0f}, {high:.0f})"
 

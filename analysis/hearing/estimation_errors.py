@@ -12,7 +12,7 @@ from scipy.stats import chi2
 __all__ = [
     "CONFIDENCE",
     "Consistency",
-    "Interval",
+    "RatioEstimate",
     "consistency",
     "rms_ratio",
     "stated_ratio",
@@ -23,7 +23,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Interval:
+class RatioEstimate:
     """An estimate with its 95 % confidence interval."""
 
     value: float
@@ -48,7 +48,7 @@ class Consistency:
         return self.low <= self.mean <= self.high
 
 
-def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Interval:
+def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
     """RMS of errors over the RMS of their standard deviations.
 
     The interval is that of a Gaussian's variance; without any error the ratio
@@ -60,10 +60,10 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Interval:
     """
     errors = np.asarray(errors, dtype=float)
     if errors.size == 0:
-        return Interval(math.inf, 0.0, math.inf)
+        return RatioEstimate(math.inf, 0.0, math.inf)
     square = float(np.mean(errors**2) / np.mean(np.square(stds)))
     low, high = chi2.interval(CONFIDENCE, errors.size) / np.array(errors.size)
-    return Interval(
+    return RatioEstimate(
         math.sqrt(square), math.sqrt(square / high), math.sqrt(square / low)
     )
 

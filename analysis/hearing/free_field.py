@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
 from analysis.hearing.estimation_errors import (
     Consistency,
-    Interval,
+    RatioEstimate,
     consistency,
     rms_ratio,
     stated_ratio,
@@ -155,12 +155,12 @@ class FreeFieldCell:
         return self.unheard + self.rangeless + int(wild.sum())
 
     @property
-    def bearing_ratio(self) -> Interval:
+    def bearing_ratio(self) -> RatioEstimate:
         """RMSE of the bearing over its bound."""
         return rms_ratio(self.bearing_errors, self.bearing_bounds)
 
     @property
-    def range_ratio(self) -> Interval:
+    def range_ratio(self) -> RatioEstimate:
         """RMSE of the range over its bound."""
         return rms_ratio(self.range_errors, self.range_bounds)
 

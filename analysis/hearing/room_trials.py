@@ -23,7 +23,7 @@ from systems.framework.noise import frame_noise, tick_generator
 from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
 from systems.hearing.localise import Localiser
 from systems.hearing.tdoa_estimator import TDOAParameters, port_values, robot_localiser
-from systems.hearing.tracker_model import Estimate, TrackerModel, TrackerParameters
+from systems.hearing.tracker_model import Measurement, TrackerModel, TrackerParameters
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.mic_array import FRAME_SAMPLES, microphones_B
@@ -198,7 +198,7 @@ def _fixes(
     frames: Iterator[NDArray[np.int16]],
     localiser: Localiser,
     p_PA_B: NDArray[np.float64],
-) -> Iterator[Estimate | None]:
+) -> Iterator[Measurement | None]:
     """What the estimator says of each frame, as the tracker takes it."""
     memory = localiser.blank()
     for frame in frames:
@@ -207,11 +207,11 @@ def _fixes(
             yield None
             continue
         ports = port_values(fix, p_PA_B)
-        yield Estimate(ports[2], ports[3], ranged=fix.range_valid)
+        yield Measurement(ports[2], ports[3], ranged=fix.range_valid)
 
 
 def _tracked(
-    estimates: Iterator[Estimate | None],
+    estimates: Iterator[Measurement | None],
     tracker: TrackerModel,
     pose: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:

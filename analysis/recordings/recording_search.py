@@ -17,7 +17,7 @@ from analysis.recordings.recording_spectra import RecordingSpectra
 from systems.hearing.steered_response import (
     LAG_DENSITY,
     SearchGrid,
-    arrival_delays,
+    centroid_delays,
     steered_response,
 )
 from systems.sound.array_shape import ArrayShape
@@ -201,7 +201,7 @@ class RecordingSearch:
         """Delays of the channels, aligned for a place of the grid first."""
         grid, rate = self.grid, self.recording.sample_rate_hz
         chosen = slice(place, place + 1)
-        later = arrival_delays(
+        later = centroid_delays(
             grid.p_AS[chosen], grid.inverse_range[chosen], self.shape, self.c
         )[0]
         lags = np.rint(later * rate).astype(np.int64)

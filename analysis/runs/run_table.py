@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from diagrams.stop_rules import SUCCESSFUL
 
-__all__ = ["ALL_RUNS", "SUCCESSES", "collisions", "figure", "stream", "successes"]
+__all__ = [
+    "ALL_RUNS",
+    "SUCCESSES",
+    "bootstrap_seed",
+    "collisions",
+    "column",
+    "successes",
+]
 
 #: Figures that any run has, however it ended.
 ALL_RUNS = (
@@ -54,13 +61,13 @@ def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
     return (rows["cause"] == "collision").to_numpy()
 
 
-def figure(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    """The figure of each run; NaN where it has none."""
+def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
+    """A figure of each run; NaN where it has none."""
     if name not in rows:
         return np.full(len(rows), np.nan)
     return rows[name].to_numpy(dtype=float)
 
 
-def stream(seed: int, name: str) -> int:
-    """Seed of a figure's own bootstrap."""
+def bootstrap_seed(seed: int, name: str) -> int:
+    """Seed of the bootstrap of a figure."""
     return crc32(json.dumps([seed, name]).encode())

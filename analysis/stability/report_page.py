@@ -23,7 +23,7 @@ from analysis.reporting.html_page import (
 from analysis.run_error import failure_text
 from analysis.stability.law_analysis import Finding, LawAnalysis
 from analysis.stability.model_sheet import Equation, ModelSheet, ParameterRow
-from analysis.stability.verdicts import Comparison, Verdict, compare_verdicts
+from analysis.stability.verdicts import Verdict, VerdictRow, compare_verdicts
 
 __all__ = ["stability_page"]
 
@@ -77,7 +77,7 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
     return section("summary", "Summary", parts)
 
 
-def _verdict_table(rows: Sequence[Comparison], laws: Sequence[str]) -> str:
+def _verdict_table(rows: Sequence[VerdictRow], laws: Sequence[str]) -> str:
     body: list[list[Cell]] = [
         [
             row.name,

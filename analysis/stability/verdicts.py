@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Comparison", "Criterion", "Verdict", "compare_verdicts", "judge"]
+__all__ = ["Criterion", "Verdict", "VerdictRow", "compare_verdicts", "judge"]
 
 Judgement = Literal["pass", "fail", "not applicable"]
 
@@ -59,7 +59,7 @@ class Verdict:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class VerdictRow:
     """One criterion, law by law."""
 
     name: str
@@ -99,7 +99,7 @@ def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdic
 
 def compare_verdicts(
     by_law: dict[str, Sequence[Verdict]],
-) -> tuple[Comparison, ...]:
+) -> tuple[VerdictRow, ...]:
     """The same criteria side by side, in the order of the first law's."""
     laws = list(by_law)
     rows = []
@@ -109,7 +109,7 @@ def compare_verdicts(
             for law, verdicts in by_law.items()
         }
         rows.append(
-            Comparison(
+            VerdictRow(
                 first.name,
                 first.unit,
                 first.threshold,

@@ -43,7 +43,7 @@ def locate_source(
         rarely less than two apertures.
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
-        fix = near_field.locate_source(tau, covariance, shape.equal_row, c)
+        fix = near_field.locate_in_row(tau, covariance, shape.equal_row, c)
         uncertain = fix.range_valid and fix.range_std >= fix.range
         return fix.without_range() if uncertain else fix
     u, w, variance, of_u, of_p, chi_square, twin = fit_delays(

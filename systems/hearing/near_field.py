@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import EqualRow
 
-__all__ = ["locate_source", "source_from_delays"]
+__all__ = ["locate_in_row", "source_from_delays"]
 
 # Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
 _LEAST_GAP_M = 1e-9
@@ -116,7 +116,7 @@ def _locate(
     return p_AS, of_p, math.sqrt(errors[1, 1]), r2, valid, range_std
 
 
-def locate_source(
+def locate_in_row(
     tau: NDArray[np.float64],
     covariance: NDArray[np.float64],
     row: EqualRow,

@@ -11,7 +11,7 @@ from systems.framework.input_error import InputError
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import FRAME_PERIOD_S
 from systems.hearing.tracker_model import (
-    Estimate,
+    Measurement,
     Track,
     TrackerModel,
     TrackerParameters,
@@ -132,7 +132,7 @@ def SourceTracker_(T):
             track = Track.unpack(context.get_discrete_state(0).CopyToVector())
             if detected[0] > 0.5:
                 ranged = bool(range_valid[0] > 0.5)
-                estimate = Estimate(p_PS_B, covariance, ranged)
+                estimate = Measurement(p_PS_B, covariance, ranged)
                 track = self._model.hear(track, estimate, pose)
             return track, pose
 

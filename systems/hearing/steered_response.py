@@ -23,7 +23,7 @@ __all__ = [
     "LAG_DENSITY",
     "NEAREST_M",
     "SearchGrid",
-    "arrival_delays",
+    "centroid_delays",
     "steered_response",
 ]
 
@@ -95,7 +95,7 @@ class SearchGrid:
             coarseness *= _COARSER
         places, inverse = _places(shape, coarseness * path)
         first, second = shape.pairs.T
-        later = arrival_delays(places, inverse, shape, c)
+        later = centroid_delays(places, inverse, shape, c)
         delays = lag_rate_hz * (later[:, second] - later[:, first])
         max_lag = math.ceil(lag_rate_hz * shape.max_delay(c)) + 1
         missed = (coarseness - 1.0) * path * shape.distances_m / shape.aperture_m
@@ -110,7 +110,7 @@ class SearchGrid:
         )
 
 
-def arrival_delays(
+def centroid_delays(
     places: NDArray[np.float64],
     inverse_range: NDArray[np.float64],
     shape: ArrayShape,

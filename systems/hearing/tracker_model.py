@@ -31,7 +31,7 @@ from systems.sound.array_shape import ArrayShape
 from systems.world.geometry import rotate
 
 __all__ = [
-    "Estimate",
+    "Measurement",
     "Track",
     "TrackerModel",
     "TrackerParameters",
@@ -65,7 +65,7 @@ class TrackerParameters(Parameters):
     """The outlier of this number in a row is believed, if they agree."""
 
 
-class Estimate(NamedTuple):
+class Measurement(NamedTuple):
     """What a hearing block says; floats or AutoDiffXd."""
 
     p_PS_B: NDArray[Any]
@@ -138,8 +138,8 @@ def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
     """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
 
     Args:
-        p_PS_B: See ``Estimate``.
-        covariance: See ``Estimate``.
+        p_PS_B: See ``Measurement``.
+        covariance: See ``Measurement``.
         ranged: 1 where the range is known, or 0.
         poses: Of the robot now, one tick and two ticks ago, (3,) each.
         age: Of the estimate, s.
@@ -210,7 +210,7 @@ class TrackerModel:
         pose = np.asarray(pose)
         return Track(pose, pose, pose, blank_memory(self._hypotheses))
 
-    def hear(self, track: Track, estimate: Estimate, pose: Any) -> Track:
+    def hear(self, track: Track, estimate: Measurement, pose: Any) -> Track:
         """The track with an estimate folded in that arrives at ``pose``."""
         poses = np.asarray(pose), track.pose_1, track.pose_2
         p_PS_B, covariance, ranged = estimate

@@ -9,12 +9,12 @@ from typing import Any
 import pandas as pd
 import pytest
 
-from analysis.comparison.cells import Cell, make_cell
+from analysis.comparison.cells import LawCell, make_cell
 
 NAN = math.nan
 
 
-def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> Cell:
+def summarised(fields: dict[str, Any] | None = None, **columns: Any) -> LawCell:
     table = {"index": [10 * k for k in range(len(columns["cause"]))], **columns}
     rows = pd.DataFrame({"collision_fault": None, **table})
     return make_cell("here", fields or {"law": "active"}, rows, 1)

@@ -8,25 +8,25 @@ import pytest
 
 from analysis.comparison.cells import (
     EXAMPLES,
-    Cell,
-    Estimate,
     ExampleRun,
+    LawCell,
+    Mean,
     Median,
 )
 from analysis.comparison.laws_in_pairs import Comparison
 from analysis.comparison.plots import plot_examples, plot_rates
 
 
-def cell(law: str, success: float) -> Cell:
-    return Cell(
+def cell(law: str, success: float) -> LawCell:
+    return LawCell(
         scenario="here",
         law=law,
         fields={"hearing": "ideal"},
         runs=50,
         causes={"completed": 50},
         mechanisms={},
-        success=Estimate(success, success - 0.1, success + 0.1),
-        collision=Estimate(0.2, 0.1, 0.4),
+        success=Mean(success, success - 0.1, success + 0.1),
+        collision=Mean(0.2, 0.1, 0.4),
         spl=None,
         metrics={"jerk_rms_m_s3": Median(1.5, 1.0, 2.5, 40)},
         examples=tuple(ExampleRun(kind, 0, "completed") for kind in EXAMPLES),

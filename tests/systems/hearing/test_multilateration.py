@@ -222,7 +222,7 @@ def test_a_row_takes_any_order_of_channels(order, dimension):
     assert fix.elevation is None
     # Seen from the row, the source is on the right: 12 - 3 o'clock.
     times = -np.hypot(0.7 - np.array([-0.4, 0.0, 0.4]), 1.2) / C
-    own = near_field.locate_source(
+    own = near_field.locate_in_row(
         times[0] - times[1:], covariance, EqualRow(0.4, np.eye(2), np.eye(2)), C
     )
     assert fix.range_std == pytest.approx(own.range_std)

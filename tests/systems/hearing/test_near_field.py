@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.hearing.near_field import locate_source, source_from_delays
+from systems.hearing.near_field import locate_in_row, source_from_delays
 from systems.sound.array_shape import EqualRow
 
 L, C = 0.4, 340.0
@@ -51,7 +51,7 @@ def test_channels_in_another_order():
     tau_12, tau_13 = delays(bearing, distance)
     row = EqualRow(L, np.array([[-1.0, 1.0], [-1.0, 0.0]]), np.eye(2))
     tau = np.array([-tau_13, tau_12 - tau_13])
-    fix = locate_source(tau, 1e-16 * np.eye(2), row, C)
+    fix = locate_in_row(tau, 1e-16 * np.eye(2), row, C)
     assert fix.bearing == pytest.approx(bearing)
     assert fix.range == pytest.approx(distance)
 
@@ -81,7 +81,7 @@ def test_no_finite_range_means_bearing_only(a, b):
 
 @given(st.floats(-3e-3, 3e-3), st.floats(-3e-3, 3e-3))
 def test_always_finite_and_in_front(tau_12, tau_13):
-    fix = locate_source(np.array([tau_12, tau_13]), np.eye(2) * 1e-14, ROW, C)
+    fix = locate_in_row(np.array([tau_12, tau_13]), np.eye(2) * 1e-14, ROW, C)
     assert -math.pi / 2 <= fix.bearing <= math.pi / 2
     assert np.isfinite([*fix.p_AS, fix.range, fix.bearing_std]).all()
     assert np.isfinite(fix.covariance).all()
@@ -94,7 +94,7 @@ def test_covariance_is_first_order(bearing, distance):
     """Against differences of the closed form."""
     taus = np.array(delays(bearing, distance))
     covariance = np.array([[2.0, 0.7], [0.7, 3.0]]) * 1e-16
-    fix = locate_source(taus, covariance, ROW, C)
+    fix = locate_in_row(taus, covariance, ROW, C)
 
     def position(tau):
         b, r, _ = source_from_delays(tau[0], tau[1], L, C)
@@ -117,14 +117,14 @@ def test_covariance_is_first_order(bearing, distance):
 
 def test_range_error_of_one_sample_at_four_metres():
     """b - 2a ~ l^2 / R, so that dR = R^2 / l^2 d(b - 2a): 34 cm a sample."""
-    fix = locate_source(np.array(delays(0.0, 4.0)), np.diag([1e-10, 0.0]), ROW, C)
+    fix = locate_in_row(np.array(delays(0.0, 4.0)), np.diag([1e-10, 0.0]), ROW, C)
     # A pure error of tau_12 enters b - 2a twice.
     assert fix.range_std == pytest.approx(2 * 16 / 0.16 * 3.4e-3, rel=0.02)
 
 
 def test_bearing_alone_is_a_unit_vector():
     taus = np.array(delays(0.5, 2.0))
-    fix = locate_source(taus, np.eye(2) * 1e-14, ROW, C).without_range()
+    fix = locate_in_row(taus, np.eye(2) * 1e-14, ROW, C).without_range()
     assert fix.p_AS == pytest.approx((math.cos(0.5), math.sin(0.5)))
     along = np.array(fix.p_AS)
     across = np.array([-along[1], along[0]])
@@ -137,7 +137,7 @@ def test_errors_of_a_bearing_without_range_are_across_it():
     """A plane wave from the left; sin(bearing) = c tau_13 / 2 l."""
     tau_13 = 2.0 * L * math.sin(0.6) / C
     covariance = np.array([[2.0, 0.7], [0.7, 3.0]]) * 1e-16
-    fix = locate_source(np.array([tau_13 / 2.0, tau_13]), covariance, ROW, C)
+    fix = locate_in_row(np.array([tau_13 / 2.0, tau_13]), covariance, ROW, C)
     assert not fix.range_valid
     assert fix.bearing == pytest.approx(0.6)
     std = C * math.sqrt(3e-16) / (2.0 * L * math.cos(0.6))

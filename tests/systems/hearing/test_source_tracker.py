@@ -13,7 +13,7 @@ from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
 from systems.base.robot import RobotParameters
 from systems.hearing.source_tracker import SourceTracker
 from systems.hearing.tracker_model import (
-    Estimate,
+    Measurement,
     Track,
     TrackerModel,
     TrackerParameters,
@@ -234,7 +234,7 @@ def test_exact_estimates_are_the_target(steps):
     for step in steps:
         x += step
         pose = np.array([step, x - 2.0, 0.3 + step])
-        estimate = Estimate(np.array([x, 1.0]), np.zeros(4), ranged=True)
+        estimate = Measurement(np.array([x, 1.0]), np.zeros(4), ranged=True)
         track = model.hear(track, estimate, pose)
         a, b, theta = past_pose(pose, track.pose_1, track.pose_2, 0.025)
         c, s = math.cos(theta), math.sin(theta)
@@ -336,7 +336,7 @@ def warm_memory(tracker, robot):
         pose = [0.05 + 0.004 * k, 0.1 + 0.008 * k, 0.25 + 0.01 * k]
         x, y = rng.normal([1.7, 0.6], 0.01) if k != 11 else (3.4, 0.6)
         covariance = np.array([1e-4, 2e-5, 2e-5, 2e-4])
-        estimate = Estimate(np.array([x, y]), covariance, ranged=True)
+        estimate = Measurement(np.array([x, y]), covariance, ranged=True)
         track = model.older(model.hear(track, estimate, pose), pose)
     return model.older(track, pose).pack()
 

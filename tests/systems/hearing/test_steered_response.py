@@ -11,7 +11,7 @@ from systems.hearing.steered_response import (
     LAG_DENSITY,
     NEAREST_M,
     SearchGrid,
-    arrival_delays,
+    centroid_delays,
     steered_response,
 )
 from systems.sound.array_shape import ArrayShape
@@ -55,7 +55,7 @@ def test_every_source_has_a_place_with_nearly_its_delays(source):
     shape, grid = SHAPES[name], GRIDS[name]
     rate = grid.lag_rate_hz
     for place, inverse in ((u, 0.0), (u * distance, 1.0 / distance)):
-        later = arrival_delays(place[np.newaxis], np.array([inverse]), shape, C)[0]
+        later = centroid_delays(place[np.newaxis], np.array([inverse]), shape, C)[0]
         first, second = shape.pairs.T
         lags = rate * (later[second] - later[first]) + grid.max_lag
         off = np.abs(grid.lags - lags).max(axis=1).min()
@@ -71,9 +71,9 @@ def test_delays_of_places_near_and_far(name):
     for distance in (0.7, 1e3):
         p = distance * u
         expected = np.linalg.norm(p - shape.p_AM, axis=1) - distance
-        near = arrival_delays(p[np.newaxis], np.array([1 / distance]), shape, C)[0]
+        near = centroid_delays(p[np.newaxis], np.array([1 / distance]), shape, C)[0]
         np.testing.assert_allclose(near, expected / C, atol=1e-12)
-    far = arrival_delays(u[np.newaxis], np.zeros(1), shape, C)[0]
+    far = centroid_delays(u[np.newaxis], np.zeros(1), shape, C)[0]
     np.testing.assert_allclose(far, expected / C, atol=1e-3 / C)
 
 
