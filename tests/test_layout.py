@@ -201,3 +201,19 @@ def test_a_circle_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     assert neighbours(tmp_path / "house") == {"a": {"b"}, "b": {"c"}, "c": {"a"}}
     with pytest.raises(graphlib.CycleError):
         test_no_rooms_and_no_files_import_one_another_in_a_circle(tmp_path / "house")
+
+
+def test_a_name_means_one_thing() -> None:
+    """No two public classes or functions of one name."""
+    homes: dict[str, list[str]] = {}
+    for package in FOLDERS:
+        for path in sources(package):
+            for node in ast.parse(path.read_text("utf-8")).body:
+                if isinstance(node, ast.ClassDef | ast.FunctionDef):
+                    homes.setdefault(node.name, []).append(str(path.relative_to(ROOT)))
+    twice = {
+        name: places
+        for name, places in homes.items()
+        if len(places) > 1 and not name.startswith("_")
+    }
+    assert not twice

@@ -22,8 +22,8 @@ from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.impedance import AttractionParameters
 
 __all__ = [
+    "attraction_damping_ratio",
     "braking_overshoot",
-    "damping_ratio",
     "follow_distance",
     "following_lag",
     "search_attraction",
@@ -53,7 +53,10 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
     time = scenario.stop.goal_margin_m / scenario.source.speed_m_s
 
     def excess(K_r: float) -> float:
-        return damping_ratio(_with(scenario, K_r, time * K_r)) - requirements.damping
+        return (
+            attraction_damping_ratio(_with(scenario, K_r, time * K_r))
+            - requirements.damping
+        )
 
     low, high = _STIFFNESSES_N_M
     if excess(low) * excess(high) > 0.0:
@@ -94,7 +97,7 @@ def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scena
     return scenario.model_copy(update={"stop": stop})
 
 
-def damping_ratio(scenario: Scenario) -> float:
+def attraction_damping_ratio(scenario: Scenario) -> float:
     """Least damping ratio of the loop to the follow point, along the robot.
 
     Sampled, with the motors' lag; no obstacle.

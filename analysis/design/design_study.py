@@ -7,8 +7,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from analysis.design.attraction_search import (
+    attraction_damping_ratio,
     braking_overshoot,
-    damping_ratio,
     follow_distance,
     following_lag,
     search_attraction,
@@ -161,7 +161,7 @@ def _alternative(
     overshoot = braking_overshoot(scenario)
     return Alternative(
         scenario=scenario,
-        damping_ratio=damping_ratio(scenario),
+        damping_ratio=attraction_damping_ratio(scenario),
         following_lag_m=following_lag(scenario),
         overshoot_m=overshoot,
         follow_distance_m=follow_distance(scenario, requirements, overshoot),

@@ -19,7 +19,7 @@ from scipy.optimize import brentq
 
 from analysis.linear.loop_margins import is_loop, loop_margins
 from analysis.models.linear_models import LinearModel
-from analysis.models.linearisation import plant_derivatives
+from analysis.models.linearisation import plant_jacobians
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model, open_loop
 from analysis.models.operating_points import OperatingPoint
@@ -89,7 +89,7 @@ class DelayedLoop:
         self._at = at
         loop = point.loop
         self._plant = loop.indices("plant")
-        self._A_plant, self._B_plant = plant_derivatives(point)
+        self._A_plant, self._B_plant = plant_jacobians(point)
         names = loop.state_names
         self._wheels = [names.index(f"command.wheel_{s}") for s in ("left", "right")]
         self._hearing = names.index(

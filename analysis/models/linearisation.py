@@ -27,7 +27,7 @@ __all__ = [
     "check_gradient",
     "compare_routes",
     "continuous_model",
-    "plant_derivatives",
+    "plant_jacobians",
     "sampled_model",
 ]
 
@@ -208,7 +208,7 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
         next(model for model in models if model.name == role)
         for role in ("collision", "controller", "command")
     )
-    A_plant, B_plant = plant_derivatives(point)
+    A_plant, B_plant = plant_jacobians(point)
     moving = [0, 1, 2, 5, 6]  # the wheels' angles move nothing
     A_plant, B_plant = A_plant[np.ix_(moving, moving)], B_plant[moving]
     seen = _signals(controller, "output", "acceleration_W")
@@ -261,7 +261,7 @@ def _signals(model: LinearModel, kind: str, port: str) -> list[int]:
     return [k for k, name in enumerate(names) if name.partition("[")[0] == port]
 
 
-def plant_derivatives(
+def plant_jacobians(
     point: OperatingPoint,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """A (7, 7) and B (7, 2) of the plant in continuous time.

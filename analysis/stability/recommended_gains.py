@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.design.attraction_search import damping_ratio, following_lag
+from analysis.design.attraction_search import attraction_damping_ratio, following_lag
 from analysis.linear.contact_mode import (
     contact_matrix,
     contact_spectral_radius,
@@ -210,7 +210,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
     return GainFigures(
         stiffness_n_m=K_r,
         damping_n_s_m=scenario.attraction.damping_n_s_m,
-        damping_ratio=damping_ratio(scenario),
+        damping_ratio=attraction_damping_ratio(scenario),
         phase_margin_deg=least("phase_margin_deg"),
         gain_margin_db=least("gain_margin_db"),
         sensitivity_peak=max(m.sensitivity_peak for m in margins),
@@ -309,7 +309,7 @@ def _with_gains(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
 
 
 def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
-    if damping_ratio(scenario) < thresholds.damping_ratio:
+    if attraction_damping_ratio(scenario) < thresholds.damping_ratio:
         return False
     if _contact_radius(scenario, thresholds) >= 1.0:
         return False

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.design.attraction_search import (
+    attraction_damping_ratio,
     braking_overshoot,
-    damping_ratio,
     follow_distance,
     following_lag,
 )
@@ -26,7 +26,7 @@ def changed(part: str, **changes) -> Scenario:
 
 def test_damping_ratio_of_the_printed_gains():
     """0.160 with the motors' lag, found by independent code."""
-    assert damping_ratio(SCENARIO) == pytest.approx(0.160, abs=1e-3)
+    assert attraction_damping_ratio(SCENARIO) == pytest.approx(0.160, abs=1e-3)
 
 
 def test_damping_ratio_without_lag_is_that_of_the_sampled_mass():
@@ -34,7 +34,9 @@ def test_damping_ratio_without_lag_is_that_of_the_sampled_mass():
     d, k = 1.0 * 0.025 / 3.94, 2.0 * 0.025**2 / 3.94
     s = cmath.log(np.roots([1.0, d + k - 2.0, 1.0 - d])[0])
     scenario = changed("plant", motor_lag_s=1e-6)
-    assert damping_ratio(scenario) == pytest.approx(-s.real / abs(s), rel=1e-4)
+    assert attraction_damping_ratio(scenario) == pytest.approx(
+        -s.real / abs(s), rel=1e-4
+    )
 
 
 def test_lag_behind_a_moving_source():
@@ -53,7 +55,7 @@ def test_default_follow_distance_has_room_for_the_overshoot():
 def test_damping_spares_the_room():
     """Critically damped: the lag of the motors alone."""
     stiff = changed("attraction", stiffness_n_m=2.0, damping_n_s_m=5.7)
-    assert damping_ratio(stiff) > 0.95
+    assert attraction_damping_ratio(stiff) > 0.95
     overshoot = braking_overshoot(stiff)
     assert overshoot < 0.03
     found = follow_distance(stiff, REQUIREMENTS, overshoot)
