@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.runs.collision_warning import collision_warning
 from analysis.runs.proximity import Proximity
 from analysis.runs.shortest_path import shortest_path_length
-from analysis.runs.sightings import sightings
 from analysis.runs.smoothness import (
     jerk,
     log_dimensionless_jerk,
@@ -255,7 +255,7 @@ def _reaction_distance(proximity: Proximity) -> float | None:
 
 def _collision_metrics(result: RunResult) -> dict[str, float | None]:
     """What the cones knew of the body that was hit."""
-    before = sightings(result)
+    before = collision_warning(result)
     return {
         "contact_warning_s": before.warning_s if before else None,
         "contact_unseen_s": before.unseen_s if before else None,

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from diagrams.simulation import RunResult
 from systems.ranging.ultrasonic_array import SENSORS, cone_ranges
 
-__all__ = ["Sightings", "sightings"]
+__all__ = ["CollisionWarning", "collision_warning"]
 
 #: An echo is a body's if the range that was read is so near to that body's, m.
 SAME_M = 0.03
 
 
 @dataclass(frozen=True)
-class Sightings:
+class CollisionWarning:
     """How a collision came about, as far as the sensors are concerned."""
 
     warning_s: float | None
@@ -29,7 +29,7 @@ class Sightings:
     """Push of the law at the last tick, N, whatever it was that pushed."""
 
 
-def sightings(result: RunResult) -> Sightings | None:
+def collision_warning(result: RunResult) -> CollisionWarning | None:
     """Echoes of the body that was hit; none without a collision or cones."""
     hit, columns = result.collision, result.columns
     if hit is None or "range_1" not in columns:
@@ -38,7 +38,7 @@ def sightings(result: RunResult) -> Sightings | None:
     first = result.time[known[0]] if len(known) else None
     last = result.time[known[-1]] if len(known) else None
     push = math.hypot(columns["repulsion_x"][-1], columns["repulsion_y"][-1])
-    return Sightings(
+    return CollisionWarning(
         warning_s=None if first is None else float(max(hit.time - first, 0.0)),
         unseen_s=None if last is None else float(max(hit.time - last, 0.0)),
         push_n=push,
