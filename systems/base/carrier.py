@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -158,8 +159,15 @@ def _driven_path(carrier: CarrierParameters) -> DrivenPath:
 
 @njit(cache=True)
 def drive(
-    state, poses, twists, wheel_acceleration, radius, separation, lag, *numbers
-):  # pragma: no cover  (compiled)
+    state: NDArray[np.float64],
+    poses: NDArray[np.float64],
+    twists: NDArray[np.float64],
+    wheel_acceleration: float,
+    radius: float,
+    separation: float,
+    lag: float,
+    *numbers: float,
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Follows a plan with feed-forward and feedback, tick by tick.
 
     Args:
@@ -314,7 +322,7 @@ class DrivenPath:
         )
 
 
-def _value_weights(s):
+def _value_weights(s: Any) -> tuple[Any, Any, Any]:
     """Of the cubic Hermite polynomial at s in [0, 1]: of b - a and of the slopes."""
     rest = FRAME_PERIOD_S * s * (1.0 - s)
     return s * s * (3.0 - 2.0 * s), rest * (1.0 - s), -rest * s

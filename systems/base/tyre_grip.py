@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
@@ -38,7 +38,13 @@ class GripNumbers(NamedTuple):
 
 
 @register_jitable
-def grip_accelerations(motion, rims, rim_accelerations, wheel_separation_m, grip):
+def grip_accelerations(
+    motion: Any,
+    rims: Any,
+    rim_accelerations: Any,
+    wheel_separation_m: float,
+    grip: GripNumbers,
+) -> tuple[Any, Any, Any]:
     """How the body's velocity changes by the forces of its tyres.
 
     Where the floor can give them, the forces are those with which no wheel slips.
@@ -94,7 +100,7 @@ def grip_accelerations(motion, rims, rim_accelerations, wheel_separation_m, grip
 
 
 @register_jitable
-def _limited(x, y, limit):
+def _limited(x: Any, y: Any, limit: float) -> tuple[Any, Any]:
     """A force of at most this size in the same direction."""
     square = x * x + y * y
     if square > limit * limit:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -82,8 +83,13 @@ def frame_repeats(
 
 @njit(cache=True)
 def _frame_repeats(
-    frame, pairs, later, at_once, noisy, rounding
-):  # pragma: no cover  (compiled)
+    frame: NDArray[np.float32 | np.int16],
+    pairs: NDArray[np.int64],
+    later: NDArray[np.float64],
+    at_once: NDArray[np.bool_],
+    noisy: Any,
+    rounding: float,
+) -> bool:  # pragma: no cover  (compiled)
     middle = frame.shape[1] // 2
     for p in range(len(pairs)):
         i, j = pairs[p]
@@ -105,7 +111,9 @@ def _frame_repeats(
 
 
 @njit(cache=True)
-def _is_copy(left, power, other, rounding):  # pragma: no cover  (compiled)
+def _is_copy(
+    left: float, power: float, other: float, rounding: float
+) -> bool:  # pragma: no cover  (compiled)
     """From what ``_difference`` returns."""
     least = max(_EXACT_SHARE * power, rounding)
     return power > 0.0 and other > 0.0 and left < min(least, _LIKE_SHARE * power)
@@ -177,7 +185,9 @@ def _shares(block: NDArray[np.float64], i: int, j: int, lag: int) -> float:
 
 
 @njit(cache=True)
-def _difference(first, second, lag):  # pragma: no cover  (compiled)
+def _difference(
+    first: NDArray[Any], second: NDArray[Any], lag: int
+) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Variances of what the second channel holds beyond the first, and of both."""
     begin, end = max(0, lag), min(second.size, second.size + lag)
     count = end - begin

@@ -7,9 +7,11 @@ see that a function in another one has changed.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from systems.framework.compiling import REORDER
 
@@ -24,7 +26,14 @@ _ROUNDING = 1.0 / 24.0
 
 
 @njit(cache=True, fastmath=REORDER, forceinline=True)
-def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compiled)
+def _turned(
+    cross: NDArray[np.complex64],
+    first: float,
+    step: float,
+    t: float,
+    real: NDArray[np.float64],
+    imaginary: NDArray[np.float64],
+) -> None:  # pragma: no cover  (compiled)
     """Fills in the parts of a cross-spectrum (n,) times exp(j w t).
 
     The turns come from a few cosines by doubling: the rest is sums and products.
@@ -47,8 +56,12 @@ def _turned(cross, first, step, t, real, imaginary):  # pragma: no cover  (compi
 
 @njit(cache=True, fastmath=REORDER, forceinline=True)
 def _slope_and_curve(
-    real, imaginary, weights, first, step
-):  # pragma: no cover  (compiled)
+    real: NDArray[np.float64],
+    imaginary: NDArray[np.float64],
+    weights: NDArray[np.float32],
+    first: float,
+    step: float,
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Derivatives of a correlation: sums of -w W Im(z) and of w^2 W Re(z)."""
     slope, curve = 0.0, 0.0
     for k in range(real.size):
@@ -59,7 +72,13 @@ def _slope_and_curve(
 
 
 @njit(cache=True, fastmath=REORDER, forceinline=True)
-def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled)
+def _sums(
+    real: NDArray[np.float64],
+    imaginary: NDArray[np.float64],
+    weights: NDArray[np.float32],
+    first: float,
+    step: float,
+) -> tuple[float, float, float, float, float]:  # pragma: no cover  (compiled)
     """Sums of Re(z), W Re(z), W |z|, w^2 W^2 Re(z) and w^2 W^2."""
     plain, aligned, total, squares, noise = 0.0, 0.0, 0.0, 0.0, 0.0
     for k in range(real.size):
@@ -73,7 +92,16 @@ def _sums(real, imaginary, weights, first, step):  # pragma: no cover  (compiled
 
 
 @njit(cache=True)
-def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (compiled)
+def _refine(
+    cross: NDArray[np.complex64],
+    weights: NDArray[np.float32],
+    first: float,
+    step: float,
+    start: NDArray[np.float64],
+    newton: Any,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]:  # pragma: no cover  (compiled)
     """Peaks of weighted cross-correlations, and sums for their errors.
 
     Args:
@@ -115,8 +143,14 @@ def _refine(cross, weights, first, step, start, newton):  # pragma: no cover  (c
 
 @njit(cache=True)
 def _arrival_variances(
-    r, sums, energy, pairs, to_shares, bins, padding
-):  # pragma: no cover  (compiled)
+    r: NDArray[np.float64],
+    sums: NDArray[np.float64],
+    energy: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    to_shares: NDArray[np.float64],
+    bins: int,
+    padding: float,
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """(n,) of each channel's time of arrival, samples^2.
 
     With noise of power n a bin and signal of power s, a correlation's peak moves
@@ -146,8 +180,12 @@ def _arrival_variances(
 
 @njit(cache=True)
 def _reconcile(
-    tau, arrivals, pairs, to_delays, reconciled
-):  # pragma: no cover  (compiled)
+    tau: NDArray[np.float64],
+    arrivals: NDArray[np.float64],
+    pairs: NDArray[np.int64],
+    to_delays: NDArray[np.float64],
+    reconciled: NDArray[np.float64],
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Fills in the arrivals that fit all delays best.
 
     Returns:
@@ -168,8 +206,16 @@ def _reconcile(
 
 @njit(cache=True)
 def measure_peaks(
-    cross, weights, energy, arrivals, tables, sizes, newton
-):  # pragma: no cover  (compiled)
+    cross: NDArray[np.complex64],
+    weights: NDArray[np.float32],
+    energy: NDArray[np.float64],
+    arrivals: NDArray[np.float64],
+    tables: tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]],
+    sizes: tuple[int, int, float],
+    newton: Any,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], float, float, float, float, float
+]:  # pragma: no cover  (compiled)
     """Fields of ``Peaks``; a correlation of 0 where there is no peak.
 
     Args:

@@ -28,7 +28,11 @@ def whitening(cross: NDArray[np.complex64]) -> NDArray[np.float32]:
 
 
 @njit(cache=True)
-def _pair_spectra(spectra, pairs):  # pragma: no cover  (compiled)
+def _pair_spectra(
+    spectra: NDArray[np.complex64], pairs: NDArray[np.int64]
+) -> tuple[
+    NDArray[np.complex64], NDArray[np.float32], NDArray[np.float64]
+]:  # pragma: no cover  (compiled)
     """Cross-spectra (p, bins) of pairs of channels, weights 1, and energies (n,)."""
     channels, bins = spectra.shape
     energy = np.zeros(channels)

@@ -9,7 +9,7 @@ noise alone would reach it.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -68,7 +68,9 @@ def amdf(
 
 
 @njit(cache=True, fastmath=REORDER)
-def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
+def _amdf(
+    x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     n = x_i.size
     out = np.empty(2 * max_lag + 1)
     for lag in range(-max_lag, max_lag + 1):
@@ -81,7 +83,9 @@ def _amdf(x_i, x_j, max_lag):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _peak(values):  # pragma: no cover  (compiled)
+def _peak(
+    values: NDArray[Any],
+) -> tuple[np.intp, float]:  # pragma: no cover  (compiled)
     """Place of the highest value, and the next peak's height over it.
 
     The main lobe ends on either side where the values have fallen below half
@@ -104,7 +108,11 @@ def _peak(values):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True, fastmath=REORDER)
-def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
+def _cross_spectra(
+    spectra: NDArray[np.complex64], edges: NDArray[np.int64], first: int, size: int
+) -> tuple[
+    NDArray[np.complex64], NDArray[np.float64], float
+]:  # pragma: no cover  (compiled)
     """Cross-spectra (e, size) of the edges, from the bin ``first`` on.
 
     Returns:
@@ -130,7 +138,9 @@ def _cross_spectra(spectra, edges, first, size):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _gated_peak(correlation, gate):  # pragma: no cover  (compiled)
+def _gated_peak(
+    correlation: NDArray[np.float32], gate: int
+) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Lag of the highest peak within the gate, second peak over it, its height."""
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
     gated[:gate] = correlation[correlation.size - gate :]
@@ -144,7 +154,9 @@ def _gated_peak(correlation, gate):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _chance_of_noise(heights, counts):  # pragma: no cover  (compiled)
+def _chance_of_noise(
+    heights: NDArray[np.float64], counts: NDArray[np.float64]
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Probability that noise reaches all peaks together, and the lowest of them.
 
     Args:
@@ -169,8 +181,13 @@ def _chance_of_noise(heights, counts):  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def _judge(
-    correlation, moments, edges, gates, padding, stretch
-):  # pragma: no cover  (compiled)
+    correlation: NDArray[np.float32],
+    moments: NDArray[np.float64],
+    edges: NDArray[np.int64],
+    gates: NDArray[np.int64],
+    padding: float,
+    stretch: float,
+) -> tuple[NDArray[np.float64], float, float, float]:  # pragma: no cover  (compiled)
     """Arrivals, ambiguity, chance and weakest of ``DelaySearch``.
 
     Args:

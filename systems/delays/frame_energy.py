@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from systems.framework.compiling import REORDER
 
@@ -15,7 +18,7 @@ BLOCK_SAMPLES = 64
 
 
 @njit(cache=True, fastmath=REORDER)
-def frame_energy(frame):  # pragma: no cover  (compiled)
+def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
     """Sum of squares of an (n, samples) frame about the means of short blocks."""
     channels, samples = frame.shape
     whole = samples - samples % BLOCK_SAMPLES
@@ -30,7 +33,9 @@ def frame_energy(frame):  # pragma: no cover  (compiled)
 
 # Inlined, so that blocks of a known length vectorise.
 @njit(cache=True, fastmath=REORDER, inline="always", error_model="numpy")
-def _block_energy(samples, begin, count):  # pragma: no cover  (compiled)
+def _block_energy(
+    samples: NDArray[Any], begin: int, count: int
+) -> Any:  # pragma: no cover  (compiled)
     """Sum of squares about the mean of one block; whole numbers will do."""
     total, squares = np.float32(0.0), np.float32(0.0)
     for k in range(count):

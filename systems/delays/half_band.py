@@ -7,8 +7,11 @@ It is symmetrical and the same for all channels, so that delays stay what they a
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from systems.framework.compiling import REORDER
 
@@ -35,7 +38,9 @@ _TAPS = _taps()
 
 
 @njit(cache=True)
-def halve_rate(frame):  # pragma: no cover  (compiled)
+def halve_rate(
+    frame: NDArray[Any],
+) -> NDArray[np.float32]:  # pragma: no cover  (compiled)
     """Every other sample of what passes.
 
     Args:
@@ -56,7 +61,12 @@ def halve_rate(frame):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True, fastmath=REORDER, forceinline=True)
-def _halve_row(samples, even, odd, out):  # pragma: no cover  (compiled)
+def _halve_row(
+    samples: NDArray[Any],
+    even: NDArray[np.float32],
+    odd: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Fills in one channel; odd (half,) is scratch, and even between its ends."""
     inside = even[_PAIRS - 1 : _PAIRS - 1 + odd.size]
     for k in range(odd.size):

@@ -32,7 +32,9 @@ def cut_to_overlap(
 
 
 @njit(cache=True)
-def cut_rows(frame, arrivals, rows, columns):  # pragma: no cover  (compiled)
+def cut_rows(
+    frame: NDArray[np.float32], arrivals: NDArray[np.float64], rows: int, columns: int
+) -> tuple[NDArray[np.float32], int]:  # pragma: no cover  (compiled)
     """``cut_to_overlap``, with zeros after and below.
 
     Returns:
@@ -54,7 +56,7 @@ def cut_rows(frame, arrivals, rows, columns):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _ramp(k):  # pragma: no cover  (compiled)
+def _ramp(k: float) -> np.float32:  # pragma: no cover  (compiled)
     """A raised cosine's sample of number k, which need not be whole."""
     share = min(max((k + 0.5) / EDGE_SAMPLES, 0.0), 1.0)
     return np.float32(0.5 - 0.5 * math.cos(math.pi * share))

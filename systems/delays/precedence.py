@@ -59,7 +59,13 @@ class EchoMemory:
 
 
 @njit(cache=True)
-def _weigh(spectra, memory, decay, floor, noise):  # pragma: no cover  (compiled)
+def _weigh(
+    spectra: NDArray[np.complex64],
+    memory: NDArray[np.float32],
+    decay: np.float32,
+    floor: np.float32,
+    noise: np.float32,
+) -> float:  # pragma: no cover  (compiled)
     """Weights spectra (n, instants, bins) in place; memory becomes the last one.
 
     Returns:
@@ -91,7 +97,12 @@ def _weigh(spectra, memory, decay, floor, noise):  # pragma: no cover  (compiled
 
 
 @njit(cache=True)
-def _overlap_add(pieces, taper, hop, out):  # pragma: no cover  (compiled)
+def _overlap_add(
+    pieces: NDArray[np.float32],
+    taper: NDArray[np.float32],
+    hop: int,
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     channels, instants, window = pieces.shape
     for m in range(channels):
         for t in range(instants):

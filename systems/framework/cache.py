@@ -23,7 +23,7 @@ def declare_cache(
     read ``entry.Eval(context)``; they must not change the object.
     """
 
-    def calc(context, value):
+    def calc(context: Any, value: Any) -> None:
         value.set_value(compute(context))
 
     producer = ValueProducer(allocate=lambda: Value(object()), calc=calc)

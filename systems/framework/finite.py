@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numpy.typing import NDArray
 
 from systems.framework.compiling import REORDER
 from systems.framework.scalar_math import float_of
@@ -84,7 +85,7 @@ def check_record(context: Any, port: Any, record: Any) -> None:
 
 
 @njit(cache=True, fastmath=REORDER)
-def total(values):  # pragma: no cover  (compiled)
+def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
     """Sum of (n,) numbers in any order: not finite where one of them is not."""
     out = values.dtype.type(0.0)
     for k in range(values.size):

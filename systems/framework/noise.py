@@ -25,7 +25,7 @@ _STEP = np.uint64(0x9E3779B97F4A7C15)
 
 
 @njit(cache=True)
-def _scrambled(word):  # pragma: no cover  (compiled)
+def _scrambled(word: int | np.uint64) -> np.uint64:  # pragma: no cover  (compiled)
     """The finaliser of splitmix64: every bit of the result hangs on every bit."""
     word = np.uint64(word) + _STEP
     word = (word ^ (word >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
@@ -34,7 +34,9 @@ def _scrambled(word):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _tick_word(seed, tick):  # pragma: no cover  (compiled)
+def _tick_word(
+    seed: int | np.uint64, tick: int | np.uint64
+) -> np.uint64:  # pragma: no cover  (compiled)
     """A word for a seed and a tick."""
     return _scrambled(_scrambled(seed) ^ tick)
 
@@ -76,7 +78,12 @@ _QUANTILES = _quantiles()
 
 
 @njit(cache=True)
-def _add_quantiles(seed, tick, quantiles, out):  # pragma: no cover  (compiled)
+def _add_quantiles(
+    seed: np.uint64,
+    tick: np.uint64,
+    quantiles: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Fills out from the words of splitmix64 after theirs, two numbers a word."""
     state, low = _tick_word(seed, tick), np.uint64(0xFFFF)
     for k in range(0, out.size, 2):
@@ -125,7 +132,13 @@ _PAIRS = 625
 
 
 @njit(cache=True, fastmath=REORDER, forceinline=True, error_model="numpy")
-def _normal_pairs(state, uniform, angle, turn, out):  # pragma: no cover  (compiled)
+def _normal_pairs(
+    state: np.uint64,
+    uniform: NDArray[np.float32],
+    angle: NDArray[np.float32],
+    turn: NDArray[np.int32],
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Fills out (2 n,) from n words: the method of Box and Muller (1958).
 
     Of each word 23 bits decide on the radius, 24 on the angle within an eighth of
@@ -168,7 +181,9 @@ def _normal_pairs(state, uniform, angle, turn, out):  # pragma: no cover  (compi
 
 
 @njit(cache=True)
-def _fill_with_normals(seed, tick, out):  # pragma: no cover  (compiled)
+def _fill_with_normals(
+    seed: np.uint64, tick: np.uint64, out: NDArray[np.float32]
+) -> None:  # pragma: no cover  (compiled)
     """Fills out (n,) from the words of splitmix64, block after block."""
     state, block = _tick_word(seed, tick), 2 * _PAIRS
     uniform = np.empty(_PAIRS, dtype=np.float32)

@@ -128,7 +128,11 @@ def _spectra(
 
 
 @njit(cache=True)
-def _pair_sums(spectra, first, step, rest):  # pragma: no cover  (compiled)
+def _pair_sums(
+    spectra: NDArray[np.complex64], first: float, step: float, rest: NDArray[np.float64]
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
+]:  # pragma: no cover  (compiled)
     """Sums over the bins of the channels' products, turned back by their delays.
 
     Args:

@@ -19,7 +19,7 @@ numba compiles them in a tenth of the time.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -54,7 +54,15 @@ class DelayProblem(NamedTuple):
 
 
 @njit(cache=True)
-def _whitened(problem, basis, k, u, w, r, J):  # pragma: no cover  (compiled)
+def _whitened(
+    problem: DelayProblem,
+    basis: NDArray[np.float64],
+    k: int,
+    u: NDArray[np.float64],
+    w: float,
+    r: NDArray[np.float64],
+    J: NDArray[np.float64],
+) -> float:  # pragma: no cover  (compiled)
     """Fills in residuals r (m,) and slopes J (m, k + 1); returns the sum of r^2.
 
     Args:
@@ -99,7 +107,9 @@ def _whitened(problem, basis, k, u, w, r, J):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _factor(J, size, damping, prior):  # pragma: no cover  (compiled)
+def _factor(
+    J: NDArray[np.float64], size: int, damping: float, prior: float
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Cholesky factor of J^T J, damped (Marquardt), with a prior on the last."""
     N = np.zeros((size, size))
     trace = 0.0
@@ -122,7 +132,9 @@ def _factor(J, size, damping, prior):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _substitute(L, x):  # pragma: no cover  (compiled)
+def _substitute(
+    L: NDArray[np.float64], x: NDArray[np.float64]
+) -> None:  # pragma: no cover  (compiled)
     """x becomes (L L^T)^-1 x."""
     size = L.shape[0]
     for i in range(size):
@@ -136,7 +148,9 @@ def _substitute(L, x):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _least_squares(J, r, size, damping):  # pragma: no cover  (compiled)
+def _least_squares(
+    J: NDArray[np.float64], r: NDArray[np.float64], size: int, damping: float
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """x of least |J x - r| over the first columns of J."""
     x = np.zeros(size)
     for i in range(size):
@@ -147,7 +161,9 @@ def _least_squares(J, r, size, damping):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _dot(a, b):  # pragma: no cover  (compiled)
+def _dot(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
     total = 0.0
     for i in range(a.size):
         total += a[i] * b[i]
@@ -155,7 +171,9 @@ def _dot(a, b):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _coordinates(problem, u, bound):  # pragma: no cover  (compiled)
+def _coordinates(
+    problem: DelayProblem, u: NDArray[np.float64], bound: Any
+) -> tuple[NDArray[np.float64], int]:  # pragma: no cover  (compiled)
     """(d, k) what the coordinates of a direction do to it, and k.
 
     Where it is bound to unit length within the span, they are those across it,
@@ -194,7 +212,9 @@ def _coordinates(problem, u, bound):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _lifted(problem, v):  # pragma: no cover  (compiled)
+def _lifted(
+    problem: DelayProblem, v: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Direction with components v in the span, completed to the side."""
     off = math.sqrt(max(0.0, 1.0 - _dot(v, v)))
     u = np.empty(problem.side.size)
@@ -206,7 +226,9 @@ def _lifted(problem, v):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _within(problem, u):  # pragma: no cover  (compiled)
+def _within(
+    problem: DelayProblem, u: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """Components of a direction in the span."""
     v = np.empty(problem.span.shape[0])
     for j in range(v.size):
@@ -215,7 +237,9 @@ def _within(problem, u):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
+def _descend(
+    problem: DelayProblem, u: NDArray[np.float64], w: float, bound: Any, far: Any
+) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
     """Gauss-Newton steps, shortened where they lead uphill.
 
     Args:
@@ -269,7 +293,9 @@ def _descend(problem, u, w, bound, far):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _descend_within(problem, u, w, far):  # pragma: no cover  (compiled)
+def _descend_within(
+    problem: DelayProblem, u: NDArray[np.float64], w: float, far: Any
+) -> tuple[NDArray[np.float64], float, float]:  # pragma: no cover  (compiled)
     """``_descend`` to a place that exists: w >= 0 and |u| = 1."""
     bound = _is_bound(problem)
     cost = 0.0
@@ -287,13 +313,17 @@ def _descend_within(problem, u, w, far):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _is_bound(problem):  # pragma: no cover  (compiled)
+def _is_bound(problem: DelayProblem) -> bool:  # pragma: no cover  (compiled)
     """Whether the array has no side: all of a direction lies in its span."""
     return _dot(problem.side, problem.side) == 0.0
 
 
 @njit(cache=True)
-def _starts(problem):  # pragma: no cover  (compiled)
+def _starts(
+    problem: DelayProblem,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], int
+]:  # pragma: no cover  (compiled)
     """Components (s, r) and inverse ranges (s,) seen from microphone 0.
 
     The first start is far away. The number of starts is returned too.
@@ -319,7 +349,8 @@ def _starts(problem):  # pragma: no cover  (compiled)
     if _is_bound(problem):
         # Direction as a function of w, of length 1: a quadratic in w.
         v_w = _least_squares(A, half, rank, 0.0)
-        a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0
+        # The loops above count with a and b.
+        a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0  # type: ignore[assignment]
         reach = math.sqrt(max(0.0, b * b - a * c))
         for sign in (1.0, -1.0):
             w = (-b + sign * reach) / max(a, 1e-300)
@@ -339,7 +370,9 @@ def _starts(problem):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _from_centroid(problem, v, w):  # pragma: no cover  (compiled)
+def _from_centroid(
+    problem: DelayProblem, v: NDArray[np.float64], w: float
+) -> tuple[NDArray[np.float64], float]:  # pragma: no cover  (compiled)
     """Direction and inverse range, given from microphone 0, from the centroid."""
     length = math.sqrt(_dot(v, v))
     if length > 1.0 or (_is_bound(problem) and length > 0.0):
@@ -356,7 +389,11 @@ def _from_centroid(problem, v, w):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _search(problem):  # pragma: no cover  (compiled)
+def _search(
+    problem: DelayProblem,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]:  # pragma: no cover  (compiled)
     """The two best places: u (2, d), w (2,) and chi-square (2,)."""
     n, dim = problem.p.shape
     unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
@@ -381,7 +418,11 @@ def _search(problem):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _covariance(problem, u, w, prior):  # pragma: no cover  (compiled)
+def _covariance(
+    problem: DelayProblem, u: NDArray[np.float64], w: float, prior: float
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], int
+]:  # pragma: no cover  (compiled)
     """Errors at a place.
 
     Args:
@@ -421,7 +462,9 @@ def _covariance(problem, u, w, prior):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _carried(T, C, size):  # pragma: no cover  (compiled)
+def _carried(
+    T: NDArray[np.float64], C: NDArray[np.float64], size: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """T C T^T over the first columns of T."""
     dim = T.shape[0]
     out = np.zeros((dim, dim))
@@ -434,7 +477,17 @@ def _carried(T, C, size):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def fit_delays(problem, prior_w):  # pragma: no cover  (compiled)
+def fit_delays(
+    problem: DelayProblem, prior_w: float
+) -> tuple[
+    NDArray[np.float64],
+    float,
+    float,
+    NDArray[np.float64],
+    NDArray[np.float64],
+    float,
+    NDArray[np.float64],
+]:  # pragma: no cover  (compiled)
     """Place, its errors and its twin.
 
     Args:

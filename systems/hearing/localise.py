@@ -328,7 +328,9 @@ class Localiser:
         at_once = self._all if noisy else self._uneven
         return frame_repeats(frame, shape.pairs, later, at_once, noisy=noisy)
 
-    def _delays(self, frame, seen=None) -> DelayEstimate | None:
+    def _delays(
+        self, frame: NDArray[np.float32], seen: tuple[DelaySearch, slice] | None = None
+    ) -> DelayEstimate | None:
         return estimate_delays(
             frame,
             self.plan,

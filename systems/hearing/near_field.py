@@ -28,7 +28,9 @@ _LEAST_COSINE = 1e-3
 
 
 @njit(cache=True)
-def _ranges(a, b, spacing):  # pragma: no cover  (compiled)
+def _ranges(
+    a: float, b: float, spacing: float
+) -> tuple[bool, float, float, float]:  # pragma: no cover  (compiled)
     """Whether the delays have a finite range, and R1, R2, R3 in m."""
     if b - 2.0 * a <= _LEAST_GAP_M:
         return False, 0.0, 0.0, 0.0
@@ -39,7 +41,9 @@ def _ranges(a, b, spacing):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def source_from_delays(tau_12, tau_13, spacing, c):  # pragma: no cover  (compiled)
+def source_from_delays(
+    tau_12: float, tau_13: float, spacing: float, c: float
+) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
     """Bearing and range of the source from M2.
 
     Args:
@@ -61,7 +65,9 @@ def source_from_delays(tau_12, tau_13, spacing, c):  # pragma: no cover  (compil
 
 
 @njit(cache=True)
-def _spread(slopes, covariance):  # pragma: no cover  (compiled)
+def _spread(
+    slopes: NDArray[np.float64], covariance: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """J C J^T."""
     rows = slopes.shape[0]
     spread = np.zeros((rows, rows))
@@ -74,7 +80,9 @@ def _spread(slopes, covariance):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _slopes(bearing, r2, a, b, spacing, c):  # pragma: no cover  (compiled)
+def _slopes(
+    bearing: float, r2: float, a: float, b: float, spacing: float, c: float
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """(4, 2) what the errors of the two delays do to range, bearing, x and y."""
     sine, cosine = math.sin(bearing), math.cos(bearing)
     r1, r3 = r2 - a, r2 - a + b
@@ -91,8 +99,15 @@ def _slopes(bearing, r2, a, b, spacing, c):  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def _locate(
-    tau, covariance, to_delays, axes, spacing, c
-):  # pragma: no cover  (compiled)
+    tau: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    to_delays: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    spacing: float,
+    c: float,
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], float, float, bool, float
+]:  # pragma: no cover  (compiled)
     """Place, its covariance, and errors of bearing and range, in the array's axes."""
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]

@@ -250,7 +250,9 @@ def steered_response(
 
 
 @njit(cache=True)
-def _steer(correlations, lags):  # pragma: no cover  (compiled)
+def _steer(
+    correlations: NDArray[np.float32], lags: NDArray[np.int32]
+) -> NDArray[np.float32]:  # pragma: no cover  (compiled)
     places, pairs = lags.shape
     out = np.empty(places, dtype=np.float32)
     for g in range(places):

@@ -31,7 +31,7 @@ Layouts (m, s, in W):
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -106,32 +106,32 @@ def ages(hypotheses: int) -> NDArray[np.float64]:
 
 
 @register_jitable
-def chosen_track(memory):
+def chosen_track(memory: NDArray[Any]) -> NDArray[Any]:
     """The track that is believed, a view."""
     start = 3 if memory[0] <= 0.0 else 3 + HYPOTHESIS
     return memory[start : start + TRACK]
 
 
 @register_jitable
-def _hypothesis(memory, index):
+def _hypothesis(memory: NDArray[Any], index: int) -> NDArray[Any]:
     """Hypothesis 0 (ahead) or 1 (behind), a view."""
     return memory[1 + index * HYPOTHESIS : 1 + (index + 1) * HYPOTHESIS]
 
 
 @register_jitable
-def _track(hypothesis):
+def _track(hypothesis: NDArray[Any]) -> NDArray[Any]:
     """The track of a hypothesis, a view."""
     return hypothesis[2 : 2 + TRACK]
 
 
 @register_jitable
-def _outliers(hypothesis):
+def _outliers(hypothesis: NDArray[Any]) -> NDArray[Any]:
     """The track of a hypothesis' outliers, a view."""
     return hypothesis[2 + TRACK :]
 
 
 @register_jitable
-def _predict(track, seconds, fade, speed_std):
+def _predict(track: NDArray[Any], seconds: Any, fade: float, speed_std: float) -> None:
     """Moves a track on in time; its age stays."""
     variance = speed_std**2
     kept = np.exp(-seconds / fade)
@@ -157,7 +157,9 @@ def _predict(track, seconds, fade, speed_std):
 
 
 @register_jitable
-def _innovation(track, sighting, floor, scale, extra):
+def _innovation(
+    track: NDArray[Any], sighting: NDArray[Any], floor: float, scale: Any, extra: float
+) -> tuple[Any, ...]:
     """What a sighting says that the track did not.
 
     Args:
@@ -197,7 +199,9 @@ def _innovation(track, sighting, floor, scale, extra):
 
 
 @register_jitable
-def _robust_innovation(track, sighting, settings):
+def _robust_innovation(
+    track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
+) -> tuple[bool, Any, tuple[Any, ...]]:
     """The innovation as the filter uses it.
 
     One that chance would exceed in 1 % of the cases is not what the model
@@ -221,7 +225,7 @@ def _robust_innovation(track, sighting, settings):
 
 
 @register_jitable
-def _learn_scatter(track, squared, dimensions):
+def _learn_scatter(track: NDArray[Any], squared: Any, dimensions: Any) -> None:
     """Matches the sightings' covariance to their innovations.
 
     Reflections scatter estimates far beyond what noise does. Innovations that
@@ -233,7 +237,7 @@ def _learn_scatter(track, squared, dimensions):
 
 
 @register_jitable
-def _correct(track, found):
+def _correct(track: NDArray[Any], found: tuple[Any, ...]) -> None:
     """The Kalman correction by an innovation."""
     ex, ey, wxx, wxy, wyy, _, _ = found
     axx, axy, ayy, cxx, cxy, cyx, cyy = track[5:12]
@@ -259,7 +263,9 @@ def _correct(track, found):
 
 
 @register_jitable
-def _begin(track, sighting, settings):
+def _begin(
+    track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
+) -> None:
     """Makes a track of a source that is heard for the first time."""
     zx, zy, rxx, rxy, ryy, ox, oy, _, _, ranged = sighting
     track[:] = 0.0
@@ -281,7 +287,9 @@ def _begin(track, sighting, settings):
 
 
 @register_jitable
-def _follow(track, sighting, settings):
+def _follow(
+    track: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
+) -> tuple[bool, Any]:
     """Feeds one track; whether the sighting can belong to it (else: no change)."""
     moved = track.copy()
     seconds = track[0] - settings.measurement_age
@@ -296,7 +304,7 @@ def _follow(track, sighting, settings):
 
 
 @register_jitable
-def _mirrored(sighting):
+def _mirrored(sighting: NDArray[Any]) -> NDArray[Any]:
     """The sighting behind the row that gives the same delays."""
     zx, zy, rxx, rxy, ryy, ox, oy, nx, ny, ranged = sighting
     image = sighting.copy()
@@ -312,7 +320,13 @@ def _mirrored(sighting):
 
 
 @register_jitable
-def _inherit(memory, before, index, candidate, settings):
+def _inherit(
+    memory: NDArray[Any],
+    before: NDArray[Any],
+    index: int,
+    candidate: NDArray[Any],
+    settings: FilterSettings,
+) -> tuple[Any, Any, int]:
     """Continues the likelier of the histories that a hypothesis can have.
 
     Args:
@@ -351,7 +365,12 @@ def _inherit(memory, before, index, candidate, settings):
 
 
 @register_jitable
-def _choose(memory, front, back, largest):
+def _choose(
+    memory: NDArray[Any],
+    front: tuple[Any, Any, int],
+    back: tuple[Any, Any, int],
+    largest: float,
+) -> None:
     """Updates costs and choice from what ``_inherit`` says of both hypotheses.
 
     Args:
@@ -380,7 +399,9 @@ def _choose(memory, front, back, largest):
 
 
 @njit(cache=True)
-def fold(memory, sighting, settings):
+def fold(
+    memory: NDArray[Any], sighting: NDArray[Any], settings: FilterSettings
+) -> bool:
     """Folds a sighting into the memory.
 
     Args:
@@ -409,7 +430,9 @@ def fold(memory, sighting, settings):
 
 
 @njit(cache=True)
-def expected(memory, velocity_fade, speed_std):
+def expected(
+    memory: NDArray[Any], velocity_fade: float, speed_std: float
+) -> NDArray[Any]:
     """A copy of the chosen track as it is expected to be now.
 
     Args:

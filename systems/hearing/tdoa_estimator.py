@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ class TDOAEstimator(LeafSystem):
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
         )
 
-    def _listen(self, context, discrete_state) -> None:
+    def _listen(self, context: Any, discrete_state: Any) -> None:
         audio = self._audio.Eval(context)
         if not isinstance(audio, AudioFrame):
             raise TypeError(
@@ -125,7 +126,7 @@ class TDOAEstimator(LeafSystem):
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
 
-    def _remembered(self, context) -> tuple[HearingMemory, bool]:
+    def _remembered(self, context: Any) -> tuple[HearingMemory, bool]:
         """What the last frame left, and whether it held a place."""
         numbers = context.get_discrete_state(_MEMORY).value().tolist()
         energy, noise_energy, echoing, heard, located = numbers

@@ -104,7 +104,9 @@ class Track(NamedTuple):
 
 
 @register_jitable
-def past_pose(pose_now, pose_1, pose_2, age):
+def past_pose(
+    pose_now: NDArray[Any], pose_1: NDArray[Any], pose_2: NDArray[Any], age: Any
+) -> NDArray[Any]:
     """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line."""
     ticks = age / FRAME_PERIOD_S
     if ticks <= 1.0:
@@ -128,13 +130,20 @@ class _Microphones(NamedTuple):
 
 
 @register_jitable
-def _turned(c, s, x, y):
+def _turned(c: Any, s: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """(x, y) turned by the angle of cosine c and sine s."""
     return c * x - s * y, s * x + c * y
 
 
 @njit(cache=True)
-def _sighting(p_PS_B, covariance, ranged, poses, age, microphones):
+def _sighting(
+    p_PS_B: NDArray[Any],
+    covariance: NDArray[Any],
+    ranged: float,
+    poses: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
+    age: float,
+    microphones: _Microphones,
+) -> tuple[NDArray[Any], NDArray[Any]]:
     """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
 
     Args:

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numba import njit
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 from pydrake.systems.framework import LeafSystem
 from scipy.special import ndtri
@@ -109,8 +109,11 @@ class UltrasonicParameters(Parameters):
 
 @njit(cache=True)
 def world_rectangles(
-    poses_WO, sizes, pose_WS, source_size
-):  # pragma: no cover  (compiled)
+    poses_WO: NDArray[np.float64],
+    sizes: NDArray[np.float64],
+    pose_WS: NDArray[np.float64] | tuple[float, float, float],
+    source_size: tuple[float, float],
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """All bodies that can be seen or hit, (n + 1, 5); the master robot is last."""
     count = len(sizes) // 2
     rectangles = np.empty((count + 1, 5))
@@ -123,7 +126,10 @@ def world_rectangles(
 
 
 def cone_ranges(
-    pose_WB, rectangles, parameters: UltrasonicParameters, control_point_m: float
+    pose_WB: ArrayLike,
+    rectangles: NDArray[np.float64],
+    parameters: UltrasonicParameters,
+    control_point_m: float,
 ) -> NDArray[np.float64]:
     """True distance to the nearest surface in each cone.
 
@@ -167,8 +173,14 @@ def measured_ranges(
 
 @njit(cache=True)
 def _measured_ranges(
-    true_ranges, numbers, stretch, noise_m, least_luck, low, high
-):  # pragma: no cover  (compiled)
+    true_ranges: NDArray[np.float64],
+    numbers: NDArray[np.floating],
+    stretch: float,
+    noise_m: float,
+    least_luck: float,
+    low: float,
+    high: float,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
     for k in range(SENSORS):
         noise, luck = numbers[0, k], numbers[1, k]
@@ -250,7 +262,7 @@ class UltrasonicArray(LeafSystem):
             )
         sources = {port.ticket() for port in self._inputs}
         sources |= {self.time_ticket(), self.xd_ticket()}
-        self._readings = declare_cache(self, "readings", self._read, sources)
+        self._readings: Any = declare_cache(self, "readings", self._read, sources)
         for name, calc in (("ranges", self._calc_ranges), ("echo", self._calc_echo)):
             self.DeclareVectorOutputPort(
                 name=name,
@@ -265,7 +277,7 @@ class UltrasonicArray(LeafSystem):
             prerequisites_of_calc={self.time_ticket()},
         )
 
-    def _read(self, context) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _read(self, context: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(3,) ranges and (3,) echoes as they stand now."""
         pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
         tick = _tick(context)
@@ -282,20 +294,20 @@ class UltrasonicArray(LeafSystem):
         held[:, fires] = ranges[fires], echo[fires]
         return held[0], held[1]
 
-    def _hold(self, context, discrete_state):
+    def _hold(self, context: Any, discrete_state: Any) -> None:
         discrete_state.set_value(np.concatenate(self._readings.Eval(context)))
 
-    def _calc_ranges(self, context, output):
+    def _calc_ranges(self, context: Any, output: Any) -> None:
         output.SetFromVector(self._readings.Eval(context)[0])
 
-    def _calc_echo(self, context, output):
+    def _calc_echo(self, context: Any, output: Any) -> None:
         output.SetFromVector(self._readings.Eval(context)[1])
 
-    def _calc_ages(self, context, output):
+    def _calc_ages(self, context: Any, output: Any) -> None:
         tick, round_ = _tick(context), self._parameters.round_ticks
         ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in range(SENSORS)]
         output.SetFromVector(ages)
 
 
-def _tick(context) -> int:
+def _tick(context: Any) -> int:
     return round(context.get_time() / FRAME_PERIOD_S)

@@ -101,8 +101,12 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
 
 @njit(cache=True)
 def _silent_counts(
-    noise, gains, sigma, full_scale, out
-):  # pragma: no cover  (compiled)
+    noise: NDArray[np.float32],
+    gains: NDArray[np.float64],
+    sigma: float,
+    full_scale: np.float32,
+    out: NDArray[np.int16],
+) -> None:  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
         level = np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):
@@ -112,8 +116,14 @@ def _silent_counts(
 
 @njit(cache=True)
 def _counts(
-    pressure, noise, gains, gain, sigma, full_scale, out
-):  # pragma: no cover  (compiled)
+    pressure: NDArray[np.float32],
+    noise: NDArray[np.float32],
+    gains: NDArray[np.float64],
+    gain: float,
+    sigma: float,
+    full_scale: np.float32,
+    out: NDArray[np.int16],
+) -> None:  # pragma: no cover  (compiled)
     for m in range(noise.shape[0]):
         factor, level = np.float32(gains[m] * gain), np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):

@@ -268,7 +268,7 @@ class MicArray(LeafSystem):
             {self.all_parameters_ticket()},
         )
 
-    def _build_array(self, context) -> RealArray:
+    def _build_array(self, context: Any) -> RealArray:
         groups = [
             context.get_numeric_parameter(index).CopyToVector()
             for index in range(context.num_numeric_parameter_groups())
@@ -281,7 +281,7 @@ class MicArray(LeafSystem):
         p_BM = microphones_B(self._robot)
         return real_array(p_BM, self._parameters, tolerances, float(c))
 
-    def _remember(self, context, discrete_state):
+    def _remember(self, context: Any, discrete_state: Any) -> None:
         state = np.empty(7)
         state[0] = context.get_time()
         state[1:4], state[4:] = read_arrays(context, self._motion)
@@ -294,7 +294,7 @@ class MicArray(LeafSystem):
         """Whether reflections take new places at a tick."""
         return round(time / FRAME_PERIOD_S) % self._update_ticks == 0
 
-    def _emissions(self, context) -> list[Emission]:
+    def _emissions(self, context: Any) -> list[Emission]:
         emissions = []
         for port in self._sources:
             emission: Any = port.Eval(context)
@@ -316,11 +316,11 @@ class MicArray(LeafSystem):
 
     def _reflections(
         self,
-        context,
+        context: Any,
         pose: NDArray[np.float64],
         emissions: list[Emission],
         array: RealArray,
-    ):
+    ) -> Sequence[NDArray[np.float32] | None]:
         if self._reverberation is None:
             return ()
         present = self._places(pose, emissions)
@@ -330,7 +330,7 @@ class MicArray(LeafSystem):
         new = present if self._updates(time) else old
         return self._reverberation.frames(emissions, time, old, new, array)
 
-    def _record(self, context, output) -> None:
+    def _record(self, context: Any, output: Any) -> None:
         emissions = self._emissions(context)
         time = context.get_time()
         pose, velocity = read_arrays(context, self._motion)

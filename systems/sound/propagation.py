@@ -64,7 +64,9 @@ INTERPOLATION_KERNEL = _interpolation_kernel()
 
 
 @njit(cache=True)
-def _hermite(s, h, a, b, da, db):  # pragma: no cover  (compiled)
+def _hermite(
+    s: float, h: float, a: float, b: float, da: float, db: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Value and derivative at s in [0, 1] of the cubic between two knots."""
     s2, s3 = s * s, s * s * s
     value = (
@@ -81,8 +83,15 @@ def _hermite(s, h, a, b, da, db):  # pragma: no cover  (compiled)
 
 @njit(cache=True)
 def microphone_paths(
-    times, begin, pose_0, velocity_0, end, pose_1, velocity_1, p_BM
-):  # pragma: no cover  (compiled)
+    times: NDArray[np.float64],
+    begin: float,
+    pose_0: NDArray[np.float64],
+    velocity_0: NDArray[np.float64],
+    end: float,
+    pose_1: NDArray[np.float64],
+    velocity_1: NDArray[np.float64],
+    p_BM: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Places and velocities of the microphones of a moving robot.
 
     The pose follows the cubic Hermite polynomial between two ticks.
@@ -124,8 +133,15 @@ def microphone_paths(
 
 @njit(cache=True)
 def retarded_delays(
-    times, p_WM, v_WM, knot_times, p_WS, v_WS, c, rise=0.0
-):  # pragma: no cover  (compiled)
+    times: NDArray[np.float64],
+    p_WM: NDArray[np.float64],
+    v_WM: NDArray[np.float64],
+    knot_times: NDArray[np.float64],
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
+    c: float,
+    rise: float = 0.0,
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
     """Travelling times of the sound that arrives at given instants.
 
     Solves c d = |p_M(t) - p_S(t - d)| by Newton's method; the source is slower
@@ -175,7 +191,13 @@ def retarded_delays(
 
 
 @njit(cache=True, fastmath=REORDER, forceinline=True)
-def _delayed(samples, first, u, kernel, out):  # pragma: no cover  (compiled)
+def _delayed(
+    samples: NDArray[np.float32],
+    first: int,
+    u: NDArray[np.float32],
+    kernel: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Fills out (n,) with samples[first + i + 1/2 + u_i], interpolated."""
     begin, last = first - KERNEL_REACH + 1, 2 * KERNEL_REACH - 1
     near = samples[begin : begin + u.size + last]
@@ -193,8 +215,15 @@ def _delayed(samples, first, u, kernel, out):  # pragma: no cover  (compiled)
 # Divisions that check for zero, as Python's do, would keep the loop from vectorising.
 @njit(cache=True, fastmath=REORDER, error_model="numpy")
 def _interpolate(
-    samples, kernel, first, delays, rates, c, nearest, out
-):  # pragma: no cover  (compiled)
+    samples: NDArray[np.float32],
+    kernel: NDArray[np.float32],
+    first: NDArray[np.float64],
+    delays: NDArray[np.float64],
+    rates: NDArray[np.float64],
+    c: float,
+    nearest: float,
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Fills out (m, length) with samples of the delayed sound over distance.
 
     In units of samples: first (m,) is the place among the samples of each

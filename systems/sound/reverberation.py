@@ -87,7 +87,14 @@ class Reverberation:
             for k, emission in enumerate(emissions)
         ]
 
-    def _frame(self, emission, time, old, new, array):
+    def _frame(
+        self,
+        emission: Emission,
+        time: float,
+        old: tuple[float, ...],
+        new: tuple[float, ...],
+        array: RealArray,
+    ) -> NDArray[np.float32] | None:
         end = round((time - emission.start_time) * SAMPLE_RATE_HZ)
         if end < self._needed:
             raise InputError(

@@ -199,8 +199,15 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
 
 @njit(cache=True, fastmath=REORDER)
 def _add_arrivals(
-    images, p_S, p_M, early, per_m, nearest, kernel, out
-):  # pragma: no cover  (compiled)
+    images: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
+    p_S: NDArray[np.float64],
+    p_M: NDArray[np.float64],
+    early: NDArray[np.float64],
+    per_m: float,
+    nearest: float,
+    kernel: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
     """Adds a click for each image and microphone to out (m, length).
 
     images: signs, offsets and gains. p_S (3,) and p_M (m, 3) from the corner,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cache
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -179,7 +180,7 @@ class SoundEmitter(LeafSystem):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
-        self._emission = self.DeclareAbstractOutputPort(
+        self._emission: Any = self.DeclareAbstractOutputPort(
             name=f"emission{suffix}",
             alloc=lambda: Value(object()),
             calc=self._emit,
@@ -190,17 +191,17 @@ class SoundEmitter(LeafSystem):
             },
         )
 
-    def _start(self, context, discrete_state) -> None:
+    def _start(self, context: Any, discrete_state: Any) -> None:
         path = np.zeros((2, self._ticks, 2))
         path[0] = read_arrays(context, self._inputs)[0][:2]
         discrete_state.set_value(path.ravel())
 
-    def _remember(self, context, discrete_state):
+    def _remember(self, context: Any, discrete_state: Any) -> None:
         emission = self._emission.Eval(context)
         path = np.concatenate((emission.p_WS[1:], emission.v_WS[1:]))
         discrete_state.set_value(path.ravel())
 
-    def _emit(self, context, output):
+    def _emit(self, context: Any, output: Any) -> None:
         held, split = context.get_discrete_state(0).value(), 2 * self._ticks
         pose_WS, velocity = read_arrays(context, self._inputs)
         p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)

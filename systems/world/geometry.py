@@ -7,6 +7,7 @@ the caller, extents along its own x and y axes; m and rad.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -31,7 +32,7 @@ __all__ = [
 _NORM_FLOOR = 1e-12
 
 
-def safe_norm(x, y):
+def safe_norm(x: Any, y: Any) -> Any:
     """Length of (x, y); at zero its gradient is zero instead of NaN.
 
     Accepts floats and AutoDiffXd. Differs from the exact norm by at most
@@ -40,7 +41,7 @@ def safe_norm(x, y):
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
 
-def rotate(theta, x, y):
+def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Components in the outer frame of (x, y) given in a frame turned by theta.
 
     Accepts floats and AutoDiffXd. This is R = [[cos, -sin], [sin, cos]], the
@@ -50,7 +51,7 @@ def rotate(theta, x, y):
     return c * x - s * y, s * x + c * y
 
 
-def control_point(pose, offset):
+def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
     """Position p_WP of the control point of a body, m.
 
     Args:
@@ -61,7 +62,7 @@ def control_point(pose, offset):
     return x + offset * cos(theta), y + offset * sin(theta)
 
 
-def control_point_velocity(theta, velocity, offset):
+def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
     """Velocity v_WP of the control point of a body, m/s.
 
     Args:
@@ -74,7 +75,7 @@ def control_point_velocity(theta, velocity, offset):
     return vx - turning * np.sin(theta), vy + turning * np.cos(theta)
 
 
-def nearest_point_on_rectangle(point, rectangle):
+def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     """Vector from a point to the nearest point of a filled rectangle.
 
     Args:
@@ -91,7 +92,7 @@ def nearest_point_on_rectangle(point, rectangle):
     return rotate(theta, -du, -dv)
 
 
-def _outside(u, half):
+def _outside(u: Any, half: Any) -> Any:
     """How far u lies beyond the interval [-half, half], with its sign."""
     if u > half:
         return u - half
@@ -110,7 +111,9 @@ def rectangle_corners(rectangle: ArrayLike) -> NDArray[np.float64]:
 
 
 @njit(cache=True)
-def _corners(rectangle):  # pragma: no cover  (compiled)
+def _corners(
+    rectangle: NDArray[np.float64],
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     x, y, theta, length, width = rectangle
     c, s = math.cos(theta), math.sin(theta)
     corners = np.empty((4, 2))
@@ -123,7 +126,9 @@ def _corners(rectangle):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _nearest_on_segment(ax, ay, bx, by):  # pragma: no cover  (compiled)
+def _nearest_on_segment(
+    ax: float, ay: float, bx: float, by: float
+) -> float:  # pragma: no cover  (compiled)
     """Distance from the origin to the segment a-b."""
     ex, ey = bx - ax, by - ay
     squared = ex * ex + ey * ey
@@ -133,7 +138,9 @@ def _nearest_on_segment(ax, ay, bx, by):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def cone_range(x, y, axis, half_angle, rectangles):  # pragma: no cover  (compiled)
+def cone_range(
+    x: float, y: float, axis: float, half_angle: float, rectangles: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
     """Distance to the nearest surface inside a sensor's cone.
 
     Each edge is cut to the part inside the cone, whose nearest point is then
@@ -186,8 +193,13 @@ def cone_range(x, y, axis, half_angle, rectangles):  # pragma: no cover  (compil
 
 @njit(cache=True)
 def fan_ranges(
-    pose_WB, rectangles, axes, places, half_angle, control_point_m
-):  # pragma: no cover  (compiled)
+    pose_WB: NDArray[np.float64],
+    rectangles: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    places: NDArray[np.float64],
+    half_angle: float,
+    control_point_m: float,
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """``cone_range`` of each sensor of a body, (n,) m.
 
     Args:
@@ -214,7 +226,9 @@ def fan_ranges(
 
 
 @njit(cache=True)
-def rectangle_clearance(a, b):  # pragma: no cover  (compiled)
+def rectangle_clearance(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
     """Distance between two rectangles; negative depth where they overlap.
 
     The depth is that of the separating-axis test: the shortest way to push
@@ -264,7 +278,9 @@ def rectangle_clearance(a, b):  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def contact_time(a, b, vx, vy):  # pragma: no cover  (compiled)
+def contact_time(
+    a: NDArray[np.float64], b: NDArray[np.float64], vx: float, vy: float
+) -> float:  # pragma: no cover  (compiled)
     """Time until two rectangles touch, the first moving at (vx, vy), unturned.
 
     Along each side's normal the shadows of both overlap during one interval of

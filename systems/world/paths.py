@@ -323,7 +323,7 @@ def _corner(
     return arc, radius * half
 
 
-def seconds(context) -> float:
+def seconds(context: Any) -> float:
     """Time of a context as a float, whatever the context's scalar type."""
     time = context.get_time()
     return time if isinstance(time, float) else time.value()
