@@ -116,3 +116,15 @@ def test_command_refuses_what_cannot_be_designed(tmp_path, capsys):
     assert main([*words, "--out", str(tmp_path / "x")]) == 2
     assert "attraction.follow_distance_m: 3.5 m" in capsys.readouterr().err
     assert not (tmp_path / "x").exists()
+
+
+@pytest.mark.parametrize("law", ["conventional", "active"])
+def test_the_recommended_attraction_rests_inside_the_goal(law):
+    """Pushed off the master robot: without the reserve it rested 2 cm outside."""
+    plan = comparison_plan("two_static_obstacles_recommended", runs=1)
+    layout = plan.scenario_of(plan.points()[0])
+    changes = {"law": law, "hearing": "ideal", "obstacles": [], "duration_s": 20.0}
+    run = simulate(Scenario.model_validate(layout.model_dump() | changes))
+    assert run.cause == "reached"
+    distance = run.columns["source_range_true"][-1]
+    assert distance < layout.goal_radius_m - 0.05
