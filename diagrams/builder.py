@@ -1,274 +1,205 @@
-"""Wires the blocks into the sound-following robot."""
+"""Puts robots, sources and obstacles into one world."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
-from zlib import crc32
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
+from pydrake.systems.primitives import (
+    ConstantVectorSource,
+    Multiplexer,
+    VectorLogSink,
+)
 
-from diagrams.laws import make_controller
+from diagrams.robot import Parts, make_robot, make_source, parts_of
 from diagrams.scenario import Scenario
-from systems import (
-    CollisionVector,
-    DiffDrivePlant,
-    IdealObstacleSensor,
-    IdealSourceSensor,
-    MicArray,
-    Obstacles,
-    SoundEmitter,
-    SourceRobot,
-    SourceTracker,
-    TDOAEstimator,
-    UltrasonicArray,
-    WheelOdometry,
-    WheelSpeedCommand,
-)
+from systems import Obstacles
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
-from systems.sound.waveforms import SoundParameters
 
-__all__ = ["SoundFollower", "block_seed", "build_sound_follower"]
-
-#: Ports that a logged build records at every tick, where they exist: (block, port).
-LOGGED_PORTS = (
-    ("plant", "pose_WB"),
-    ("plant", "velocity_WB"),
-    ("source", "pose_WS"),
-    ("hearing", "p_PS_B"),
-    ("hearing", "detected"),
-    ("hearing", "range_valid"),
-    ("tracker", "p_WS_estimated"),
-    ("tracker", "target_valid"),
-    ("odometry", "pose_WB_estimated"),
-    ("collision", "collision_vectors_B"),
-    ("collision", "features"),
-    ("controller", "forces_W"),
-    ("controller", "obstacle_speeds"),
-    ("command", "wheel_speeds"),
-    ("command", "v_WP"),
-    ("ultrasonic", "ranges"),
-    ("ultrasonic", "echo"),
-)
-#: Those that it records besides where ``plant.friction`` is set.
-LOGGED_WITH_FRICTION = (("plant", "slip_velocities"),)
+__all__ = ["SoundFollower", "build_sound_follower"]
 
 
 @dataclass(frozen=True)
 class SoundFollower:
-    """A built diagram, with its blocks by role.
+    """A built scenario: its robots and sources by name.
 
-    Roles: plant, odometry, source, obstacles, hearing, tracker, collision,
-    controller, command; with audio also emitter and microphones, and
-    source_<name> and emitter_<name> of each interferer; with ultrasonic
-    sensing also ultrasonic.
+    ``blocks``, ``port``, ``log`` and ``logged`` are those of the only robot.
     """
 
     diagram: Diagram
     scenario: Scenario
-    blocks: dict[str, Any]
-    log: VectorLogSink | None
-    """Rows of the logged ports, one after the other; none unless asked for."""
-    logged: tuple[tuple[str, str], ...]
-    """(role, port) of what the log holds, in order."""
+    robots: Mapping[str, Parts]
+    """Each robot's blocks: plant, odometry, hearing, tracker, collision, controller,
+    command; with audio also microphones; with ultrasonic sensing also ultrasonic;
+    with a loudspeaker also emitter."""
+    sources: Mapping[str, Parts]
+    """Each source's blocks: source, and with audio emitter."""
+    obstacles: Obstacles
 
-    def port(self, role: str, name: str) -> Any:
-        """Output port of a block."""
-        return self.blocks[role].GetOutputPort(name)
+    @cached_property
+    def only(self) -> Parts:
+        """The one robot.
 
+        Raises:
+            InputError: There are several.
+        """
+        if len(self.robots) > 1:
+            raise InputError(
+                "robots",
+                f"there are {len(self.robots)}: {', '.join(self.robots)}; ask for one "
+                "by its name (SoundFollower.robots)",
+            )
+        return next(iter(self.robots.values()))
 
-def block_seed(seed: int, name: str) -> int:
-    """A block's own seed: depends on the scenario's seed and its name alone."""
-    sequence = np.random.SeedSequence([seed, crc32(name.encode())])
-    return int(sequence.generate_state(1, np.uint64)[0])
+    @cached_property
+    def blocks(self) -> dict[str, Any]:
+        """The only robot's blocks by part, those of the source that it follows, and
+        ``obstacles``."""
+        (target,) = map(self.scenario.target, self.scenario.all_robots)
+        blocks = {**self.sources[target].blocks, "obstacles": self.obstacles}
+        return {**blocks, **self.only.blocks}
+
+    @property
+    def log(self) -> VectorLogSink | None:
+        """The only robot's log; none unless asked for."""
+        return self.only.log
+
+    @property
+    def logged(self) -> Mapping[tuple[str, str], tuple[str, ...]]:
+        """What the only robot's log holds, see ``Parts``."""
+        return self.only.logged
+
+    def port(self, part: str, name: str) -> Any:
+        """Output port of a block of the only robot, its source or the obstacles."""
+        return self.blocks[part].GetOutputPort(name)
 
 
 def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
     """Builds the diagram of a scenario.
 
-    The same function builds every fidelity: ``hearing`` and
-    ``obstacle_sensing`` choose blocks with the same ports. With both ideal
-    and ``odometry.rounding`` off the diagram converts to AutoDiffXd.
+    Every robot and every source is a diagram of its own (``make_robot``,
+    ``make_source``); the world is shared: each robot sees and can hit the
+    obstacles, the other robots and the sources, and hears all that sounds.
 
     Args:
         scenario: What to build.
-        log: Whether to add a log of every port in ``LOGGED_PORTS``, and of
-            those in ``LOGGED_WITH_FRICTION`` where there is friction.
+        log: Whether each robot logs what its blocks name columns for.
 
     Raises:
         InputError: The law is not known.
-        InputError: The sound file cannot be played.
+        InputError: A sound file cannot be played.
     """
     builder = DiagramBuilder()
-    blocks = {
-        "source": SourceRobot(source=scenario.source),
-        "obstacles": Obstacles(obstacles=scenario.obstacles),
-        "plant": DiffDrivePlant(
-            robot=scenario.robot,
-            plant=scenario.plant,
-            initial_pose=scenario.start.pose,
-        ),
-        "odometry": WheelOdometry(
-            robot=scenario.robot,
-            odometry=scenario.odometry,
-            initial_pose=scenario.start.pose,
-        ),
-        **_hearing(scenario),
-        "tracker": _tracker(scenario),
-        **_obstacle_sensing(scenario),
-        "controller": make_controller(scenario),
-        "command": WheelSpeedCommand(robot=scenario.robot),
+    robots, audible = scenario.all_robots, set()
+    if any(robot.hearing == "audio" for robot in robots.values()):
+        audible = set(scenario.sounds())
+    sources = {
+        name: make_source(scenario, name, source, audible=name in audible)
+        for name, source in scenario.all_sources.items()
     }
-    for block in blocks.values():
-        builder.AddNamedSystem(block.get_name(), block)
-    _connect_by_name(builder, list(blocks.values()))
-    friction = scenario.plant.friction is not None
-    sink, logged = _add_log(builder, blocks, friction=friction) if log else (None, ())
+    obstacles = Obstacles(obstacles=scenario.obstacles)
+    followers = {}
+    for name in robots:
+        target = scenario.target(name)
+        followers[name] = make_robot(
+            _own(scenario, name, audible=name in audible),
+            name,
+            bodies=len(scenario.surroundings(name).obstacles),
+            others=[each for each in scenario.sounds() if each != target],
+            log=log,
+        )
+    for name, system in (
+        *sources.items(),
+        ("obstacles", obstacles),
+        *followers.items(),
+    ):
+        builder.AddNamedSystem(name, system)
+    world = _World(builder, scenario, obstacles, sources, followers)
+    for name in robots:
+        world.surround(name)
     diagram = builder.Build()
     diagram.set_name("sound_follower")
-    return SoundFollower(diagram, scenario, blocks, sink, logged)
-
-
-def _add_log(
-    builder: DiagramBuilder, blocks: dict[str, Any], *, friction: bool
-) -> tuple[VectorLogSink, tuple[tuple[str, str], ...]]:
-    """One sink behind a multiplexer: a third cheaper than a sink a port."""
-    logged = tuple(key for key in LOGGED_PORTS if key[0] in blocks)
-    if friction:
-        logged += LOGGED_WITH_FRICTION
-    ports = [blocks[role].GetOutputPort(name) for role, name in logged]
-    multiplexer = builder.AddNamedSystem(
-        "log_multiplexer", Multiplexer([port.size() for port in ports])
-    )
-    for index, port in enumerate(ports):
-        builder.Connect(port, multiplexer.get_input_port(index))
-    sink = LogVectorOutput(
-        multiplexer.get_output_port(0), builder, publish_period=FRAME_PERIOD_S
-    )
-    sink.set_name("log")
-    return sink, logged
-
-
-def _hearing(scenario: Scenario) -> dict[str, Any]:
-    if scenario.hearing == "ideal":
-        return {
-            "hearing": IdealSourceSensor(
-                robot=scenario.robot,
-                hearing=scenario.ideal_hearing,
-                sound=scenario.sound,
-                seed=block_seed(scenario.seed, "ideal_source_sensor"),
-            )
-        }
-    microphones = MicArray(
-        parameters=scenario.microphones,
-        robot=scenario.robot,
-        acoustics=scenario.acoustics,
-        room=scenario.room,
-        interferers=[interferer.name for interferer in scenario.interferers],
-        seed=block_seed(scenario.seed, "mic_array"),
-    )
-    emitters = {"emitter": _emitter(scenario, scenario.sound, microphones)}
-    for k, interferer in enumerate(scenario.interferers):
-        suffix = f"_{interferer.name}"
-        robot = SourceRobot(source=interferer, suffix=suffix)
-        emitters[f"source{suffix}"] = robot
-        try:
-            emitter = _emitter(scenario, interferer.sound, microphones, suffix)
-        except InputError as error:
-            field = f"interferers.{k}.{error.field}"
-            raise InputError(field, error.message) from None
-        emitters[f"emitter{suffix}"] = emitter
-    return {
-        **emitters,
-        "microphones": microphones,
-        "hearing": TDOAEstimator(
-            parameters=scenario.tdoa,
-            robot=scenario.robot,
-            acoustics=scenario.acoustics,
-        ),
-    }
-
-
-def _emitter(
-    scenario: Scenario, sound: SoundParameters, microphones: MicArray, suffix: str = ""
-) -> SoundEmitter:
-    return SoundEmitter(
-        sound=sound,
-        acoustics=scenario.acoustics,
-        maximum_range_m=microphones.maximum_range_m,
-        seed=block_seed(scenario.seed, f"sound_emitter{suffix}"),
-        suffix=suffix,
+    return SoundFollower(
+        diagram,
+        scenario,
+        {name: parts_of(system) for name, system in followers.items()},
+        {name: parts_of(system) for name, system in sources.items()},
+        obstacles,
     )
 
 
-def _tracker(scenario: Scenario) -> Any:
-    """An ideal estimate is a tick old, one from audio half a frame more.
-
-    It also is what its covariance says, and tells front from back.
-    """
-    tracker, age = scenario.tracker, 1.5 * FRAME_PERIOD_S
-    if scenario.hearing == "ideal":
-        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
-        tracker = tracker.model_copy(update=exact)
-        age = FRAME_PERIOD_S
-    return SourceTracker(robot=scenario.robot, tracker=tracker, measurement_age_s=age)
+def _own(scenario: Scenario, name: str, *, audible: bool) -> Scenario:
+    """A robot's own scenario; a loudspeaker that nobody hears is left out."""
+    own = scenario.of_robot(name)
+    return own if audible else own.model_copy(update={"loudspeaker": None})
 
 
-def _obstacle_sensing(scenario: Scenario) -> dict[str, Any]:
-    bodies: dict[str, Any] = {
-        "robot": scenario.robot,
-        "source_size": scenario.source_size,
-        "obstacle_count": len(scenario.obstacles),
-    }
-    if scenario.obstacle_sensing == "ideal":
-        return {
-            "collision": IdealObstacleSensor(
-                maximum_range_m=scenario.ultrasonic.maximum_range_m,
-                all_bodies=scenario.collision_vector.aggregation == "sum",
-                **bodies,
-            )
-        }
-    return {
-        "ultrasonic": UltrasonicArray(
-            parameters=scenario.ultrasonic,
-            acoustics=scenario.acoustics,
-            seed=block_seed(scenario.seed, "ultrasonic_array"),
-            **bodies,
-        ),
-        "collision": CollisionVector(
-            parameters=scenario.collision_vector,
-            sensors=scenario.ultrasonic,
-            robot=scenario.robot,
-            initial_pose=scenario.start.pose,
-        ),
-    }
+@dataclass(frozen=True)
+class _World:
+    """Joins what robots take from the world to those that give it."""
 
+    builder: DiagramBuilder
+    scenario: Scenario
+    obstacles: Any
+    sources: Mapping[str, Any]
+    robots: Mapping[str, Any]
 
-def _connect_by_name(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
-    """Joins every input port to the one output port of the same name.
+    def surround(self, name: str) -> None:
+        """Gives a robot all that it takes."""
+        around, target = self.scenario.surroundings(name), self.scenario.target(name)
+        self._give(name, "pose_WS", lambda: self._pose(target))
+        self._give(name, "emission", lambda: self._emission(target))
+        for other in self.scenario.sounds():
+            self._give(name, f"emission_{other}", lambda o=other: self._emission(o))
+        boxes = len(self.scenario.obstacles)
+        others = dict([*around.obstacles.items()][boxes:])
+        poses = [self._pose(other) for other in others]
+        sizes = [extent for body in others.values() for extent in body.size]
+        self._give(
+            name,
+            "poses_WO",
+            lambda: self._joined(name, "poses_WO", poses),
+        )
+        self._give(
+            name,
+            "sizes",
+            lambda: self._joined(name, "sizes", self._constant(name, sizes)),
+        )
 
-    A quantity has one name on every port (see docs/model.md), so the wiring
-    needs no list; an input whose quantity nobody or more than one block
-    publishes is an error.
-    """
-    outputs: dict[str, list[Any]] = {}
-    for block in blocks:
-        for index in range(block.num_output_ports()):
-            port = block.get_output_port(index)
-            outputs.setdefault(port.get_name(), []).append(port)
-    for block in blocks:
-        for index in range(block.num_input_ports()):
-            port = block.get_input_port(index)
-            sources = outputs.get(port.get_name(), [])
-            if len(sources) != 1:
-                raise InputError(
-                    f"{block.get_name()}",
-                    f"{len(sources)} blocks publish "
-                    f"{port.get_name()!r}, which it needs; give one block an output "
-                    "port of that name",
-                )
-            builder.Connect(sources[0], port)
+    def _give(self, name: str, port: str, source: Any) -> None:
+        robot = self.robots[name]
+        if robot.HasInputPort(port):
+            self.builder.Connect(source(), robot.GetInputPort(port))
+
+    def _pose(self, name: str) -> Any:
+        if name in self.sources:
+            return self.sources[name].GetOutputPort("pose_WS")
+        return self.robots[name].GetOutputPort("pose_WB")
+
+    def _emission(self, name: str) -> Any:
+        if name in self.sources:
+            return self.sources[name].GetOutputPort("emission")
+        return self.robots[name].GetOutputPort("own_emission")
+
+    def _constant(self, name: str, sizes: list[float]) -> list[Any]:
+        if not sizes:
+            return []
+        block = ConstantVectorSource(np.array(sizes))
+        self.builder.AddNamedSystem(f"sizes_of_others_for_{name}", block)
+        return [block.get_output_port()]
+
+    def _joined(self, name: str, port: str, more: list[Any]) -> Any:
+        """The obstacles' port, or it and others one after the other."""
+        first = self.obstacles.GetOutputPort(port)
+        ports = [each for each in (first, *more) if each.size()]
+        if not more:
+            return first
+        multiplexer = Multiplexer([each.size() for each in ports])
+        self.builder.AddNamedSystem(f"{port}_for_{name}", multiplexer)
+        for index, each in enumerate(ports):
+            self.builder.Connect(each, multiplexer.get_input_port(index))
+        return multiplexer.get_output_port(0)

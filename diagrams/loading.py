@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable, Mapping
 from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 from ruamel.yaml import YAML
 
+from diagrams.explain import explain
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, parse_yaml
-from systems.framework.input_error import InputError, shortened
+from systems.framework.input_error import InputError
 
 __all__ = [
     "dump_scenario",
-    "explain",
     "library_scenarios",
     "load_scenario",
     "parse_setting",
@@ -123,15 +122,21 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 def resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """A relative sound file lies beside the scenario, or where one works."""
-    interferers = data.get("interferers")
-    others = interferers if isinstance(interferers, list) else []
-    sounds = [other.get("sound") for other in others if isinstance(other, dict)]
-    for sound, key in [
-        (data.get("microphones"), "ego_noise_file"),
-        *((sound, "file") for sound in [data.get("sound"), *sounds]),
-    ]:
-        if isinstance(sound, dict) and isinstance(sound.get(key), str):
-            sound[key] = str((folder / sound[key]).resolve())
+    for place in [data, *_participants(data, "robots"), *_participants(data, "sources")]:
+        for group, key in (
+            ("microphones", "ego_noise_file"),
+            ("sound", "file"),
+            ("loudspeaker", "file"),
+        ):
+            fields = place.get(group)
+            if isinstance(fields, dict) and isinstance(fields.get(key), str):
+                fields[key] = str((folder / fields[key]).resolve())
+
+
+def _participants(data: dict[str, Any], group: str) -> list[dict[str, Any]]:
+    named = data.get(group)
+    found = named.values() if isinstance(named, dict) else ()
+    return [fields for fields in found if isinstance(fields, dict)]
 
 
 def parse_setting(text: str) -> tuple[str, Any]:
@@ -185,42 +190,3 @@ def _index(node: list[Any], part: str, key: str) -> int:
     raise InputError(
         key, f"{part!r} is not an index of a list of {len(node)}; count from 0"
     )
-
-
-def explain(error: ValidationError, model: type[BaseModel], what: str) -> InputError:
-    """The first complaint, as field, value and remedy on one line.
-
-    Args:
-        error: What pydantic found.
-        model: The model that it validated.
-        what: What the model is to a user, as 'a scenario'.
-    """
-    first = error.errors(include_url=False)[0]
-    field = ".".join(str(part) for part in first["loc"])
-    kind, message = first["type"], first["msg"]
-    if kind == "extra_forbidden":
-        message = f"is not a field of {what}; remove it"
-        return InputError(field, message + _near(field, model))
-    if kind == "value_error":
-        # A validator of several fields names the one to mend.
-        inner = first["ctx"]["error"]
-        named = [field, getattr(inner, "field", "")]
-        text = inner.message if isinstance(inner, InputError) else str(inner)
-        return InputError(".".join(filter(None, named)), text)
-    # Words of YAML for words of Python.
-    message = re.sub(r"dictionary or instance of \w+", "mapping", message)
-    message = message.replace("valid tuple", "valid list")
-    value = shortened(repr(first["input"]), 80)
-    return InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
-
-
-def _near(field: str, model: Any) -> str:
-    """A field of a similar name at the same place, if there is one."""
-    from difflib import get_close_matches
-
-    *parents, last = field.split(".")
-    for part in parents:
-        info = getattr(model, "model_fields", {}).get(part)
-        model = info.annotation if info else None
-    names = get_close_matches(last, getattr(model, "model_fields", {}), n=1)
-    return f" (did you mean {names[0]!r}?)" if names else ""

@@ -6,62 +6,43 @@ one name, one default and one legal range. See ``load_scenario`` for YAML.
 
 from __future__ import annotations
 
-import math
-from typing import Annotated, Literal, NamedTuple
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from itertools import combinations
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, StringConstraints, Strict, ValidationError, model_validator
 
-from systems.base.carrier import DrivenPath
-from systems.base.diff_drive_plant import PlantParameters
-from systems.base.robot import RobotParameters
+from diagrams.bodies import Body, LivePath, Path, Surroundings, robot_rectangle
+from diagrams.explain import explain
+from diagrams.participants import FollowerParameters, SourceParameters, joined
 from systems.base.source_robot import SourceRobotParameters
-from systems.base.wheel_odometry import OdometryParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
-    Angle,
     Duration,
     Fraction,
     Length,
     NonNegative,
     Parameters,
-    Point,
     Size,
     Speed,
 )
-from systems.hearing.ideal_source_sensor import IdealHearingParameters
-from systems.hearing.tdoa_estimator import TDOAParameters
-from systems.hearing.tracker_model import TrackerParameters
-from systems.laws.impedance import AttractionParameters
-from systems.laws.repulsion import RepulsionParameters
-from systems.ranging.collision_vector import CollisionVectorParameters
-from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, channel_skew
-from systems.sound.interferers import InterfererParameters
 from systems.sound.mic_array import microphones_B
 from systems.sound.room import RoomParameters
 from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import rectangle_clearance, rotate
 from systems.world.obstacles import ObstacleParameters
-from systems.world.paths import WaypointPath
 
-__all__ = ["Body", "Scenario", "StartParameters", "StopParameters"]
+__all__ = ["ROBOT", "SOURCE", "RunParameters", "Scenario", "StopParameters"]
 
+#: Names of the robot and of the source where there is one of each.
+ROBOT, SOURCE = "robot", "source"
 
-class StartParameters(Parameters):
-    """Where the robot starts, at rest."""
-
-    position_m: Point = (0.0, 0.0)
-    """Origin of B in W, m."""
-    heading_deg: Angle = 0.0
-    """Heading, deg CCW from the x axis of W."""
-
-    @property
-    def pose(self) -> tuple[float, float, float]:
-        """(x, y, theta), m and rad."""
-        return (*self.position_m, math.radians(self.heading_deg))
+_P = TypeVar("_P", bound=Parameters)
+_Name = Annotated[str, StringConstraints(pattern=r"\A[a-z][a-z0-9_]*\z")]
+_Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
 
 
 class StopParameters(Parameters):
@@ -97,26 +78,8 @@ class IntegratorParameters(Parameters):
     """Largest step, s."""
 
 
-class Body(NamedTuple):
-    """A rectangle that moves along a path."""
-
-    path: WaypointPath | DrivenPath
-    """Pose of its centre over time."""
-    size: tuple[float, float]
-    """Length and width, m."""
-
-    def rectangle(self, time: float) -> NDArray[np.float64]:
-        """(5,) x, y, theta, length, width in W at a time in s."""
-        return np.array([*self.path.pose(time), *self.size])
-
-    def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
-        """(n, 5) rectangles at many times at once."""
-        poses = self.path.poses(times)
-        return np.hstack([poses, np.tile(np.array(self.size), (len(poses), 1))])
-
-
-class Scenario(Parameters):
-    """One run. Every field has a default: the default scenario is complete."""
+class RunParameters(Parameters):
+    """What a run has beside its robots: name, seed, world, sources, end."""
 
     name: str = Field(default="default", min_length=1, pattern=r"\A[^\n]*\z")
     """Name in results."""
@@ -128,100 +91,188 @@ class Scenario(Parameters):
     """Longest simulated time, s; an hour at most."""
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; it has no walls."""
-    law: str = Field(default="active", min_length=1)
-    """``none``, ``conventional``, ``active`` (2019), ``conventional2017``,
-    ``active2017``, or ``package.module:Name``."""
-    hearing: Literal["audio", "ideal"] = "audio"
-    """Sound waves and microphones, or exact positions."""
-    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
-    """Cones, or exact nearest points."""
-
-    start: StartParameters = StartParameters()
+    robots: _Participants = {}
+    """By name, what each robot has other than the scenario says of a robot; empty:
+    one, named ``robot``, that has nothing other."""
+    sources: _Participants = {}
+    """By name, what each source has other than ``source`` and ``sound`` say; empty:
+    one, named ``source``."""
     source: SourceRobotParameters = SourceRobotParameters()
+    sound: SoundParameters = SoundParameters()
     obstacles: Annotated[
         tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
     ] = ()
     stop: StopParameters = StopParameters()
-
     acoustics: AcousticParameters = AcousticParameters()
-    sound: SoundParameters = SoundParameters()
     room: RoomParameters | None = None
-    interferers: Annotated[
-        tuple[InterfererParameters, ...], Strict(False), Field(max_length=16)
-    ] = ()
-    microphones: MicArrayParameters = MicArrayParameters()
-    tdoa: TDOAParameters = TDOAParameters()
-    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
-    tracker: TrackerParameters = TrackerParameters()
-    ultrasonic: UltrasonicParameters = UltrasonicParameters()
-    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
-    attraction: AttractionParameters = AttractionParameters()
-    repulsion: RepulsionParameters = RepulsionParameters()
-    robot: RobotParameters = RobotParameters()
-    plant: PlantParameters = PlantParameters()
-    odometry: OdometryParameters = OdometryParameters()
     integrator: IntegratorParameters = IntegratorParameters()
+
+
+class Scenario(FollowerParameters, RunParameters):
+    """One run. Every field has a default: the default scenario is complete.
+
+    What it says of a robot goes for all of them, but for what ``robots`` says
+    of one; so for sources.
+    """
+
+    @cached_property
+    def all_robots(self) -> dict[str, FollowerParameters]:
+        """Each robot with all that it has, by name."""
+        fields = FollowerParameters.model_fields
+        if not self.robots:
+            values = {key: getattr(self, key) for key in fields}
+            return {ROBOT: FollowerParameters.model_construct(**values)}
+        base, robots = self.model_dump(include=set(fields)), {}
+        for name, changes in self.robots.items():
+            own = joined(base, changes)
+            if isinstance(played := changes.get("loudspeaker"), Mapping):
+                own["loudspeaker"] = joined(self.sound.model_dump(), played)
+            robots[name] = _validated(FollowerParameters, own, f"robots.{name}")
+        return robots
+
+    @cached_property
+    def all_sources(self) -> dict[str, SourceParameters]:
+        """Each source with all that it has, by name."""
+        base = self.source.model_dump() | {"sound": self.sound.model_dump()}
+        return {
+            name: _validated(SourceParameters, joined(base, own), f"sources.{name}")
+            for name, own in (self.sources or {SOURCE: {}}).items()
+        }
+
+    def sounds(self) -> dict[str, SoundParameters]:
+        """What is played, by the name of the source or robot that plays it."""
+        played = {name: source.sound for name, source in self.all_sources.items()}
+        for name, robot in self.all_robots.items():
+            if robot.loudspeaker is not None:
+                played[name] = robot.loudspeaker
+        return played
+
+    def target(self, robot: str) -> str:
+        """Name of what a robot follows."""
+        return self.all_robots[robot].follows or next(iter(self.all_sources))
+
+    def of_robot(self, name: str) -> Scenario:
+        """The scenario as if a robot were alone with the source that it follows.
+
+        Where it follows a robot, ``source`` rests where that one starts.
+        """
+        if not self.robots and not self.sources:
+            return self
+        robot, target = self.all_robots[name], self.target(name)
+        own = {key: getattr(robot, key) for key in FollowerParameters.model_fields}
+        if target in self.all_sources:
+            fields = SourceRobotParameters.model_fields
+            data = self.all_sources[target].model_dump(include=set(fields))
+        else:
+            leader = self.all_robots[target]
+            length, width = leader.size
+            data = {
+                "waypoints_m": (leader.start.position_m,),
+                "heading_deg": leader.start.heading_deg,
+                "length_m": length,
+                "width_m": width,
+            }
+        source = SourceRobotParameters.model_validate(data)
+        own |= {"source": source, "sound": self.sounds()[target], "follows": ""}
+        return self.model_copy(update=own | {"robots": {}, "sources": {}})
+
+    def surroundings(
+        self, robot: str = "", paths: Mapping[str, Path] | None = None
+    ) -> Surroundings:
+        """All that a robot can hit and see, and what it follows.
+
+        Args:
+            robot: Its name; empty: the first one.
+            paths: Of the other robots; without them they rest at their starts.
+        """
+        robot = robot or next(iter(self.all_robots))
+        target, paths = self.target(robot), paths or {}
+        bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
+        for name, other in self.all_robots.items():
+            if name != robot:
+                path = paths.get(name) or LivePath(other.start.pose)
+                bodies[name] = Body(path, other.size)
+        for name, source in self.all_sources.items():
+            if source.body:
+                bodies[name] = Body(source.path(), (source.length_m, source.width_m))
+        bodies[target] = bodies.pop(target)
+        return Surroundings(bodies, target)
+
+    def bodies(self) -> dict[str, Body]:
+        """All that the first robot can hit, by name; what it follows is last."""
+        return dict(self.surroundings().bodies)
 
     @property
     def source_size(self) -> tuple[float, float]:
         """Length and width of the master robot, m."""
         return self.source.length_m, self.source.width_m
 
-    def bodies(self) -> dict[str, Body]:
-        """All that the robot can hit, by name: the obstacles, then ``source``."""
-        bodies = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
-        bodies["source"] = Body(self.source.path(), self.source_size)
-        return bodies
-
     @property
     def goal_radius_m(self) -> NonNegative:
-        """P is in the goal within this distance of the source, m.
+        """``goal_radius`` of ``source``, m."""
+        return self.goal_radius(moves=self.source.path().moves)
 
-        Of a moving source the goal is as wide as the following band.
+    def goal_radius(self, *, moves: bool) -> NonNegative:
+        """P is in the goal within this distance of what it follows, m.
+
+        Args:
+            moves: Whether that moves: the goal is as wide as the following band then.
         """
-        moves = self.source.path().moves
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.attraction.follow_distance_m + margin
+
+    @model_validator(mode="after")
+    def _check_names(self) -> Scenario:
+        taken = list(self.all_robots)
+        for field, names in (
+            ("sources", self.all_sources),
+            ("obstacles", [obstacle.name for obstacle in self.obstacles]),
+        ):
+            for name in names:
+                if name in taken:
+                    raise InputError(
+                        field,
+                        f"the name {name!r} is taken; give each obstacle, source and "
+                        "robot a name of its own",
+                    )
+                taken.append(name)
+        return self
+
+    @model_validator(mode="after")
+    def _check_targets(self) -> Scenario:
+        played, sources = self.sounds(), self.all_sources
+        for name, robot in self.all_robots.items():
+            field = f"robots.{name}.follows" if self.robots else "follows"
+            target = self.target(name)
+            if target not in played or target == name:
+                can = [each for each in played if each != name]
+                raise InputError(
+                    field,
+                    f"{target!r} is no source, nor another robot with a loudspeaker; "
+                    f"use {', '.join(can)}",
+                )
+            if target in sources and not sources[target].body:
+                raise InputError(
+                    f"sources.{target}.body",
+                    f"is off, but robot {name!r} follows it; what is followed has a "
+                    "body: set it to true",
+                )
+            if robot.tdoa.schedule_known and robot.hearing == "audio":
+                _check_schedule(field, target, played)
+        return self
 
     @model_validator(mode="after")
     def _check_step(self) -> Scenario:
         # Where explicit Runge-Kutta steps of these orders amplify a decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
-        lag, step = self.plant.motor_lag_s, self.integrator.step_s
-        if lag < step / limits[self.integrator.scheme]:
-            raise InputError(
-                "plant.motor_lag_s",
-                f"{lag} s is too short for steps of {step} s, which "
-                f"would be unstable; set integrator.step_s to {lag:g} or less",
-            )
-        return self
-
-    @model_validator(mode="after")
-    def _check_channels(self) -> Scenario:
-        channel_skew(self.microphones, len(self.robot.microphones_m))
-        return self
-
-    @model_validator(mode="after")
-    def _check_names(self) -> Scenario:
-        names = [obstacle.name for obstacle in self.obstacles]
-        for name in names:
-            if names.count(name) > 1 or name == "source":
+        step = self.integrator.step_s
+        for prefix, robot in self._robot_fields():
+            lag = robot.plant.motor_lag_s
+            if lag < step / limits[self.integrator.scheme]:
                 raise InputError(
-                    "obstacles",
-                    f"the name {name!r} is taken; give each obstacle a "
-                    "name of its own, other than 'source'",
-                )
-        return self
-
-    @model_validator(mode="after")
-    def _check_interferers(self) -> Scenario:
-        names = [interferer.name for interferer in self.interferers]
-        for name in names:
-            if names.count(name) > 1:
-                raise InputError(
-                    "interferers",
-                    f"the name {name!r} is taken; give each interferer a "
-                    "name of its own",
+                    f"{prefix}plant.motor_lag_s",
+                    f"{lag} s is too short for steps of {step} s, which "
+                    f"would be unstable; set integrator.step_s to {lag:g} or less",
                 )
         return self
 
@@ -230,16 +281,17 @@ class Scenario(Parameters):
         if self.room is None:
             return self
         self.room.walls(self.acoustics.c)
-        x, y, theta = self.start.pose
-        dx, dy = rotate(theta, *microphones_B(self.robot).T)
-        places = {
-            "source.waypoints_m": self.source.waypoints_m,
-            "start.position_m": np.column_stack([x + dx, y + dy]),
-        }
-        for k, interferer in enumerate(self.interferers):
-            places[f"interferers.{k}.waypoints_m"] = interferer.waypoints_m
+        places: dict[str, Any] = {}
+        for name, source in self.all_sources.items():
+            group = f"sources.{name}" if self.sources else "source"
+            places[f"{group}.waypoints_m"] = source.waypoints_m
+        for prefix, robot in self._robot_fields():
+            x, y, theta = robot.start.pose
+            dx, dy = rotate(theta, *microphones_B(robot.robot).T)
+            field = f"{prefix}start.position_m"
+            places[field] = np.column_stack([x + dx, y + dy])
         for field, points in places.items():
-            what = ", a microphone," if field == "start.position_m" else ""
+            what = ", a microphone," if field.endswith("start.position_m") else ""
             for point in points:
                 if not self.room.contains(point):
                     raise InputError(
@@ -252,21 +304,61 @@ class Scenario(Parameters):
 
     @model_validator(mode="after")
     def _check_start(self) -> Scenario:
-        footprint = robot_rectangle(self.start.pose, self.robot)
-        fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
-        for field, (name, body) in zip(
-            [*fields, "source"], self.bodies().items(), strict=True
+        footprints = {
+            name: (prefix, robot, robot_rectangle(robot.start.pose, robot.robot))
+            for name, (prefix, robot) in zip(
+                self.all_robots, self._robot_fields(), strict=True
+            )
+        }
+        for (first, (_, _, a)), (second, (prefix, robot, b)) in combinations(
+            footprints.items(), 2
         ):
-            if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
+            if rectangle_clearance(a, b) < 0.0:
                 raise InputError(
-                    field,
-                    f"{name!r} stands on the robot's start at {self.start.position_m}; "
-                    "move its first waypoint or start.position_m",
+                    f"{prefix}start.position_m",
+                    f"robot {second!r} at {robot.start.position_m} stands in robot "
+                    f"{first!r}; move one",
                 )
+        still = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
+        fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
+        for name, source in self.all_sources.items():
+            if source.body:
+                still[name] = Body(source.path(), (source.length_m, source.width_m))
+                fields.append(f"sources.{name}" if self.sources else "source")
+        for prefix, robot, footprint in footprints.values():
+            for field, (name, body) in zip(fields, still.items(), strict=True):
+                if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
+                    raise InputError(
+                        field,
+                        f"{name!r} stands on the robot's start at "
+                        f"{robot.start.position_m}; move its first waypoint or "
+                        f"{prefix}start.position_m",
+                    )
         return self
 
+    def _robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:
+        """Each robot, with what its fields begin with in a message."""
+        for name, robot in self.all_robots.items():
+            yield (f"robots.{name}." if self.robots else ""), robot
 
-def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
-    """The robot's footprint: a rectangle centred on the origin of B."""
-    x, y, theta = np.asarray(pose_WB)
-    return np.array([x, y, theta, robot.length_m, robot.width_m])
+
+def _check_schedule(
+    field: str, target: str, played: Mapping[str, SoundParameters]
+) -> None:
+    """A known schedule tells sources apart only if their bursts are apart."""
+    sound = played[target]
+    if sound.on_s >= sound.period_s:
+        raise InputError(
+            field.removesuffix("follows") + "tdoa.schedule_known",
+            f"{target!r} sounds without a pause, so that its schedule tells nothing; "
+            "set it to false",
+        )
+
+
+def _validated(model: type[_P], data: dict[str, Any], where: str) -> _P:
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        found = explain(error, model, f"one of {where.split('.')[0]}")
+        field = f"{where}.{found.field}"
+        raise InputError(field, found.message) from None

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.framework import EventStatus
 
+from diagrams.bodies import Body, LivePath, Surroundings, robot_rectangle
 from diagrams.builder import SoundFollower
-from diagrams.scenario import Body, robot_rectangle
+from diagrams.robot import Parts
+from diagrams.scenario import Scenario
 from systems.framework.signals import FRAME_PERIOD_S
 from systems.world.geometry import (
     control_point,
@@ -19,10 +22,21 @@ from systems.world.geometry import (
     rectangle_clearance,
 )
 
-__all__ = ["ROUNDING_S", "SUCCESSFUL", "Collision", "StopRules"]
+__all__ = [
+    "ROUNDING_S",
+    "SUCCESSFUL",
+    "Collision",
+    "RobotRules",
+    "StopRules",
+    "whole_cause",
+]
 
 #: Causes of runs that did what they should.
 SUCCESSFUL = ("reached", "completed")
+#: Causes that end the run of all robots.
+ENDING = ("collision", "diverged")
+#: Cause of a robot whose run another's end has cut short.
+INTERRUPTED = "interrupted"
 
 #: A rest of exactly ``stop.rest_time_s`` counts: instants of ticks are rounded, s.
 ROUNDING_S = 1e-9
@@ -48,15 +62,99 @@ class Collision:
     """First contact, s, to a fifth of a tick."""
 
 
-@dataclass
-class StopRules:
-    """A monitor for Drake's simulator; remembers why it stopped the run."""
+def whole_cause(robots: Mapping[str, RobotRules]) -> str:
+    """Name of the robot whose end is that of the whole run.
 
-    follower: SoundFollower
+    The first that touched something, else the first that did not do what it
+    should, else the first.
+
+    Args:
+        robots: By name.
+    """
+    causes = {name: rules.final_cause() for name, rules in robots.items()}
+
+    def rank(name: str) -> int:
+        cause = causes[name]
+        if cause in ENDING:
+            return 0
+        return 2 if cause in (*SUCCESSFUL, INTERRUPTED) else 1
+
+    return min(robots, key=rank)
+
+
+class StopRules:
+    """A monitor for Drake's simulator; remembers why it stopped the run.
+
+    A run ends when each robot has a cause of its own, or one has touched something
+    or is lost from sight; what has ended otherwise goes on beside the others.
+    """
+
+    def __init__(self, follower: SoundFollower) -> None:
+        self._diagram = follower.diagram
+        scenario = follower.scenario
+        starts = {n: robot.start.pose for n, robot in scenario.all_robots.items()}
+        self._paths = {name: LivePath(pose) for name, pose in starts.items()}
+        several = len(starts) > 1
+        self._moving = self._paths if several else {}
+        self.robots = {
+            name: RobotRules(
+                scenario.of_robot(name),
+                scenario.surroundings(name, self._paths),
+                parts,
+            )
+            for name, parts in follower.robots.items()
+        }
+        self._tick = -1
+
+    @property
+    def cause(self) -> str:
+        """Cause of the whole run; empty while it goes on."""
+        if not self.over:
+            return ""
+        return self.robots[whole_cause(self.robots)].final_cause()
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has ended."""
+        causes = [rules.cause for rules in self.robots.values()]
+        return all(causes) or any(cause in ENDING for cause in causes)
+
+    def __call__(self, context: Any) -> EventStatus:
+        """Called after every step of the simulator, which may be finer than ticks."""
+        time = context.get_time()
+        tick = round(time / FRAME_PERIOD_S)
+        if tick == self._tick or abs(time - tick * FRAME_PERIOD_S) > ROUNDING_S:
+            return _GO_ON
+        self._tick = tick
+        poses = {n: rules.look(context) for n, rules in self.robots.items()}
+        for name, path in self._moving.items():
+            path.move(time, poses[name])
+        for rules in self.robots.values():
+            rules.judge(time)
+        if self.over:
+            self._interrupt()
+            return EventStatus.ReachedTermination(self._diagram, self.cause)
+        return _GO_ON
+
+    def _interrupt(self) -> None:
+        for rules in self.robots.values():
+            rules.cause = rules.cause or INTERRUPTED
+
+
+@dataclass
+class RobotRules:
+    """Why one robot's run ends."""
+
+    scenario: Scenario
+    """Of this robot alone."""
+    surroundings: Surroundings
+    """What it can hit, and what it follows."""
+    parts: Parts
     cause: str = ""
     collision: Collision | None = None
     _root: Any = None
     _contexts: tuple[Any, Any] = (None, None)
+    _now: list[float] = field(default_factory=list)
     _pose: list[float] | None = None
     _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
     _valid: bool = False
@@ -66,34 +164,28 @@ class StopRules:
     _ticks_since_heard: int = 0
     _following_ticks: int = 0
     _time: float = 0.0
-    _tick: int = -1
 
     def __post_init__(self) -> None:
-        scenario = self.follower.scenario
-        bodies = scenario.bodies()
-        self._source_rests = not bodies["source"].path.moves
-        self._plant = self.follower.blocks["plant"]
-        self._tracker = self.follower.blocks["tracker"]
-        self._pose_port = self.follower.port("plant", "pose_WB")
-        self._velocity_port = self.follower.port("plant", "velocity_WB")
-        self._valid_port = self.follower.port("tracker", "target_valid")
-        self._goal_radius = scenario.goal_radius_m
+        scenario = self.scenario
+        self._target = self.surroundings.followed.path
+        self._source_rests = not self._target.moves
+        self._plant = self.parts.blocks["plant"]
+        self._tracker = self.parts.blocks["tracker"]
+        self._pose_port = self.parts.port("plant", "pose_WB")
+        self._velocity_port = self.parts.port("plant", "velocity_WB")
+        self._valid_port = self.parts.port("tracker", "target_valid")
+        self._goal_radius = scenario.goal_radius(moves=self._target.moves)
         self._follow_distance = scenario.attraction.follow_distance_m
         self._offset = scenario.robot.control_point_m
-        robot = (scenario.robot.length_m, scenario.robot.width_m)
         # Farther than this from the robot's centre, a body does not touch it.
+        size = scenario.size
         self._reach = [
-            (name, body, 0.5 * (math.hypot(*robot) + math.hypot(*body.size)) + NEAR_M)
-            for name, body in bodies.items()
+            (name, body, 0.5 * (math.hypot(*size) + math.hypot(*body.size)) + NEAR_M)
+            for name, body in self.surroundings.bodies.items()
         ]
 
-    def __call__(self, context: Any) -> EventStatus:
-        """Called after every step of the simulator, which may be finer than ticks."""
-        time = context.get_time()
-        tick = round(time / FRAME_PERIOD_S)
-        if tick == self._tick or abs(time - tick * FRAME_PERIOD_S) > ROUNDING_S:
-            return _GO_ON
-        self._tick = tick
+    def look(self, context: Any) -> list[float]:
+        """Reads the robot at a tick; its pose, m and rad."""
         if context is not self._root:
             self._root = context
             self._contexts = (
@@ -101,13 +193,21 @@ class StopRules:
                 self._tracker.GetMyContextFromRoot(context),
             )
         plant, tracker = self._contexts
-        pose = self._pose_port.Eval(plant).tolist()
+        self._now = self._pose_port.Eval(plant).tolist()
         self._valid = self._valid_port.Eval(tracker)[0] > 0.5
-        self.cause = self._judge(time, pose)
-        self._pose, self._time = pose, time
-        if self.cause:
-            return EventStatus.ReachedTermination(self.follower.diagram, self.cause)
-        return _GO_ON
+        return self._now
+
+    def judge(self, time: float) -> None:
+        """Decides at a tick, in s, after ``look``; what has ended stays as it ended.
+
+        Of several robots, one that has reached its goal can still be hit.
+        """
+        ended, self.collision = self.cause, self._find_collision(time)
+        if self.collision is not None:
+            self.cause = "collision"
+        elif not ended:
+            self.cause = self._judge(time, self._now)
+        self._pose, self._time = self._now, time
 
     def final_cause(self) -> str:
         """Cause of the run, once the simulator has returned."""
@@ -122,18 +222,14 @@ class StopRules:
         return "unsettled" if self._was_in_goal else "timeout"
 
     def _has_followed(self) -> bool:
-        share = self.follower.scenario.stop.following_share
+        share = self.scenario.stop.following_share
         ticks = self._ticks_since_heard
         return ticks > 0 and self._following_ticks >= share * ticks
 
     def _judge(self, time: float, pose: list[float]) -> str:
-        stop = self.follower.scenario.stop
-        places = {name: body.path.pose(time) for name, body, _ in self._reach}
-        self.collision = self._find_collision(time, pose, places)
-        if self.collision is not None:
-            return "collision"
+        stop = self.scenario.stop
         x_P, y_P = control_point(pose, self._offset)
-        x_S, y_S, _ = places["source"]
+        x_S, y_S, _ = self._target.pose(time)
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
@@ -151,7 +247,7 @@ class StopRules:
 
     def _has_rested(self, time: float, heading: float, *, there: bool) -> bool:
         """Whether P has been slow in the goal for long enough."""
-        stop = self.follower.scenario.stop
+        stop = self.scenario.stop
         if there:
             velocity = self._velocity_port.Eval(self._contexts[0]).tolist()
             v_WP = control_point_velocity(heading, velocity, self._offset)
@@ -164,29 +260,24 @@ class StopRules:
         self._was_in_goal |= in_goal
         if self._valid or self._ticks_since_heard:
             error = abs(distance - self._follow_distance)
-            following = error <= self.follower.scenario.stop.following_band_m
+            following = error <= self.scenario.stop.following_band_m
             self._ticks_since_heard += 1
             self._following_ticks += following
 
     def _find_stuck(self, time: float, x_P: float, y_P: float, *, away: bool) -> str:
         """Stuck: P goes nowhere though there is a target, and the goal is elsewhere."""
-        stop = self.follower.scenario.stop
+        stop = self.scenario.stop
         then, x, y = self._anchor
         if not away or math.hypot(x_P - x, y_P - y) > stop.stuck_radius_m:
             self._anchor = (time, x_P, y_P)
             return ""
         return "stuck" if time - then >= stop.stuck_after_s else ""
 
-    def _find_collision(
-        self,
-        time: float,
-        pose: list[float],
-        places: dict[str, tuple[float, float, float]],
-    ) -> Collision | None:
+    def _find_collision(self, time: float) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
-        first = None
+        first, pose = None, self._now
         for name, body, reach in self._reach:
-            x, y, _ = places[name]
+            x, y, _ = body.path.pose(time)
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue
             instant = self._first_contact(time, pose, body)
@@ -222,5 +313,5 @@ class StopRules:
         before = now if self._pose is None else np.array(self._pose)
         part = (instant - self._time) / max(time - self._time, FRAME_PERIOD_S)
         return robot_rectangle(
-            before + part * (now - before), self.follower.scenario.robot
+            before + part * (now - before), self.scenario.robot
         )

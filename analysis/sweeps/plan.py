@@ -22,8 +22,8 @@ from ruamel.yaml import YAML
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
 from diagrams.laws import law_files
+from diagrams.explain import explain
 from diagrams.loading import (
-    explain,
     read_mapping,
     resolve_sound,
     scenario_from_mapping,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ from pydrake.systems.framework import BasicVector_, LeafSystem_
 
 from systems.base.robot import RobotParameters
 from systems.base.tyre_grip import GripNumbers, grip_accelerations
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, check_port
 from systems.framework.parameters import Duration, Parameters
 from systems.framework.scalar_math import cos, sin
@@ -222,6 +224,19 @@ def DiffDrivePlant_(T):
         Reference: Han 2019, table 6; the motor lag and the grip are ours.
         """
 
+        FACTS = BlockFacts(
+            "plant",
+            "robot",
+            columns={
+                "pose_WB": ("p_WB_x", "p_WB_y", "theta_WB"),
+                "velocity_WB": ("v_WB_x", "v_WB_y", "omega_WB"),
+            },
+            states=(
+                *("x", "y", "theta"),
+                *("angle_left", "angle_right", "speed_left", "speed_right"),
+            ),
+        )
+
         def _construct(
             self,
             *,
@@ -240,6 +255,7 @@ def DiffDrivePlant_(T):
                 self._numbers += (GripNumbers.of(self._robot, self._plant.friction),)
                 self._derivatives = slipping_derivatives
                 self._checked = _checked_slipping
+                self.FACTS = _slipping(self.FACTS)
                 body = 3
             self._initial_pose = tuple(initial_pose)
             check_finite("DiffDrivePlant: initial_pose", self._initial_pose)
@@ -315,3 +331,13 @@ def DiffDrivePlant_(T):
 
 
 DiffDrivePlant = DiffDrivePlant_[None]
+
+
+def _slipping(facts: BlockFacts) -> BlockFacts:
+    """What a plant with friction has besides."""
+    slip = {"slip_velocities": ("slip_left", "slip_right", "slip_sideways")}
+    return replace(
+        facts,
+        columns={**facts.columns, **slip},
+        states=(*facts.states, "forward", "leftward", "yaw_rate"),
+    )

@@ -7,6 +7,7 @@ import math
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.carrier import CarrierParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.parameters import Angle, Length
 from systems.framework.scalar_types import define_for_scalars
 from systems.world.paths import seconds
@@ -47,29 +48,26 @@ def SourceRobot_(T):
         exogenous body, so that gradients do not pass through it.
 
         Args:
-            source: ``SourceRobotParameters``, or ``InterfererParameters``.
-            suffix: Ends the names of block and ports; empty for the source
-                that is followed.
+            source: ``SourceRobotParameters``.
         """
 
-        def _construct(self, *, source=None, suffix="", converter=None):
+        FACTS = BlockFacts("source", "world")
+
+        def _construct(self, *, source=None, converter=None):
             super().__init__(converter=converter)
             self._source = source or SourceRobotParameters()
-            self._suffix = suffix
             self._path = self._source.path()
-            self.set_name(f"source_robot{suffix}")
+            self.set_name("source_robot")
             for name, calc in (("pose_WS", self._pose), ("v_WS", self._velocity)):
                 self.DeclareVectorOutputPort(
-                    name=f"{name}{suffix}",
+                    name=name,
                     size=3,
                     calc=calc,
                     prerequisites_of_calc={self.time_ticket()},
                 )
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self, source=other._source, suffix=other._suffix, converter=converter
-            )
+            Impl._construct(self, source=other._source, converter=converter)
 
         def _pose(self, context, output):
             output.SetFromVector(self._path.pose(seconds(context)))

@@ -10,6 +10,7 @@ from pydrake.systems.framework import LeafSystem_
 
 from systems.base.diff_drive_plant import body_twist
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, read_list
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
@@ -90,6 +91,19 @@ def WheelOdometry_(T):
             InputError: Rounding is on in an AutoDiffXd system.
             ValueError: The initial pose is not finite.
         """
+
+        FACTS = BlockFacts(
+            "odometry",
+            "robot",
+            columns={
+                "pose_WB_estimated": (
+                    "p_WB_estimated_x",
+                    "p_WB_estimated_y",
+                    "theta_WB_estimated",
+                )
+            },
+            states=("x", "y", "theta", "angle_left", "angle_right"),
+        )
 
         def _construct(
             self,

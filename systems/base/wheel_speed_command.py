@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import FRAME_PERIOD_S
@@ -93,6 +94,16 @@ def WheelSpeedCommand_(T):
         Reference: ours; the papers do not say how an acceleration becomes
         wheel speeds.
         """
+
+        FACTS = BlockFacts(
+            "command",
+            "control",
+            columns={
+                "wheel_speeds": ("wheel_speed_left", "wheel_speed_right"),
+                "v_WP": ("v_WP_x", "v_WP_y"),
+            },
+            states=("v_WP_x", "v_WP_y", "wheel_left", "wheel_right"),
+        )
 
         def _construct(self, *, robot=None, converter=None):
             super().__init__(converter=converter)

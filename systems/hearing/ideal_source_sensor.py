@@ -8,6 +8,7 @@ from pydrake.math import atan2
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
 from systems.framework.input_error import InputError
 from systems.framework.noise import tick_generator
@@ -78,6 +79,17 @@ def IdealSourceSensor_(T):
         Raises:
             InputError: Noise is set in an AutoDiffXd system.
         """
+
+        FACTS = BlockFacts(
+            "hearing",
+            "hearing",
+            columns={
+                "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
+                "detected": ("detected",),
+                "range_valid": ("range_valid",),
+            },
+            states=("p_PS_B_x", "p_PS_B_y", "detected"),
+        )
 
         def _construct(
             self,

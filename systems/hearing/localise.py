@@ -102,6 +102,9 @@ class TDOAParameters(Parameters):
     """Largest standard deviation of a bearing, deg."""
     maximum_relative_range_std: Positive = 0.25
     """A range is valid where its standard deviation is below this share."""
+    schedule_known: bool = False
+    """Hear nothing in frames that cannot hold the source's sound by its schedule:
+    sources that take turns are told apart so, and a robot's own loudspeaker."""
 
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:

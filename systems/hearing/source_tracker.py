@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
@@ -62,6 +65,15 @@ def SourceTracker_(T):
                 and half a frame for the audio chain.
         """
 
+        FACTS = BlockFacts(
+            "tracker",
+            "control",
+            columns={
+                "p_WS_estimated": ("p_WS_estimated_x", "p_WS_estimated_y"),
+                "target_valid": ("target_valid",),
+            },
+        )
+
         def _construct(
             self,
             *,
@@ -97,6 +109,7 @@ def SourceTracker_(T):
             ]
             blank = self._model.start([0.0] * 3)
             self.DeclareDiscreteState([T(value) for value in blank.pack()])
+            self.FACTS = replace(self.FACTS, states=blank.names())
             self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update

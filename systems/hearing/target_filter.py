@@ -48,7 +48,13 @@ __all__ = [
     "fold",
 ]
 
-TRACK = 16
+#: Names of a track's elements.
+TRACK_NAMES = (
+    *("age", "x", "y", "vx", "vy"),
+    *("Axx", "Axy", "Ayy", "Cxx", "Cxy", "Cyx", "Cyy", "Vxx", "Vxy", "Vyy"),
+    "scatter",
+)
+TRACK = len(TRACK_NAMES)
 HYPOTHESIS = 2 + 2 * TRACK
 
 #: Age of a track that was never fed, s: finite, and beyond every limit.

@@ -11,6 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_record
 from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
@@ -18,8 +19,16 @@ from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
+from systems.sound.sound_emitter import MAXIMUM_RANGE_M
+from systems.sound.waveforms import SoundParameters
 
-__all__ = ["TDOAEstimator", "TDOAParameters", "port_values", "robot_localiser"]
+__all__ = [
+    "TDOAEstimator",
+    "TDOAParameters",
+    "may_sound",
+    "port_values",
+    "robot_localiser",
+]
 
 
 def robot_localiser(
@@ -33,6 +42,19 @@ def robot_localiser(
     shape = ArrayShape.of(robot.microphones_m)
     localiser = Localiser(parameters, shape, acoustics.c)
     return localiser, np.mean(robot.microphones_m, axis=0)
+
+
+def may_sound(sound: SoundParameters, time: float, longest_way: float) -> bool:
+    """Whether a frame can hold direct sound of a source, by its schedule.
+
+    Args:
+        sound: Its gate.
+        time: End of the frame, s.
+        longest_way: Longest that sound can take to the microphones, s.
+    """
+    phase = time - sound.start_s
+    open_for = sound.on_s + longest_way + FRAME_PERIOD_S
+    return phase > 0.0 and phase % sound.period_s < open_for
 
 
 class TDOAEstimator(LeafSystem):
@@ -69,6 +91,7 @@ class TDOAEstimator(LeafSystem):
         parameters: Method, band and thresholds.
         robot: Places of the microphones.
         acoustics: Speed of sound.
+        sound: What is listened to; its gate is the schedule where that is known.
 
     Raises:
         InputError: The array cannot serve at this rate and band.
@@ -76,18 +99,34 @@ class TDOAEstimator(LeafSystem):
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
 
+    FACTS = BlockFacts(
+        "hearing",
+        "hearing",
+        columns={
+            "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
+            "detected": ("detected",),
+            "range_valid": ("range_valid",),
+        },
+    )
+
     def __init__(
         self,
         *,
         parameters: TDOAParameters | None = None,
         robot: RobotParameters | None = None,
         acoustics: AcousticParameters | None = None,
+        sound: SoundParameters | None = None,
     ) -> None:
         super().__init__()
+        acoustics = acoustics or AcousticParameters()
+        self._schedule = None
+        if parameters is not None and parameters.schedule_known:
+            self._schedule = sound or SoundParameters()
+        self._longest_way_s = MAXIMUM_RANGE_M / acoustics.c
         self._localiser, self._p_PA_B = robot_localiser(
             parameters or TDOAParameters(),
             robot or RobotParameters(),
-            acoustics or AcousticParameters(),
+            acoustics,
         )
         self.set_name("tdoa_estimator")
         self._audio = self.DeclareAbstractInputPort(
@@ -117,6 +156,10 @@ class TDOAEstimator(LeafSystem):
             )
         before, located = self._remembered(context)
         fix, after = self._localiser.localise(audio.counts, before)
+        if self._schedule and not may_sound(
+            self._schedule, audio.time, self._longest_way_s
+        ):
+            fix = None
         flags = after.echoes is not None, after.heard, fix is not None
         discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
         if after.echoes is not None and after.echoes is not before.echoes:

@@ -20,6 +20,8 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import FRAME_PERIOD_S
 from systems.hearing.target_filter import (
+    HYPOTHESIS,
+    TRACK_NAMES,
     FilterSettings,
     ages,
     blank_memory,
@@ -96,6 +98,25 @@ class Track(NamedTuple):
     def pack(self) -> NDArray[Any]:
         """To the discrete state's vector."""
         return np.concatenate(self)
+
+    def names(self) -> tuple[str, ...]:
+        """Of the elements of ``pack``."""
+        poses = (
+            f"{pose}_{axis}"
+            for pose in ("pose_1", "pose_2", "pose_heard")
+            for axis in ("x", "y", "theta")
+        )
+        memory = (
+            name
+            for k in range((len(self.memory) - 1) // HYPOTHESIS)
+            for name in (
+                f"hypothesis_{k}_cost",
+                f"hypothesis_{k}_outliers",
+                *(f"track_{k}_{element}" for element in TRACK_NAMES),
+                *(f"outlier_track_{k}_{element}" for element in TRACK_NAMES),
+            )
+        )
+        return (*poses, "chosen", *memory)
 
     @property
     def age(self) -> Any:

@@ -8,9 +8,12 @@ that grow with distance; eq. 19 replaces them. See docs/errata.md.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
 from systems.framework.parameters import (
@@ -132,6 +135,18 @@ class ImpedanceLoop:
     it is the mean over the round, which is up to 50 ms old itself.
     """
 
+    FACTS = BlockFacts(
+        "controller",
+        "control",
+        columns={
+            "forces_W": (
+                *("attraction_x", "attraction_y"),
+                *("repulsion_x", "repulsion_y"),
+            ),
+            "obstacle_speeds": tuple(f"obstacle_speed_{k + 1}" for k in range(SLOTS)),
+        },
+    )
+
     def _declare_loop(
         self,
         scalar,
@@ -149,6 +164,7 @@ class ImpedanceLoop:
         sensors = sensors or UltrasonicParameters()
         self._round_ticks = sensors.round_ticks
         self._least_range_m = sensors.minimum_range_m
+        self.FACTS = replace(self.FACTS, states=_slot_names(self._round_ticks))
         # What a copy for another scalar type is made with.
         self._options = {
             "robot": self._robot,
@@ -246,6 +262,16 @@ class ImpedanceLoop:
 
     def _speeds(self, context, output):
         output.SetFromVector(self._forces.Eval(context)[2])
+
+
+def _slot_names(round_ticks: int) -> tuple[str, ...]:
+    """Names of what is remembered, the last tick first."""
+    return tuple(
+        f"{name}_{slot}{after}"
+        for after in ("", *(f"_{k}_ticks_ago" for k in range(2, round_ticks + 1)))
+        for slot in range(1, SLOTS + 1)
+        for name in ("feature", "C_x", "C_y")
+    )
 
 
 def _key(feature) -> int:

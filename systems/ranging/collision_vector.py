@@ -9,6 +9,7 @@ import numpy as np
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
 from systems.framework.parameters import NonNegativeLength, Parameters
@@ -19,6 +20,7 @@ from systems.ranging.ultrasonic_array import SENSORS, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
 __all__ = [
+    "COLLISION_FACTS",
     "SLOTS",
     "CollisionVector",
     "CollisionVectorParameters",
@@ -197,6 +199,19 @@ def fill_slots(vectors, scalar):
     return out + blank + blank, mask + blank, features + blank
 
 
+#: What every block says of itself that obstacle sensing ends in.
+COLLISION_FACTS = BlockFacts(
+    "collision",
+    "obstacle sensing",
+    columns={
+        "collision_vectors_B": tuple(
+            f"collision_{slot}_B_{axis}" for slot in range(1, SLOTS + 1) for axis in "xy"
+        ),
+        "features": tuple(f"feature_{slot}" for slot in range(1, SLOTS + 1)),
+    },
+)
+
+
 def declare_collision_ports(system, slots):
     """Declares the three output ports that every obstacle sensing ends in."""
     for index, (name, size) in enumerate(
@@ -249,6 +264,8 @@ def CollisionVector_(T):
 
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
+
+        FACTS = COLLISION_FACTS
 
         def _construct(
             self,

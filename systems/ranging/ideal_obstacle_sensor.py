@@ -10,7 +10,12 @@ from systems.framework.finite import check_finite, read_lists
 from systems.framework.parameters import Positive, Size
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
-from systems.ranging.collision_vector import SLOTS, declare_collision_ports, fill_slots
+from systems.ranging.collision_vector import (
+    COLLISION_FACTS,
+    SLOTS,
+    declare_collision_ports,
+    fill_slots,
+)
 from systems.world.geometry import control_point, nearest_point_on_rectangle, rotate
 
 __all__ = ["IdealObstacleSensor", "IdealObstacleSensor_", "nearest_vectors"]
@@ -73,6 +78,8 @@ def IdealObstacleSensor_(T):
             source_size: Length and width of the master robot, m.
             obstacle_count: Number of boxes on the obstacle ports.
         """
+
+        FACTS = COLLISION_FACTS
 
         def _construct(
             self,

@@ -14,6 +14,7 @@ from pydrake.systems.framework import LeafSystem
 from scipy.special import ndtri
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.input_error import InputError
@@ -226,6 +227,15 @@ class UltrasonicArray(LeafSystem):
         obstacle_count: Number of boxes on the obstacle ports.
         seed: Seed of the noise.
     """
+
+    FACTS = BlockFacts(
+        "ultrasonic",
+        "obstacle sensing",
+        columns={
+            "ranges": tuple(f"range_{k}" for k in range(1, SENSORS + 1)),
+            "echo": tuple(f"echo_{k}" for k in range(1, SENSORS + 1)),
+        },
+    )
 
     def __init__(
         self,

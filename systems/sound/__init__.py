@@ -5,7 +5,6 @@ from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.array_shape import ArrayShape
 from systems.sound.array_tolerances import RealArray, Tolerances
 from systems.sound.ego_noise import EgoNoise
-from systems.sound.interferers import InterfererParameters
 from systems.sound.mic_array import MicArray, microphones_B, record_frame
 from systems.sound.propagation import propagate
 from systems.sound.reverberation import Reverberation
@@ -18,7 +17,6 @@ __all__ = [
     "AcousticParameters",
     "ArrayShape",
     "EgoNoise",
-    "InterfererParameters",
     "MicArray",
     "MicArrayParameters",
     "RealArray",

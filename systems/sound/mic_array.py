@@ -11,6 +11,7 @@ from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, LeafSystem
 
 from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
@@ -33,13 +34,14 @@ from systems.sound.array_tolerances import (
 from systems.sound.ego_noise import EgoNoise, driving_share
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
-from systems.sound.room import RoomParameters
+from systems.sound.room import RoomParameters, room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 __all__ = [
     "FRAME_SAMPLES",
     "MicArray",
     "MicArrayParameters",
+    "microphone_reach",
     "microphones_B",
     "record_frame",
 ]
@@ -51,6 +53,19 @@ _SAME_INSTANT_S = 1e-6
 def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
     """(n, 2) microphones in B, m, in the order of the channels."""
     return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
+
+
+def microphone_reach(room: RoomParameters | None, acoustics: AcousticParameters) -> float:
+    """Longest way of sound that emissions must reach back for, m.
+
+    Args:
+        room: Its reflections are heard, too; none: the free field.
+        acoustics: Speed of sound.
+    """
+    if room is None:
+        return MAXIMUM_RANGE_M
+    c = acoustics.c
+    return max(MAXIMUM_RANGE_M, room_images(room, c).length / SAMPLE_RATE_HZ * c)
 
 
 def record_frame(
@@ -174,8 +189,8 @@ class MicArray(LeafSystem):
         robot: Places of the microphones.
         acoustics: Speed of sound.
         room: Walls, if there are any.
-        interferers: Names of further sources; each adds an input port
-            ``emission_<name>`` [Emission].
+        others: Names of further sources, which are not followed; each adds an input
+            port ``emission_<name>`` [Emission].
         seed: Seed of the noise and of the array's errors.
 
     Raises:
@@ -183,6 +198,7 @@ class MicArray(LeafSystem):
             cannot be, or the file of the ego noise cannot be used.
     """
 
+    FACTS = BlockFacts("microphones", "hearing")
     POSITION_ERRORS, CHANNEL_DELAYS, GAINS, SOUND_SPEED = range(4)
 
     def __init__(
@@ -192,7 +208,7 @@ class MicArray(LeafSystem):
         robot: RobotParameters | None = None,
         acoustics: AcousticParameters | None = None,
         room: RoomParameters | None = None,
-        interferers: Sequence[str] = (),
+        others: Sequence[str] = (),
         seed: int = 0,
     ) -> None:
         super().__init__()
@@ -210,7 +226,7 @@ class MicArray(LeafSystem):
         self._rise = room.rise_m if room else 0.0
         self._sources = [
             self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
-            for name in ("emission", *(f"emission_{name}" for name in interferers))
+            for name in ("emission", *(f"emission_{name}" for name in others))
         ]
         self._motion = [
             self.DeclareVectorInputPort(name=name, size=3)
@@ -236,13 +252,6 @@ class MicArray(LeafSystem):
                 *(port.ticket() for port in (*self._sources, *self._motion)),
             },
         )
-
-    @property
-    def maximum_range_m(self) -> float:
-        """Longest way of sound that the emissions must reach back for, m."""
-        if self._reverberation is None:
-            return MAXIMUM_RANGE_M
-        return max(MAXIMUM_RANGE_M, self._reverberation.maximum_range_m)
 
     def _declare_errors(self, c: float) -> None:
         drawn = draw_tolerances(

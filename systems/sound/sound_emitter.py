@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
+from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.signals import (
     FRAME_PERIOD_S,
@@ -146,14 +147,14 @@ class SoundEmitter(LeafSystem):
         acoustics: Speed of sound.
         maximum_range_m: Longest way to a listener, m, that of reflections included.
         seed: Seed of noise-like waveforms.
-        suffix: Ends the names of block and ports; empty for the source that is
-            followed.
 
     Raises:
         ValueError: The sound file cannot be played, or the range is not finite.
 
     Reference: Han 2019, section 4.1.
     """
+
+    FACTS = BlockFacts("emitter", "hearing")
 
     def __init__(
         self,
@@ -162,7 +163,6 @@ class SoundEmitter(LeafSystem):
         acoustics: AcousticParameters | None = None,
         maximum_range_m: float = MAXIMUM_RANGE_M,
         seed: int = 0,
-        suffix: str = "",
     ) -> None:
         super().__init__()
         self._sound = sound or SoundParameters()
@@ -170,9 +170,9 @@ class SoundEmitter(LeafSystem):
         check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
         c = (acoustics or AcousticParameters()).c
         self._ticks = history_ticks(maximum_range_m, c)
-        self.set_name(f"sound_emitter{suffix}")
+        self.set_name("sound_emitter")
         self._inputs = [
-            self.DeclareVectorInputPort(name=f"{name}{suffix}", size=3)
+            self.DeclareVectorInputPort(name=name, size=3)
             for name in ("pose_WS", "v_WS")
         ]
         self.DeclareDiscreteState(4 * self._ticks)
@@ -181,7 +181,7 @@ class SoundEmitter(LeafSystem):
             period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
         )
         self._emission: Any = self.DeclareAbstractOutputPort(
-            name=f"emission{suffix}",
+            name="emission",
             alloc=lambda: Value(object()),
             calc=self._emit,
             prerequisites_of_calc={

@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, model_validator
 from pydrake.systems.framework import LeafSystem_
 
+from systems.framework.block_facts import BlockFacts
 from systems.framework.parameters import (
     Acceleration,
     Angle,
@@ -82,6 +83,8 @@ def Obstacles_(T):
 
         Parameters: a sequence of ``ObstacleParameters``.
         """
+
+        FACTS = BlockFacts("obstacles", "world")
 
         def _construct(self, *, obstacles=(), converter=None):
             super().__init__(converter=converter)

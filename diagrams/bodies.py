@@ -1,0 +1,127 @@
+"""Rectangles that move, and what one robot has about it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from systems.base.robot import RobotParameters
+
+__all__ = [
+    "Body",
+    "LivePath",
+    "Path",
+    "RecordedPath",
+    "Surroundings",
+    "robot_rectangle",
+]
+
+
+class Path(Protocol):
+    """A pose as a function of time."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the pose ever changes."""
+
+    def pose(self, time: float) -> tuple[float, float, float]:
+        """(x, y, theta) in W at a time in s, m and rad."""
+
+    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) at many times at once."""
+
+
+@dataclass(frozen=True)
+class RecordedPath:
+    """Poses of a robot at the ticks of a run, joined by straight lines."""
+
+    times: NDArray[np.float64]
+    """(n,) ascending, s."""
+    recorded: NDArray[np.float64]
+    """(n, 3) x, y, theta in W, m and rad, not wrapped."""
+
+    @property
+    def moves(self) -> bool:
+        """A robot may move."""
+        return True
+
+    def pose(self, time: float) -> tuple[float, float, float]:
+        """(x, y, theta) at a time in s."""
+        x, y, theta = self.poses([time])[0].tolist()
+        return x, y, theta
+
+    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) at many times at once; before and after the run as at its ends."""
+        at = np.asarray(times, dtype=float)
+        return np.column_stack(
+            [np.interp(at, self.times, column) for column in self.recorded.T]
+        )
+
+
+class LivePath(RecordedPath):
+    """Where a robot was at the last tick and is at this one, during a run."""
+
+    def __init__(self, pose: tuple[float, float, float]) -> None:
+        super().__init__(np.zeros(2), np.array([pose, pose], dtype=float))
+
+    def move(self, time: float, pose: ArrayLike) -> None:
+        """The next tick, at a time in s."""
+        self.times[:] = self.times[1], time
+        self.recorded[:] = self.recorded[1], pose
+
+
+class Body(NamedTuple):
+    """A rectangle that moves along a path."""
+
+    path: Path
+    """Pose of its centre over time."""
+    size: tuple[float, float]
+    """Length and width, m."""
+
+    def rectangle(self, time: float) -> NDArray[np.float64]:
+        """(5,) x, y, theta, length, width in W at a time in s."""
+        return np.array([*self.path.pose(time), *self.size])
+
+    def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 5) rectangles at many times at once."""
+        poses = self.path.poses(times)
+        return np.hstack([poses, np.tile(np.array(self.size), (len(poses), 1))])
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """What one robot can hit, and which of it is followed."""
+
+    bodies: Mapping[str, Body]
+    """By name: obstacles, other robots, other sources, and last what it follows."""
+    target: str
+    """Name of the source, or of the robot with a loudspeaker, that it follows."""
+
+    @property
+    def followed(self) -> Body:
+        """What is followed."""
+        return self.bodies[self.target]
+
+    @cached_property
+    def obstacles(self) -> dict[str, Body]:
+        """All but what is followed."""
+        return {k: body for k, body in self.bodies.items() if k != self.target}
+
+
+def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
+    """The robot's footprint: a rectangle centred on the origin of B.
+
+    Args:
+        pose_WB: (x, y, theta), m and rad.
+        robot: Its size.
+
+    Returns:
+        (5,) x, y, theta, length, width in W.
+    """
+    x, y, theta = np.asarray(pose_WB)
+    return np.array([x, y, theta, robot.length_m, robot.width_m])

@@ -1,0 +1,108 @@
+"""What a scenario says of each robot and of each source."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, Literal
+
+from pydantic import Field, model_validator
+
+from systems.base.diff_drive_plant import PlantParameters
+from systems.base.robot import RobotParameters
+from systems.base.source_robot import SourceRobotParameters
+from systems.base.wheel_odometry import OdometryParameters
+from systems.framework.parameters import Angle, Parameters, Point
+from systems.hearing.ideal_source_sensor import IdealHearingParameters
+from systems.hearing.tdoa_estimator import TDOAParameters
+from systems.hearing.tracker_model import TrackerParameters
+from systems.laws.impedance import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.ranging.collision_vector import CollisionVectorParameters
+from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.sound.adc import MicArrayParameters, channel_skew
+from systems.sound.waveforms import SoundParameters
+
+__all__ = [
+    "FollowerParameters",
+    "SourceParameters",
+    "StartParameters",
+    "joined",
+]
+
+
+class StartParameters(Parameters):
+    """Where the robot starts, at rest."""
+
+    position_m: Point = (0.0, 0.0)
+    """Origin of B in W, m."""
+    heading_deg: Angle = 0.0
+    """Heading, deg CCW from the x axis of W."""
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """(x, y, theta), m and rad."""
+        return (*self.position_m, math.radians(self.heading_deg))
+
+
+class FollowerParameters(Parameters):
+    """One robot that follows a sound: its law, ears, sensors and body."""
+
+    law: str = Field(default="active", min_length=1)
+    """``none``, ``conventional``, ``active`` (2019), ``conventional2017``,
+    ``active2017``, or ``package.module:Name``."""
+    hearing: Literal["audio", "ideal"] = "audio"
+    """Sound waves and microphones, or exact positions."""
+    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
+    """Cones, or exact nearest points."""
+    follows: str = ""
+    """Name of the source, or of a robot with a loudspeaker; empty: the first source."""
+    loudspeaker: SoundParameters | None = None
+    """What the robot itself plays, at the origin of B, for others to follow."""
+    start: StartParameters = StartParameters()
+    microphones: MicArrayParameters = MicArrayParameters()
+    tdoa: TDOAParameters = TDOAParameters()
+    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
+    tracker: TrackerParameters = TrackerParameters()
+    ultrasonic: UltrasonicParameters = UltrasonicParameters()
+    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
+    attraction: AttractionParameters = AttractionParameters()
+    repulsion: RepulsionParameters = RepulsionParameters()
+    robot: RobotParameters = RobotParameters()
+    plant: PlantParameters = PlantParameters()
+    odometry: OdometryParameters = OdometryParameters()
+
+    @model_validator(mode="after")
+    def _check_channels(self) -> FollowerParameters:
+        channel_skew(self.microphones, len(self.robot.microphones_m))
+        return self
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Length and width of the robot, m."""
+        return self.robot.length_m, self.robot.width_m
+
+
+class SourceParameters(SourceRobotParameters):
+    """One source: the robot that carries it, and what it plays."""
+
+    sound: SoundParameters = SoundParameters()
+    """What it plays."""
+    body: bool = True
+    """Whether it can be hit and seen; off: a loudspeaker in the air."""
+
+
+def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """A tree of plain values, with some of its leaves changed.
+
+    Args:
+        base: The tree.
+        changes: A tree of the leaves to change, or to add.
+    """
+    result = dict(base)
+    for key, value in changes.items():
+        before = result.get(key)
+        if isinstance(value, Mapping) and isinstance(before, Mapping):
+            value = joined(before, value)
+        result[key] = value
+    return result

@@ -1,0 +1,367 @@
+"""One robot, and one source, as a diagram of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+from zlib import crc32
+
+import numpy as np
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
+
+from diagrams.laws import make_controller
+from diagrams.participants import SourceParameters
+from diagrams.scenario import ROBOT, SOURCE, Scenario
+from systems import (
+    CollisionVector,
+    DiffDrivePlant,
+    IdealObstacleSensor,
+    IdealSourceSensor,
+    MicArray,
+    SoundEmitter,
+    SourceRobot,
+    SourceTracker,
+    TDOAEstimator,
+    UltrasonicArray,
+    WheelOdometry,
+    WheelSpeedCommand,
+)
+from systems.framework.block_facts import block_facts
+from systems.framework.input_error import InputError
+from systems.framework.signals import FRAME_PERIOD_S
+from systems.laws.impedance import ImpedanceLoop
+from systems.sound.mic_array import microphone_reach
+from systems.sound.waveforms import SoundParameters
+
+__all__ = ["LOG", "Parts", "block_seed", "make_robot", "make_source", "parts_of"]
+
+#: Name of a robot's log.
+LOG = "log"
+#: What a robot takes from the world around it; of emissions, all.
+_OUTSIDE = ("pose_WS", "poses_WO", "sizes", "emission")
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What a robot's or a source's diagram is made of."""
+
+    diagram: Diagram
+    blocks: Mapping[str, Any]
+    """Blocks by part, as ``plant``: what each says of itself (``block_facts``)."""
+    log: VectorLogSink | None = None
+    """Rows of the logged ports, one after the other; none unless asked for."""
+    logged: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
+    """What the log holds, in order: the columns of each (part, port)."""
+
+    def port(self, part: str, name: str) -> Any:
+        """Output port of a block."""
+        return self.blocks[part].GetOutputPort(name)
+
+
+def parts_of(diagram: Diagram) -> Parts:
+    """The parts of what ``make_robot`` or ``make_source`` has made."""
+    log, blocks, logged = None, {}, {}
+    for system in diagram.GetSystems():
+        if isinstance(system, VectorLogSink):
+            log = system
+        elif not isinstance(system, Multiplexer):
+            blocks[block_facts(system).part] = system
+    if log is not None:
+        logged = {
+            (part, port): names
+            for part, block in blocks.items()
+            for port, names in _columns(block).items()
+        }
+    return Parts(diagram, blocks, log, logged)
+
+
+def block_seed(seed: int, name: str) -> int:
+    """A block's own seed: depends on the scenario's seed and its name alone."""
+    sequence = np.random.SeedSequence([seed, crc32(name.encode())])
+    return int(sequence.generate_state(1, np.uint64)[0])
+
+
+def _seed(scenario: Scenario, block: str, owner: str) -> int:
+    """Of a block of a robot or source; of the only one it is that of the block."""
+    name = block if owner in (ROBOT, SOURCE) else f"{block}_{owner}"
+    return block_seed(scenario.seed, name)
+
+
+def make_robot(
+    scenario: Scenario,
+    name: str = ROBOT,
+    *,
+    bodies: int = 0,
+    others: Sequence[str] = (),
+    log: bool = False,
+) -> Diagram:
+    """A robot that follows a sound, as a diagram with ports of its own.
+
+    The same function builds every fidelity: ``hearing`` and
+    ``obstacle_sensing`` choose blocks with the same ports. Inside, every input is
+    joined to the one output of its name (see docs/model.md). With both ideal and
+    ``odometry.rounding`` off the diagram converts to AutoDiffXd.
+
+    Input ports, as far as its blocks need them: ``pose_WS`` of what it follows,
+    ``poses_WO`` and ``sizes`` of the other bodies, ``emission`` of what it follows,
+    and ``emission_<name>`` of each other source. Output ports: ``pose_WB``,
+    ``velocity_WB``, and with a loudspeaker ``own_emission``.
+
+    Args:
+        scenario: Of this robot alone, see ``Scenario.of_robot``.
+        name: Of the robot; its random numbers depend on it.
+        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        others: Names of the sources that are not followed.
+        log: Whether to log what its blocks name columns for, at every tick.
+
+    Returns:
+        The diagram; ``parts_of`` gives its blocks by what they are for.
+
+    Raises:
+        InputError: The law is not known, or a sound file cannot be played.
+    """
+    controller = make_controller(scenario)
+    blocks = [
+        DiffDrivePlant(
+            robot=scenario.robot,
+            plant=scenario.plant,
+            initial_pose=scenario.start.pose,
+        ),
+        WheelOdometry(
+            robot=scenario.robot,
+            odometry=scenario.odometry,
+            initial_pose=scenario.start.pose,
+        ),
+        *_hearing(scenario, name, others),
+        _tracker(scenario),
+        *_obstacle_sensing(scenario, name, bodies),
+        controller,
+        WheelSpeedCommand(robot=scenario.robot),
+    ]
+    builder = DiagramBuilder()
+    for block in blocks:
+        builder.AddNamedSystem(block.get_name(), block)
+    connect_by_name(builder, blocks, _OUTSIDE)
+    plant = blocks[0]
+    for port in ("pose_WB", "velocity_WB"):
+        builder.ExportOutput(plant.GetOutputPort(port), port)
+    if scenario.loudspeaker is not None:
+        _carry_loudspeaker(builder, scenario, name, plant)
+    if log:
+        _add_log(builder, blocks)
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram
+
+
+def make_source(
+    scenario: Scenario, name: str, source: SourceParameters, *, audible: bool
+) -> Diagram:
+    """A source, driven along its waypoints, as a diagram with ports of its own.
+
+    Output ports: ``pose_WS``, ``v_WS``, and ``emission`` where it is audible.
+
+    Args:
+        scenario: For the seed, the air and the room.
+        name: Of the source; its random numbers depend on it.
+        source: Its path, drive and sound.
+        audible: Whether anybody hears its sound as waves.
+
+    Raises:
+        InputError: Its sound file cannot be played.
+    """
+    robot = SourceRobot(source=source)
+    blocks: list[Any] = [robot]
+    if audible:
+        blocks.append(_emitter(scenario, name, source.sound))
+    builder = DiagramBuilder()
+    for block in blocks:
+        builder.AddNamedSystem(block.get_name(), block)
+    connect_by_name(builder, blocks)
+    for block in blocks:
+        for index in range(block.num_output_ports()):
+            port = block.get_output_port(index)
+            builder.ExportOutput(port, port.get_name())
+    diagram = builder.Build()
+    diagram.set_name(name)
+    return diagram
+
+
+def _emitter(scenario: Scenario, name: str, sound: SoundParameters) -> SoundEmitter:
+    try:
+        return SoundEmitter(
+            sound=sound,
+            acoustics=scenario.acoustics,
+            maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
+            seed=_seed(scenario, "sound_emitter", name),
+        )
+    except InputError as error:
+        if not error.field.startswith("sound."):
+            raise
+        field = error.field.removeprefix("sound.")
+        if name in scenario.sources:
+            group = f"sources.{name}.sound."
+        elif scenario.loudspeaker is sound:
+            group = f"robots.{name}.loudspeaker."
+        else:
+            group = "sound."
+        raise InputError(f"{group}{field}", error.message) from None
+
+
+def _carry_loudspeaker(
+    builder: DiagramBuilder, scenario: Scenario, name: str, plant: Any
+) -> None:
+    """The robot's own loudspeaker stands where the robot is: W's S is its B."""
+    assert scenario.loudspeaker is not None
+    emitter = _emitter(scenario, name, scenario.loudspeaker)
+    builder.AddNamedSystem(emitter.get_name(), emitter)
+    for output, entry in (("pose_WB", "pose_WS"), ("velocity_WB", "v_WS")):
+        builder.Connect(plant.GetOutputPort(output), emitter.GetInputPort(entry))
+    builder.ExportOutput(emitter.GetOutputPort("emission"), "own_emission")
+
+
+def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
+    if scenario.hearing == "ideal":
+        return [
+            IdealSourceSensor(
+                robot=scenario.robot,
+                hearing=scenario.ideal_hearing,
+                sound=scenario.sound,
+                seed=_seed(scenario, "ideal_source_sensor", name),
+            )
+        ]
+    return [
+        MicArray(
+            parameters=scenario.microphones,
+            robot=scenario.robot,
+            acoustics=scenario.acoustics,
+            room=scenario.room,
+            others=others,
+            seed=_seed(scenario, "mic_array", name),
+        ),
+        TDOAEstimator(
+            parameters=scenario.tdoa,
+            robot=scenario.robot,
+            acoustics=scenario.acoustics,
+            sound=scenario.sound,
+        ),
+    ]
+
+
+def _tracker(scenario: Scenario) -> Any:
+    """An ideal estimate is a tick old, one from audio half a frame more.
+
+    It also is what its covariance says, and tells front from back.
+    """
+    tracker, age = scenario.tracker, 1.5 * FRAME_PERIOD_S
+    if scenario.hearing == "ideal":
+        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
+        tracker = tracker.model_copy(update=exact)
+        age = FRAME_PERIOD_S
+    return SourceTracker(robot=scenario.robot, tracker=tracker, measurement_age_s=age)
+
+
+def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
+    seen: dict[str, Any] = {
+        "robot": scenario.robot,
+        "source_size": scenario.source_size,
+        "obstacle_count": bodies,
+    }
+    if scenario.obstacle_sensing == "ideal":
+        return [
+            IdealObstacleSensor(
+                maximum_range_m=scenario.ultrasonic.maximum_range_m,
+                all_bodies=scenario.collision_vector.aggregation == "sum",
+                **seen,
+            )
+        ]
+    return [
+        UltrasonicArray(
+            parameters=scenario.ultrasonic,
+            acoustics=scenario.acoustics,
+            seed=_seed(scenario, "ultrasonic_array", name),
+            **seen,
+        ),
+        CollisionVector(
+            parameters=scenario.collision_vector,
+            sensors=scenario.ultrasonic,
+            robot=scenario.robot,
+            initial_pose=scenario.start.pose,
+        ),
+    ]
+
+
+def connect_by_name(
+    builder: DiagramBuilder, blocks: Sequence[Any], outside: Sequence[str] = ()
+) -> None:
+    """Joins every input port to the one output port of the same name.
+
+    A quantity has one name on every port (see docs/model.md), so the wiring
+    needs no list.
+
+    Args:
+        builder: That of the robot or source, which has the blocks.
+        blocks: Its blocks.
+        outside: Quantities that come from elsewhere: they become its own inputs; a
+            name that goes on after one of these and an underscore, too.
+
+    Raises:
+        InputError: More than one block publishes a quantity, or none, and it does
+            not come from elsewhere.
+    """
+    outputs: dict[str, list[Any]] = {}
+    for block in blocks:
+        for index in range(block.num_output_ports()):
+            port = block.get_output_port(index)
+            outputs.setdefault(port.get_name(), []).append(port)
+    entries: dict[str, Any] = {}
+    for block in blocks:
+        for index in range(block.num_input_ports()):
+            port = block.get_input_port(index)
+            name = port.get_name()
+            sources = outputs.get(name, [])
+            if len(sources) == 1:
+                builder.Connect(sources[0], port)
+            elif not sources and any(f"{name}_".startswith(f"{o}_") for o in outside):
+                if name not in entries:
+                    entries[name] = builder.ExportInput(port, name)
+                else:
+                    builder.ConnectInput(entries[name], port)
+            else:
+                raise InputError(
+                    block.get_name(),
+                    f"{len(sources)} blocks publish {name!r}, which it needs; give "
+                    "one block an output port of that name",
+                )
+
+
+def _columns(block: Any) -> dict[str, tuple[str, ...]]:
+    """Output ports of a block that have columns, of a user's own as far as it has."""
+    columns = block_facts(block).columns or ImpedanceLoop.FACTS.columns
+    ports = {
+        port.get_name(): port.size()
+        for port in map(block.get_output_port, range(block.num_output_ports()))
+    }
+    return {
+        name: names
+        for name, names in columns.items()
+        if ports.get(name) == len(names)
+    }
+
+
+def _add_log(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
+    """One sink behind a multiplexer: a third cheaper than a sink a port."""
+    ports = [
+        block.GetOutputPort(name) for block in blocks for name in _columns(block)
+    ]
+    multiplexer = builder.AddNamedSystem(
+        "log_multiplexer", Multiplexer([port.size() for port in ports])
+    )
+    for index, port in enumerate(ports):
+        builder.Connect(port, multiplexer.get_input_port(index))
+    sink = LogVectorOutput(
+        multiplexer.get_output_port(0), builder, publish_period=FRAME_PERIOD_S
+    )
+    sink.set_name(LOG)

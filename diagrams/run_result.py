@@ -1,0 +1,191 @@
+"""What a run did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.bodies import RecordedPath, Surroundings
+from diagrams.robot import Parts
+from diagrams.scenario import ROBOT, Scenario
+from diagrams.stop_rules import Collision, RobotRules, whole_cause
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["RunResult", "gather_result"]
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """What a robot did, at every 25 ms tick, and why its run ended.
+
+    Of several robots, what all did: ``robots`` has one of each, the names of
+    columns begin with that of the robot and a dot, and the cause is that of the
+    first robot which did not do what it should, the ones that touched something
+    before the others.
+    """
+
+    scenario: Scenario
+    """Of one robot among several, that of it alone (``Scenario.of_robot``)."""
+    cause: str
+    """One of reached, completed, unsettled, timeout, astray, collision, stuck, lost,
+    diverged, interrupted; docs/model.md says when."""
+    collision: Collision | None
+    """Set where the cause is collision."""
+    columns: dict[str, NDArray[np.float64]]
+    """Columns of ``trajectory``."""
+    wall_s: float
+    """Time that the simulation took, without building the diagram and compiling or
+    loading what numba compiles, s."""
+    name: str = ROBOT
+    """Of the robot."""
+    several: dict[str, RunResult] = field(default_factory=dict)
+    """What each robot did, where there are several."""
+    others: Surroundings | None = None
+    """What this one of several robots had about it."""
+    whole: Scenario | None = None
+    """What was run, where that is more than ``scenario``."""
+
+    @property
+    def full_scenario(self) -> Scenario:
+        """The whole scenario that was run."""
+        return self.whole or self.scenario
+
+    @property
+    def robots(self) -> dict[str, RunResult]:
+        """What each robot did, by name."""
+        return self.several or {self.name: self}
+
+    @cached_property
+    def surroundings(self) -> Surroundings:
+        """What the robot could hit, and what it followed."""
+        return self.others or self.scenario.surroundings()
+
+    @property
+    def target_moves(self) -> bool:
+        """Whether what is followed ever moves."""
+        return self.surroundings.followed.path.moves
+
+    @property
+    def goal_radius_m(self) -> float:
+        """P is in the goal within this distance of what it follows, m."""
+        return self.scenario.goal_radius(moves=self.target_moves)
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """(n,) s."""
+        return self.columns["t"]
+
+    def poses(self, body: str) -> NDArray[np.float64]:
+        """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
+        names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
+        return np.stack([self.columns[name] for name in names], axis=1)
+
+    @property
+    def simulated_s(self) -> float:
+        """Simulated time, s."""
+        return float(self.time[-1])
+
+    @cached_property
+    def trajectory(self) -> pd.DataFrame:
+        """A row a tick: SI units, frames as in docs/model.md."""
+        import pandas as pd
+
+        return pd.DataFrame(self.columns)
+
+
+def gather_result(
+    scenario: Scenario,
+    rules: Mapping[str, RobotRules],
+    robots: Mapping[str, Parts],
+    context: Any,
+    wall_s: float,
+) -> RunResult:
+    """The result of a run that has ended.
+
+    Args:
+        scenario: That was run.
+        rules: Each robot's stop rules, with their causes.
+        robots: Each robot's parts, with their logs.
+        context: Of the whole diagram.
+        wall_s: Time that the simulation took, s.
+    """
+    logs = {name: _logged(parts, context) for name, parts in robots.items()}
+    paths = {
+        name: RecordedPath(
+            log["t"], np.column_stack([log[key] for key in _POSE])
+        )
+        for name, log in logs.items()
+    }
+    several = len(robots) > 1
+    results = {}
+    for name, log in logs.items():
+        around = scenario.surroundings(name, paths)
+        own = scenario.of_robot(name)
+        results[name] = RunResult(
+            own,
+            rules[name].final_cause(),
+            rules[name].collision,
+            _completed(log, own, around),
+            wall_s,
+            name,
+            others=None if own is scenario else around,
+            whole=None if own is scenario else scenario,
+        )
+    if not several:
+        return next(iter(results.values()))
+    columns = {"t": next(iter(logs.values()))["t"]}
+    for name, result in results.items():
+        for key, values in result.columns.items():
+            if key != "t":
+                columns[f"{name}.{key}"] = values
+    decisive = results[whole_cause(rules)]
+    return RunResult(
+        scenario,
+        decisive.cause,
+        decisive.collision,
+        columns,
+        wall_s,
+        decisive.name,
+        several=results,
+    )
+
+
+_POSE = ("p_WB_x", "p_WB_y", "theta_WB")
+
+
+def _logged(parts: Parts, context: Any) -> dict[str, NDArray[np.float64]]:
+    """The columns of a robot's log, and the time."""
+    assert parts.log is not None
+    log = parts.log.FindLog(context)
+    names = [name for columns in parts.logged.values() for name in columns]
+    rows = zip(names, np.array(log.data()), strict=True)
+    return {"t": np.array(log.sample_times()), **dict(rows)}
+
+
+def _completed(
+    columns: dict[str, NDArray[np.float64]], scenario: Scenario, around: Surroundings
+) -> dict[str, NDArray[np.float64]]:
+    """With what follows from the log: P, and the true and heard place of the source."""
+    offset, theta = scenario.robot.control_point_m, columns["theta_WB"]
+    x_P = columns["p_WB_x"] + offset * np.cos(theta)
+    y_P = columns["p_WB_y"] + offset * np.sin(theta)
+    path = around.followed.path
+    pose_WS = np.array([path.pose(time) for time in columns["t"].tolist()]).T
+    columns["p_WS_x"], columns["p_WS_y"], columns["theta_WS"] = pose_WS
+    dx, dy = columns["p_WS_x"] - x_P, columns["p_WS_y"] - y_P
+    bearing = np.arctan2(dy, dx) - theta
+    columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
+    columns["source_range_true"] = np.hypot(dx, dy)
+    columns["source_bearing_true"] = np.arctan2(np.sin(bearing), np.cos(bearing))
+    x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
+    heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5
+    columns["source_bearing"] = np.where(heard, np.arctan2(y, x), np.nan)
+    columns["source_range"] = np.where(heard & ranged, np.hypot(x, y), np.nan)
+    return columns
