@@ -185,7 +185,8 @@ def _fields() -> list[str]:
     """Dotted paths of all fields of a scenario with one of everything."""
     one_of_each = {
         "obstacles": [{"name": "box"}],
-        "interferers": [{"name": "other"}],
+        "robots": {"robot": {}, "other": {"start": {"position_m": [-2.0, 0.0]}}},
+        "sources": {"source": {}, "radio": {"waypoints_m": [[0.0, 3.0]]}},
         "room": {},
     }
     found: list[str] = []

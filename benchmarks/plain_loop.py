@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams import Scenario
-from diagrams.builder import block_seed
+from diagrams.robot import block_seed
 from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
 from systems.base.wheel_odometry import advance_pose, encoder_angle
 from systems.base.wheel_speed_command import (

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Protocol
@@ -63,16 +63,31 @@ class RecordedPath:
         )
 
 
-class LivePath(RecordedPath):
+class LivePath:
     """Where a robot was at the last tick and is at this one, during a run."""
 
-    def __init__(self, pose: tuple[float, float, float]) -> None:
-        super().__init__(np.zeros(2), np.array([pose, pose], dtype=float))
+    moves = True
 
-    def move(self, time: float, pose: ArrayLike) -> None:
+    def __init__(self, pose: tuple[float, float, float]) -> None:
+        self._then = self._now = 0.0, pose
+
+    def move(self, time: float, pose: Sequence[float]) -> None:
         """The next tick, at a time in s."""
-        self.times[:] = self.times[1], time
-        self.recorded[:] = self.recorded[1], pose
+        x, y, theta = pose
+        self._then, self._now = self._now, (time, (x, y, theta))
+
+    def pose(self, time: float) -> tuple[float, float, float]:
+        """(x, y, theta) at a time in s since the last tick, by a straight line."""
+        (begin, then), (end, now) = self._then, self._now
+        if time >= end or end <= begin:
+            return now
+        part = (time - begin) / (end - begin)
+        x, y, theta = (a + part * (b - a) for a, b in zip(then, now, strict=True))
+        return x, y, theta
+
+    def poses(self, times: ArrayLike) -> NDArray[np.float64]:
+        """(n, 3) at many times at once."""
+        return np.array([self.pose(time) for time in np.asarray(times).tolist()])
 
 
 class Body(NamedTuple):

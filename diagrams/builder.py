@@ -57,8 +57,7 @@ class SoundFollower:
 
     @cached_property
     def blocks(self) -> dict[str, Any]:
-        """The only robot's blocks by part, those of the source that it follows, and
-        ``obstacles``."""
+        """By part: the only robot's, those of its source, and ``obstacles``."""
         (target,) = map(self.scenario.target, self.scenario.all_robots)
         blocks = {**self.sources[target].blocks, "obstacles": self.obstacles}
         return {**blocks, **self.only.blocks}
@@ -188,7 +187,8 @@ class _World:
     def _constant(self, name: str, sizes: list[float]) -> list[Any]:
         if not sizes:
             return []
-        block = ConstantVectorSource(np.array(sizes))
+        values: Any = np.array(sizes)  # untyped: Drake's stubs take ndarray amiss
+        block = ConstantVectorSource(values)
         self.builder.AddNamedSystem(f"sizes_of_others_for_{name}", block)
         return [block.get_output_port()]
 

@@ -122,7 +122,11 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 def resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """A relative sound file lies beside the scenario, or where one works."""
-    for place in [data, *_participants(data, "robots"), *_participants(data, "sources")]:
+    for place in [
+        data,
+        *_participants(data, "robots"),
+        *_participants(data, "sources"),
+    ]:
         for group, key in (
             ("microphones", "ego_noise_file"),
             ("sound", "file"),

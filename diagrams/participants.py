@@ -103,6 +103,7 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     for key, value in changes.items():
         before = result.get(key)
         if isinstance(value, Mapping) and isinstance(before, Mapping):
-            value = joined(before, value)
-        result[key] = value
+            result[key] = joined(before, value)
+        else:
+            result[key] = value
     return result

@@ -345,17 +345,13 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
         for port in map(block.get_output_port, range(block.num_output_ports()))
     }
     return {
-        name: names
-        for name, names in columns.items()
-        if ports.get(name) == len(names)
+        name: names for name, names in columns.items() if ports.get(name) == len(names)
     }
 
 
 def _add_log(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
     """One sink behind a multiplexer: a third cheaper than a sink a port."""
-    ports = [
-        block.GetOutputPort(name) for block in blocks for name in _columns(block)
-    ]
+    ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
     multiplexer = builder.AddNamedSystem(
         "log_multiplexer", Multiplexer([port.size() for port in ports])
     )

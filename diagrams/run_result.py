@@ -118,9 +118,7 @@ def gather_result(
     """
     logs = {name: _logged(parts, context) for name, parts in robots.items()}
     paths = {
-        name: RecordedPath(
-            log["t"], np.column_stack([log[key] for key in _POSE])
-        )
+        name: RecordedPath(log["t"], np.column_stack([log[key] for key in _POSE]))
         for name, log in logs.items()
     }
     several = len(robots) > 1

@@ -12,7 +12,8 @@ from itertools import combinations
 from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, StringConstraints, Strict, ValidationError, model_validator
+from annotated_types import MaxLen
+from pydantic import Field, Strict, StringConstraints, ValidationError, model_validator
 
 from diagrams.bodies import Body, LivePath, Path, Surroundings, robot_rectangle
 from diagrams.explain import explain
@@ -42,7 +43,7 @@ ROBOT, SOURCE = "robot", "source"
 
 _P = TypeVar("_P", bound=Parameters)
 _Name = Annotated[str, StringConstraints(pattern=r"\A[a-z][a-z0-9_]*\z")]
-_Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
+_Participants = Annotated[dict[_Name, dict[str, Any]], MaxLen(16)]
 
 
 class StopParameters(Parameters):
@@ -91,10 +92,10 @@ class RunParameters(Parameters):
     """Longest simulated time, s; an hour at most."""
     arena_m: Size = (7.0, 7.0)
     """Extents of the floor in pictures, m; it has no walls."""
-    robots: _Participants = {}
+    robots: _Participants = Field(default={})
     """By name, what each robot has other than the scenario says of a robot; empty:
     one, named ``robot``, that has nothing other."""
-    sources: _Participants = {}
+    sources: _Participants = Field(default={})
     """By name, what each source has other than ``source`` and ``sound`` say; empty:
     one, named ``source``."""
     source: SourceRobotParameters = SourceRobotParameters()
@@ -175,6 +176,23 @@ class Scenario(FollowerParameters, RunParameters):
         source = SourceRobotParameters.model_validate(data)
         own |= {"source": source, "sound": self.sounds()[target], "follows": ""}
         return self.model_copy(update=own | {"robots": {}, "sources": {}})
+
+    def require_one_robot(self, purpose: str) -> None:
+        """Refuses what is defined for one robot and one source alone.
+
+        Args:
+            purpose: What is, as 'a linear model'.
+
+        Raises:
+            InputError: There are others.
+        """
+        for field, named in (("robots", self.robots), ("sources", self.sources)):
+            if named:
+                raise InputError(
+                    field,
+                    f"{', '.join(named)}: {purpose} is of one robot and one source; "
+                    f"leave {field} out",
+                )
 
     def surroundings(
         self, robot: str = "", paths: Mapping[str, Path] | None = None
@@ -259,7 +277,22 @@ class Scenario(FollowerParameters, RunParameters):
                 )
             if robot.tdoa.schedule_known and robot.hearing == "audio":
                 _check_schedule(field, target, played)
+        self._check_heard(played)
         return self
+
+    def _check_heard(self, played: Mapping[str, SoundParameters]) -> None:
+        robots = self.all_robots
+        if any(robot.hearing == "audio" for robot in robots.values()):
+            return
+        followed = {self.target(name) for name in robots}
+        for name in played:
+            if name not in followed:
+                group = "robots" if name in robots else "sources"
+                raise InputError(
+                    f"{group}.{name}",
+                    "nobody hears its sound: no robot follows it, and none has hearing "
+                    "'audio'; let one, or make it an obstacle",
+                )
 
     @model_validator(mode="after")
     def _check_step(self) -> Scenario:
@@ -359,6 +392,6 @@ def _validated(model: type[_P], data: dict[str, Any], where: str) -> _P:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found = explain(error, model, f"one of {where.split('.')[0]}")
+        found = explain(error, model, f"one of {where.split('.', maxsplit=1)[0]}")
         field = f"{where}.{found.field}"
         raise InputError(field, found.message) from None

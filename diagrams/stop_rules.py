@@ -46,6 +46,7 @@ NEAR_M = 0.1
 #: Instants looked at between two ticks.
 BETWEEN_TICKS = 5
 
+_Places = Mapping[str, tuple[float, float, float]]
 _GO_ON = EventStatus.DidNothing()
 
 
@@ -167,14 +168,13 @@ class RobotRules:
 
     def __post_init__(self) -> None:
         scenario = self.scenario
-        self._target = self.surroundings.followed.path
-        self._source_rests = not self._target.moves
+        self._source_rests = not self.surroundings.followed.path.moves
         self._plant = self.parts.blocks["plant"]
         self._tracker = self.parts.blocks["tracker"]
         self._pose_port = self.parts.port("plant", "pose_WB")
         self._velocity_port = self.parts.port("plant", "velocity_WB")
         self._valid_port = self.parts.port("tracker", "target_valid")
-        self._goal_radius = scenario.goal_radius(moves=self._target.moves)
+        self._goal_radius = scenario.goal_radius(moves=not self._source_rests)
         self._follow_distance = scenario.attraction.follow_distance_m
         self._offset = scenario.robot.control_point_m
         # Farther than this from the robot's centre, a body does not touch it.
@@ -202,11 +202,12 @@ class RobotRules:
 
         Of several robots, one that has reached its goal can still be hit.
         """
-        ended, self.collision = self.cause, self._find_collision(time)
+        places = {name: body.path.pose(time) for name, body, _ in self._reach}
+        ended, self.collision = self.cause, self._find_collision(time, places)
         if self.collision is not None:
             self.cause = "collision"
         elif not ended:
-            self.cause = self._judge(time, self._now)
+            self.cause = self._judge(time, self._now, places)
         self._pose, self._time = self._now, time
 
     def final_cause(self) -> str:
@@ -226,10 +227,10 @@ class RobotRules:
         ticks = self._ticks_since_heard
         return ticks > 0 and self._following_ticks >= share * ticks
 
-    def _judge(self, time: float, pose: list[float]) -> str:
+    def _judge(self, time: float, pose: list[float], places: _Places) -> str:
         stop = self.scenario.stop
         x_P, y_P = control_point(pose, self._offset)
-        x_S, y_S, _ = self._target.pose(time)
+        x_S, y_S, _ = places[self.surroundings.target]
         distance = math.hypot(x_S - x_P, y_S - y_P)
         if not distance <= stop.diverged_range_m:
             return "diverged"
@@ -273,11 +274,11 @@ class RobotRules:
             return ""
         return "stuck" if time - then >= stop.stuck_after_s else ""
 
-    def _find_collision(self, time: float) -> Collision | None:
+    def _find_collision(self, time: float, places: _Places) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first, pose = None, self._now
         for name, body, reach in self._reach:
-            x, y, _ = body.path.pose(time)
+            x, y, _ = places[name]
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue
             instant = self._first_contact(time, pose, body)
@@ -312,6 +313,4 @@ class RobotRules:
         now = np.array(pose)
         before = now if self._pose is None else np.array(self._pose)
         part = (instant - self._time) / max(time - self._time, FRAME_PERIOD_S)
-        return robot_rectangle(
-            before + part * (now - before), self.scenario.robot
-        )
+        return robot_rectangle(before + part * (now - before), self.scenario.robot)

@@ -27,7 +27,7 @@ from diagrams import (
     build_sound_follower,
     make_simulator,
 )
-from diagrams.scenario import robot_rectangle
+from diagrams.bodies import robot_rectangle
 from diagrams.stop_rules import Collision, StopRules
 from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 from systems.framework.input_error import InputError
@@ -175,10 +175,11 @@ def _run(
     set_discrete_state(contexts["command"], [*velocity, *wheels])
     simulator.Initialize()
     simulator.AdvanceTo(scenario.duration_s)
-    if rules.collision is None:
-        return rules.final_cause(), ""
+    (robot_rules,) = rules.robots.values()
+    if robot_rules.collision is None:
+        return robot_rules.final_cause(), ""
     end = contexts["plant"].get_continuous_state_vector().CopyToVector()[:3]
-    return "collision", _mechanism(scenario, end, rules.collision)
+    return "collision", _mechanism(scenario, end, robot_rules.collision)
 
 
 def _mechanism(

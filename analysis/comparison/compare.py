@@ -22,8 +22,8 @@ from analysis.sweeps.one_run import require_runs
 from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import load_scenario
-from diagrams.laws import LAWS
 from diagrams.explain import explain
+from diagrams.laws import LAWS
 from diagrams.loading import read_mapping
 from systems.framework.input_error import InputError
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
 from diagrams import Scenario, build_sound_follower, make_simulator
-from diagrams.builder import block_seed
+from diagrams.robot import block_seed
 from systems import MicArray
 from systems.framework.noise import tick_generator
 from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ

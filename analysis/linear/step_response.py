@@ -127,7 +127,7 @@ def _run(
     simulator.Initialize()
     simulator.AdvanceTo(duration_s)
     assert follower.log is not None
-    assert follower.logged[0] == ("plant", "pose_WB")
+    assert next(iter(follower.logged)) == ("plant", "pose_WB")
     log = follower.log.FindLog(simulator.get_context())
     x, y, theta = np.array(log.data())[:3]
     p_WS = scenario.source.path().pose(0.0)

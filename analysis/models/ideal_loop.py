@@ -36,9 +36,10 @@ from analysis.models.ideal_scenarios import (
     ideal_scenario,
     require_ideal,
 )
-from analysis.models.state_names import state_names
 from diagrams import build_sound_follower
+from diagrams.robot import parts_of
 from diagrams.scenario import Scenario
+from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S
 
@@ -78,7 +79,7 @@ class PeriodDerivatives:
 class IdealLoop:
     """The all-ideal build, and its AutoDiff twin: converted once, used again.
 
-    The state is the diagram's, in the order of ``state_names``: continuous
+    The state is the diagram's, named by ``state_names``: continuous
     first, then the discrete groups. A period begins just before the updates of
     a tick and ends just before those of the next.
 
@@ -93,7 +94,7 @@ class IdealLoop:
         require_ideal(scenario)
         self.scenario = scenario
         self.follower = build_sound_follower(scenario)
-        twin = self.follower.diagram.ToAutoDiffXdMaybe()
+        twin: Any = self.follower.diagram.ToAutoDiffXdMaybe()
         if twin is None:
             raise InputError(
                 "law",
@@ -102,8 +103,13 @@ class IdealLoop:
                 "TemplateSystem of float and AutoDiffXd",
             )
         self.twin: Any = twin
+        self._twin_blocks = {
+            part: block
+            for name in (*self.follower.sources, *self.follower.robots)
+            for part, block in parts_of(twin.GetSubsystemByName(name)).blocks.items()
+        }
         self._try_law()
-        self.state_names: tuple[str, ...] = state_names(self.follower)
+        self.state_names: tuple[str, ...] = self._names()
         self.sampled_twins: dict[str, Any] = {}
         """Continuous blocks as maps of one period, see
         ``analysis.models.block_models``."""
@@ -140,8 +146,24 @@ class IdealLoop:
 
     def block(self, role: str, *, twin: bool = False) -> Any:
         """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd."""
-        block = self.follower.blocks[role]
-        return self.twin.GetSubsystemByName(block.get_name()) if twin else block
+        return self._twin_blocks[role] if twin else self.follower.blocks[role]
+
+    def _names(self) -> tuple[str, ...]:
+        """``part.element`` of every state: continuous first, then discrete.
+
+        What a block does not name, as a user's own law, is numbered.
+        """
+        context = self.follower.diagram.CreateDefaultContext()
+        continuous: list[str] = []
+        discrete: list[str] = []
+        for part, block in self.follower.only.blocks.items():
+            own = block.GetMyContextFromRoot(context)
+            size, names = own.num_total_states(), block_facts(block).states
+            if len(names) != size:
+                names = tuple(f"state_{k}" for k in range(size))
+            kind = continuous if own.num_continuous_states() else discrete
+            kind.extend(f"{part}.{name}" for name in names)
+        return (*continuous, *discrete)
 
     def indices(self, role: str) -> list[int]:
         """Where a block's state stands in the state vector."""

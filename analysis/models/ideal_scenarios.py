@@ -84,6 +84,7 @@ def require_ideal(scenario: Scenario) -> None:
     Raises:
         InputError: Some block has no derivative.
     """
+    scenario.require_one_robot("a linear model")
     require_rolling(scenario.plant)
     hearing = scenario.ideal_hearing
     checks = (

@@ -6,37 +6,27 @@ that a bare machine lacks; the project asks for no more than Drake does.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
 from pathlib import Path
 from typing import Any
 
 from pydrake.systems.framework import Diagram
-from pydrake.systems.primitives import VectorLogSink
 
-__all__ = ["Wire", "block_svg", "wires", "write_block_diagram"]
+from analysis.runs.wires import Wire, blocks, wires
+from systems.framework.block_facts import STAGES, Stage, block_facts
 
-#: What a block is for, its fill, and the classes; in the order of the signal.
-ROLES = (
-    ("world", "#E8EEF4", ("SourceRobot", "Obstacles")),
-    (
-        "hearing",
-        "#FBE3D6",
-        ("SoundEmitter", "MicArray", "TDOAEstimator", "IdealSourceSensor"),
-    ),
-    (
-        "obstacle sensing",
-        "#FCEFC9",
-        ("UltrasonicArray", "CollisionVector", "IdealObstacleSensor"),
-    ),
-    ("control", "#DDF1E7", ("SourceTracker", "WheelSpeedCommand")),
-    ("robot", "#DCEAF7", ("DiffDrivePlant", "WheelOdometry")),
-)
-#: Blocks of no other role are laws, ours or a user's.
-OTHER_ROLE = "control"
-#: These stand in a row of their own, below the others.
-LOWER = ("Obstacles", "UltrasonicArray", "CollisionVector", "IdealObstacleSensor")
+__all__ = ["block_svg", "write_block_diagram"]
+
+#: Fill of the stages' blocks.
+FILLS: dict[Stage, str] = {
+    "world": "#E8EEF4",
+    "hearing": "#FBE3D6",
+    "obstacle sensing": "#FCEFC9",
+    "control": "#DDF1E7",
+    "robot": "#DCEAF7",
+}
 #: Wires of one block have one colour; dark enough for a white page.
 WIRE_COLOURS = (
     "#0072B2",
@@ -56,23 +46,15 @@ WIRE_COLOURS = (
 MARGIN, HEADER, ROW, TRACK, GAP, CHARACTER = 24, 42, 20, 9, 36, 6.7
 
 
-@dataclass(frozen=True)
-class Wire:
-    """A connection between two blocks, by the names of blocks and ports."""
-
-    source: str
-    output: str
-    target: str
-    input: str
-
-
 @dataclass
 class _Box:
     """A block with its place in the picture."""
 
     name: str
     kind: str
-    role: str
+    stage: Stage
+    lower: bool
+    """Whether it stands in the row below the others."""
     inputs: list[str]
     outputs: list[str]
     column: int = 0
@@ -109,21 +91,20 @@ class _Layout:
     track_x: dict[tuple[int, tuple[str, str]], float] = field(default_factory=dict)
 
 
-def wires(diagram: Diagram) -> list[Wire]:
-    """All connections between the blocks that are no logs, in a fixed order."""
-    names = [block.get_name() for block in _blocks(diagram)]
-    found = [wire for wire in _all_wires(diagram) if wire.target in names]
-    return sorted(found, key=lambda w: (names.index(w.target), w.input, w.source))
-
-
-def block_svg(diagram: Diagram) -> str:
+def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
     """The diagram as SVG text.
 
     The signal runs from left to right. Wires that skip a column, or run back,
     go along the bus between the upper row and the row of obstacle sensing. An
     output that nothing reads is grey. Logs are left out.
+
+    Args:
+        diagram: What to draw.
+        flat: Whether to draw what is in the diagrams that it is made of, in place of
+            them.
     """
-    layout = _arrange(diagram)
+    connections = wires(diagram, flat=flat)
+    layout = _arrange(blocks(diagram, flat=flat), connections)
     names = list(layout.boxes)
     size = f"{layout.width:.0f} {layout.height:.0f}"
     width, height = size.split()
@@ -138,45 +119,25 @@ def block_svg(diagram: Diagram) -> str:
     parts += [_direct(layout, w, colours[w.source]) for w in layout.direct]
     for key, along in layout.bus.items():
         parts += [_along_bus(layout, key, wire, colours[key[0]]) for wire in along]
-    read = {(w.source, w.output) for w in wires(diagram)}
+    read = {(w.source, w.output) for w in connections}
     parts += [_drawn(box, read) for box in layout.boxes.values()]
     return "\n".join([*parts, "</svg>", ""])
 
 
-def write_block_diagram(diagram: Diagram, path: str | Path) -> None:
+def write_block_diagram(
+    diagram: Diagram, path: str | Path, *, flat: bool = True
+) -> None:
     """Writes the diagram of named blocks as SVG.
+
+    Args:
+        diagram: What to draw.
+        path: The .svg file.
+        flat: See ``block_svg``.
 
     Raises:
         OSError: The file cannot be written.
     """
-    Path(path).write_text(block_svg(diagram), encoding="utf-8")
-
-
-def _all_wires(diagram: Diagram) -> list[Wire]:
-    found = []
-    for target, source in diagram.connection_map().items():
-        (reader, input_index), (writer, output_index) = target, source
-        found.append(
-            Wire(
-                writer.get_name(),
-                writer.get_output_port(output_index).get_name(),
-                reader.get_name(),
-                reader.get_input_port(input_index).get_name(),
-            )
-        )
-    return found
-
-
-def _blocks(diagram: Diagram) -> list[Any]:
-    """The systems but for logs, and but for what is read by logs alone."""
-    systems = diagram.GetSystems()
-    logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
-    readers: dict[str, set[str]] = {}
-    for wire in _all_wires(diagram):
-        readers.setdefault(wire.source, set()).add(wire.target)
-    while more := {name for name, by in readers.items() if by <= logs} - logs:
-        logs |= more
-    return [s for s in systems if s.get_name() not in logs]
+    Path(path).write_text(block_svg(diagram, flat=flat), encoding="utf-8")
 
 
 def _class_name(block: Any) -> str:
@@ -185,26 +146,30 @@ def _class_name(block: Any) -> str:
 
 
 def _box(block: Any) -> _Box:
-    kind = _class_name(block)
-    role = next((role for role, _, kinds in ROLES if kind in kinds), OTHER_ROLE)
+    facts = block_facts(block)
+    stage: Stage = facts.stage
+    if isinstance(block, Diagram):
+        stage = "robot" if block.HasOutputPort("pose_WB") else "world"
+    elif type(block).__module__.startswith("pydrake."):  # joins ports
+        stage = "world"
     return _Box(
         block.get_name(),
-        kind,
-        role,
+        _class_name(block),
+        stage,
+        facts.part == "obstacles" or stage == "obstacle sensing",
         [block.get_input_port(k).get_name() for k in range(block.num_input_ports())],
         [block.get_output_port(k).get_name() for k in range(block.num_output_ports())],
     )
 
 
-def _arrange(diagram: Diagram) -> _Layout:
-    boxes = {block.get_name(): _box(block) for block in _blocks(diagram)}
-    connections = wires(diagram)
+def _arrange(systems: Sequence[Any], connections: Sequence[Wire]) -> _Layout:
+    boxes = {block.get_name(): _box(block) for block in systems}
     _set_columns(boxes, connections)
     direct: list[Wire] = []
     bus: dict[tuple[str, str], list[Wire]] = {}
     for wire in connections:
         step = boxes[wire.target].column - boxes[wire.source].column
-        lower = [boxes[n].kind in LOWER for n in (wire.source, wire.target)]
+        lower = [boxes[n].lower for n in (wire.source, wire.target)]
         if step == 1 and (lower[0] == lower[1] or lower[0]):
             direct.append(wire)
         else:
@@ -216,7 +181,6 @@ def _arrange(diagram: Diagram) -> _Layout:
 
 def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
     """Longest path from the left, then as far to the right as readers allow."""
-    order = [role for role, _, _ in ROLES]
     names = list(boxes)
     forward: dict[str, set[str]] = {name: set() for name in boxes}
     # Of the wires that close a loop, those against the order of building go back.
@@ -224,7 +188,7 @@ def _set_columns(boxes: dict[str, _Box], connections: Iterable[Wire]) -> None:
         connections, key=lambda w: names.index(w.source) > names.index(w.target)
     )
     for wire in against:
-        ranks = [order.index(boxes[n].role) for n in (wire.source, wire.target)]
+        ranks = [STAGES.index(boxes[n].stage) for n in (wire.source, wire.target)]
         back = ranks[0] > ranks[1] or _reaches(forward, wire.target, wire.source)
         if not back:
             forward[wire.source].add(wire.target)
@@ -247,8 +211,8 @@ def _reaches(forward: dict[str, set[str]], start: str, goal: str) -> bool:
 
 def _set_places(layout: _Layout) -> None:
     boxes = layout.boxes.values()
-    upper = [box for box in boxes if box.kind not in LOWER]
-    lower = [box for box in boxes if box.kind in LOWER]
+    upper = [box for box in boxes if not box.lower]
+    lower = [box for box in boxes if box.lower]
     _set_tracks(layout)
     top = MARGIN + 30.0
     below = _stack(upper, top)
@@ -322,7 +286,7 @@ def _wire(wire: Wire, path: str, end: tuple[float, float], colour: str) -> str:
 
 
 def _drawn(box: _Box, read: set[tuple[str, str]]) -> str:
-    fill = {role: colour for role, colour, _ in ROLES}[box.role]
+    fill = FILLS[box.stage]
     middle = box.x + box.width / 2.0
     title = escape(box.name.replace("_", " "))
     frame = f'x="{box.x:.1f}" y="{box.y:.1f}" width="{box.width:.1f}" stroke="#777777"'

@@ -25,8 +25,9 @@ class CollisionWarning:
     """From the first echo of the body to the contact, s; none: never heard of."""
     unseen_s: float | None
     """From its last echo to the contact, s."""
-    push_n: float
-    """Push of the law at the last tick, N, whatever it was that pushed."""
+    push_n: float | None
+    """Push of the law at the last tick, N, whatever it was that pushed; none of a
+    law that does not say."""
 
 
 def collision_warning(result: RunResult) -> CollisionWarning | None:
@@ -37,7 +38,9 @@ def collision_warning(result: RunResult) -> CollisionWarning | None:
     known = np.flatnonzero(_echoes(result, hit.object))
     first = result.time[known[0]] if len(known) else None
     last = result.time[known[-1]] if len(known) else None
-    push = math.hypot(columns["repulsion_x"][-1], columns["repulsion_y"][-1])
+    push = None
+    if "repulsion_x" in columns:
+        push = math.hypot(columns["repulsion_x"][-1], columns["repulsion_y"][-1])
     return CollisionWarning(
         warning_s=None if first is None else float(max(hit.time - first, 0.0)),
         unseen_s=None if last is None else float(max(hit.time - last, 0.0)),
@@ -49,7 +52,7 @@ def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
     """(n,) whether any cone's echo was that body's, at the ticks."""
     scenario, columns = result.scenario, result.columns
     sensors, control_point_m = scenario.ultrasonic, scenario.robot.control_point_m
-    bodies = scenario.bodies()[name].rectangles(result.time)
+    bodies = result.surroundings.bodies[name].rectangles(result.time)
     ranges = [
         cone_ranges(pose, body[np.newaxis], sensors, control_point_m)
         for pose, body in zip(result.poses("WB"), bodies, strict=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -39,7 +40,16 @@ ECHO_M = 0.2
 
 
 def run_metrics(result: RunResult) -> dict[str, float | None]:
-    """All metrics of a run, SI units; None where one does not apply."""
+    """All metrics of a run, SI units; None where one does not apply.
+
+    Of several robots, names begin with that of the robot and a dot.
+    """
+    if result.several:
+        return {
+            f"{name}.{metric}": value
+            for name, own in result.several.items()
+            for metric, value in run_metrics(own).items()
+        }
     proximity = Proximity(result)
     return {
         **_proximity_metrics(proximity),
@@ -73,8 +83,8 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
 
 def _goal_metrics(result: RunResult) -> dict[str, float | None]:
     """The goal: the radius of a resting source, the band of a moving one."""
-    columns, moves = result.columns, result.scenario.source.path().moves
-    inside = columns["source_range_true"] <= result.scenario.goal_radius_m
+    columns, moves = result.columns, result.target_moves
+    inside = columns["source_range_true"] <= result.goal_radius_m
     entries = np.flatnonzero(inside)
     steps = np.hypot(np.diff(columns["p_WB_x"]), np.diff(columns["p_WB_y"]))
     length = float(np.sum(steps))
@@ -92,7 +102,7 @@ def _goal_metrics(result: RunResult) -> dict[str, float | None]:
 def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None:
     """Since when P has been in the goal and, where the source rests, at rest."""
     stop, settled, least = result.scenario.stop, inside, 0.0
-    if not result.scenario.source.path().moves:
+    if not result.target_moves:
         settled = inside & (_speed_of_P(result) < stop.rest_speed_m_s)
         least = stop.rest_time_s - ROUNDING_S
     exits = np.flatnonzero(~settled)
@@ -113,12 +123,12 @@ def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
 def _shortest_path(result: RunResult) -> float | None:
     """Of a disc as wide as the robot, to where P can be at the goal radius."""
     scenario = result.scenario
-    *obstacles, source = scenario.bodies().values()
-    boxes = [body.rectangle(0.0) for body in obstacles if not body.path.moves]
+    around = result.surroundings
+    boxes = [b.rectangle(0.0) for b in around.obstacles.values() if not b.path.moves]
     length = shortest_path_length(
         scenario.start.position_m,
-        source.path.pose(0.0)[:2],
-        scenario.goal_radius_m + scenario.robot.control_point_m,
+        around.followed.path.pose(0.0)[:2],
+        result.goal_radius_m + scenario.robot.control_point_m,
         boxes,
         scenario.robot.width_m / 2.0,
     )
@@ -188,26 +198,44 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
 def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     """What the law and the wheels were asked for."""
     columns, robot = result.columns, result.scenario.robot
-    force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
     wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
-    push = columns["repulsion_x"] * columns["v_WP_x"]
-    push = push + columns["repulsion_y"] * columns["v_WP_y"]
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
     pulling = np.hypot(columns["v_WP_x"], columns["v_WP_y"])
     full = 0.999
     saturated = np.max(np.abs(wheels), axis=0) >= full * robot.top_wheel_speed
     saturated |= pulling >= full * robot.top_speed_m_s
-    speeds = np.stack([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
-    impossible = np.any(speeds > 2.0 * robot.top_speed_m_s, axis=0)
     return {
-        "control_effort_rms_n": _rms(np.hypot(*force)),
-        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
+        **_force_metrics(columns),
         "wheel_variation_m_s2": float(variation)
         * robot.wheel_radius_m
         / FRAME_PERIOD_S,
         "saturated_fraction": float(np.mean(saturated)),
-        "impossible_obstacle_speed_ticks": int(np.count_nonzero(impossible)),
+        "impossible_obstacle_speed_ticks": _impossible_speeds(result),
     }
+
+
+def _force_metrics(
+    columns: Mapping[str, NDArray[np.float64]],
+) -> dict[str, float | None]:
+    """Of a law that says its forces."""
+    if "repulsion_x" not in columns:
+        return {"control_effort_rms_n": None, "push_work_j": None}
+    force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
+    push = columns["repulsion_x"] * columns["v_WP_x"]
+    push = push + columns["repulsion_y"] * columns["v_WP_y"]
+    return {
+        "control_effort_rms_n": _rms(np.hypot(*force)),
+        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
+    }
+
+
+def _impossible_speeds(result: RunResult) -> int | None:
+    """Ticks at which the law took an obstacle to be faster than any can be."""
+    columns, top = result.columns, result.scenario.robot.top_speed_m_s
+    if "obstacle_speed_1" not in columns:
+        return None
+    speeds = np.stack([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
+    return int(np.count_nonzero(np.any(speeds > 2.0 * top, axis=0)))
 
 
 def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
@@ -235,7 +263,7 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     """From P to the nearest obstacle when the law first pushes back from it."""
     columns = proximity.result.columns
     distances = proximity.distances_from_P()
-    if len(distances) < 2:
+    if len(distances) < 2 or "repulsion_x" not in columns:
         return None
     nearest = np.min(distances[:-1], axis=0)
     echoes = [

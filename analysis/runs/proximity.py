@@ -23,7 +23,7 @@ PARTS = 10
 
 @dataclass(frozen=True)
 class Proximity:
-    """The robot's footprint beside all bodies: the obstacles, then the source.
+    """The robot's footprint beside all bodies, of which it follows the last.
 
     The footprint is the real rectangle, not a disc round it.
     """
@@ -37,8 +37,8 @@ class Proximity:
 
     @cached_property
     def bodies(self) -> NDArray[np.float64]:
-        """(m, n, 5) the bodies' rectangles at the ticks, the source last."""
-        bodies = self.result.scenario.bodies().values()
+        """(m, n, 5) the bodies' rectangles at the ticks, what is followed last."""
+        bodies = self.result.surroundings.bodies.values()
         return np.stack([body.rectangles(self.result.time) for body in bodies])
 
     @cached_property
@@ -57,7 +57,8 @@ class Proximity:
 
         A tick's clearance says little about a box that passes in 25 ms. Where
         it is below ``NEAR_M`` a tick is cut into ten: the robot's pose is
-        interpolated, the bodies are where their paths say.
+        interpolated, the bodies are where their paths say, and other robots on
+        straight lines between ticks.
         """
         least = np.min(self.clearances, axis=1)
         near = self.clearance < NEAR_M
@@ -70,7 +71,7 @@ class Proximity:
         step = np.diff(poses, axis=0)[ticks]
         between = poses[ticks, None] + part[:, None] * step[:, None]
         robot = _rectangles(self.result, between.reshape(-1, 3))
-        paths = self.result.scenario.bodies().values()
+        paths = self.result.surroundings.bodies.values()
         bodies = np.stack([body.rectangles(times) for body in paths])
         return np.minimum(least, np.min(_clearances(robot, bodies), axis=1))
 

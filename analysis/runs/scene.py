@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams import RunResult, Scenario
-from diagrams.scenario import robot_rectangle
+from diagrams.bodies import robot_rectangle
 from systems.framework.input_error import InputError
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 from systems.world.obstacles import ObstacleParameters
@@ -76,8 +76,14 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
 
     Estimates do not count: a wild one would shrink all else.
     """
-    scenario, times = result.scenario, picture_times(result, most=60)
-    centres = [result.poses("WB")[:, :2], result.poses("WS")[:, :2]]
+    scenario, times = result.full_scenario, picture_times(result, most=60)
+    centres = [
+        own.poses(body)[:, :2]
+        for own in result.robots.values()
+        for body in ("WB", "WS")
+    ]
+    sources = scenario.all_sources.values()
+    centres += [source.path().poses(times)[:, :2] for source in sources]
     for obstacle in scenario.obstacles:
         path = obstacle.path()
         centres.append(np.array([path.pose(t)[:2] for t in times]))
@@ -95,7 +101,7 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     hit, scenario = result.collision, result.scenario
     if hit is None:
         raise InputError("contact_point", f"the run ended by {result.cause!r}")
-    body = scenario.bodies()[hit.object].rectangle(hit.time)
+    body = result.surroundings.bodies[hit.object].rectangle(hit.time)
     pose = result.poses("WB")[tick_at(result, hit.time)]
     footprint = robot_rectangle(pose, scenario.robot)
     return touching_point(footprint, body)

@@ -21,7 +21,7 @@ from analysis.runs.scene import (
     tick_at,
 )
 from diagrams import RunResult
-from diagrams.scenario import robot_rectangle
+from diagrams.bodies import robot_rectangle
 from systems.sound.mic_array import microphones_B
 from systems.world.geometry import rectangle_corners, rotate
 

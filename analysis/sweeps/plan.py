@@ -21,8 +21,8 @@ from ruamel.yaml import YAML
 
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
-from diagrams.laws import law_files
 from diagrams.explain import explain
+from diagrams.laws import law_files
 from diagrams.loading import (
     read_mapping,
     resolve_sound,

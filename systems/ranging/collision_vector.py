@@ -205,7 +205,9 @@ COLLISION_FACTS = BlockFacts(
     "obstacle sensing",
     columns={
         "collision_vectors_B": tuple(
-            f"collision_{slot}_B_{axis}" for slot in range(1, SLOTS + 1) for axis in "xy"
+            f"collision_{slot}_B_{axis}"
+            for slot in range(1, SLOTS + 1)
+            for axis in "xy"
         ),
         "features": tuple(f"feature_{slot}" for slot in range(1, SLOTS + 1)),
     },

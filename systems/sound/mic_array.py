@@ -55,7 +55,9 @@ def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
     return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
 
 
-def microphone_reach(room: RoomParameters | None, acoustics: AcousticParameters) -> float:
+def microphone_reach(
+    room: RoomParameters | None, acoustics: AcousticParameters
+) -> float:
     """Longest way of sound that emissions must reach back for, m.
 
     Args:

@@ -14,13 +14,15 @@ from pydrake.systems.analysis import (
     Simulator_,
     SimulatorConfig,
 )
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from diagrams import build_sound_follower, make_simulator
-from diagrams.builder import LOGGED_PORTS, SoundFollower, _connect_by_name, block_seed
+from diagrams import build_sound_follower, make_simulator, simulate
+from diagrams.builder import SoundFollower
 from diagrams.laws import LAWS
+from diagrams.robot import block_seed, connect_by_name
 from diagrams.scenario import Scenario
 from systems import DiffDrivePlant, WheelOdometry, WheelSpeedCommand
+from systems.framework.block_facts import block_facts
 
 T = 0.025
 IDEAL: dict[str, Any] = {
@@ -34,8 +36,6 @@ COMMON_BLOCKS = {
     "active_impedance_controller",
     "collision_vector",
     "diff_drive_plant",
-    "obstacles",
-    "source_robot",
     "source_tracker",
     "wheel_odometry",
     "wheel_speed_command",
@@ -46,36 +46,58 @@ def build(**data: Any) -> SoundFollower:
     return build_sound_follower(Scenario.model_validate(IDEAL | data))
 
 
-def block_names(follower: SoundFollower) -> set[str]:
-    return {system.get_name() for system in follower.diagram.GetSystems()}
+def block_names(diagram: Diagram) -> set[str]:
+    return {system.get_name() for system in diagram.GetSystems()}
+
+
+def wires(diagram: Diagram) -> dict[tuple[str, str], tuple[str, str]]:
+    """(block, input) to the (block, output) that it reads."""
+    return {
+        (to.get_name(), to.get_input_port(i).get_name()): (
+            origin.get_name(),
+            origin.get_output_port(j).get_name(),
+        )
+        for (to, i), (origin, j) in diagram.connection_map().items()
+    }
 
 
 def test_blocks_of_the_full_build():
-    audio = {"sound_emitter", "mic_array", "tdoa_estimator"}
     follower = build_sound_follower(Scenario())
-    assert block_names(follower) == COMMON_BLOCKS | audio | {"ultrasonic_array"}
+    assert block_names(follower.diagram) == {"source", "obstacles", "robot"}
+    audio = {"mic_array", "tdoa_estimator", "ultrasonic_array"}
+    assert block_names(follower.robots["robot"].diagram) == COMMON_BLOCKS | audio
+    source = follower.sources["source"].diagram
+    assert block_names(source) == {"source_robot", "sound_emitter"}
 
 
-def test_interferers_are_wired_to_the_microphones():
-    names = ("fan", "drill")
-    scenario = Scenario.model_validate({"interferers": [{"name": n} for n in names]})
+def test_other_sources_are_wired_to_the_microphones():
+    scenario = Scenario.model_validate(
+        {
+            "sources": {
+                "source": {},
+                "fan": {"waypoints_m": [[0.0, 3.0]]},
+                "drill": {"waypoints_m": [[0.0, -3.0]], "body": False},
+            }
+        }
+    )
     follower = build_sound_follower(scenario)
-    wires = {
-        (to.get_name(), to.get_input_port(i).get_name()): origin.get_name()
-        for (to, i), (origin, _) in follower.diagram.connection_map().items()
-    }
-    assert wires["mic_array", "emission"] == "sound_emitter"
-    for name in names:
-        emitter = f"sound_emitter_{name}"
-        assert wires["mic_array", f"emission_{name}"] == emitter
-        assert wires[emitter, f"pose_WS_{name}"] == f"source_robot_{name}"
+    found = wires(follower.diagram)
+    assert found["robot", "emission"] == ("source", "emission")
+    assert found["robot", "pose_WS"] == ("source", "pose_WS")
+    for name in ("fan", "drill"):
+        assert found["robot", f"emission_{name}"] == (name, "emission")
+    assert found["robot", "poses_WO"] == ("poses_WO_for_robot", "y0")
+    assert follower.robots["robot"].diagram.GetInputPort("poses_WO").size() == 3
 
 
 def test_bad_files_are_named_by_their_whole_field(tmp_path):
     missing = str(tmp_path / "missing.wav")
-    interferer = {"name": "fan", "sound": {"kind": "wav", "file": missing}}
+    sound = {"kind": "wav", "file": missing}
+    fan = {"waypoints_m": [[0.0, 3.0]], "sound": sound}
     for data, field in (
-        ({"interferers": [interferer]}, r"interferers\.0\.sound\.file"),
+        ({"sound": sound}, r"sound\.file"),
+        ({"sources": {"source": {}, "fan": fan}}, r"sources\.fan\.sound\.file"),
+        ({"robots": {"a": {"loudspeaker": sound}}}, r"robots\.a\.loudspeaker\.file"),
         ({"microphones": {"ego_noise_file": missing}}, r"microphones\.ego_noise_file"),
     ):
         with pytest.raises(ValueError, match=rf"^{field}: .*missing\.wav"):
@@ -84,20 +106,24 @@ def test_bad_files_are_named_by_their_whole_field(tmp_path):
 
 def test_emitters_reach_back_as_far_as_the_room_answers():
     """By 0.4 s: 136 m, where 30 m are enough without a room."""
+    fan = {"waypoints_m": [[0.0, 3.0]]}
     scenario = Scenario.model_validate(
-        {"room": {"reverberation_time_s": 0.4}, "interferers": [{"name": "fan"}]}
+        {"room": {"reverberation_time_s": 0.4}, "sources": {"source": {}, "fan": fan}}
     )
     follower = build_sound_follower(scenario)
     context = follower.diagram.CreateDefaultContext()
-    for role in ("emitter", "emitter_fan"):
-        block = follower.blocks[role]
+    for parts in follower.sources.values():
+        block = parts.blocks["emitter"]
         emission = block.get_output_port(0).Eval(block.GetMyContextFromRoot(context))
         assert emission.start_time <= -0.4 - 0.025
 
 
 def test_blocks_of_the_ideal_build():
     ideal = {"ideal_source_sensor", "ideal_obstacle_sensor"}
-    assert block_names(build()) == COMMON_BLOCKS - {"collision_vector"} | ideal
+    follower = build()
+    names = block_names(follower.robots["robot"].diagram)
+    assert names == COMMON_BLOCKS - {"collision_vector"} | ideal
+    assert block_names(follower.sources["source"].diagram) == {"source_robot"}
 
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])
@@ -107,28 +133,40 @@ def test_every_input_is_connected_to_the_output_of_its_name(
     hearing, obstacle_sensing, law
 ):
     follower = build(hearing=hearing, obstacle_sensing=obstacle_sensing, law=law)
-    wires = {
-        (to.get_name(), to.get_input_port(i).get_name()): origin.get_output_port(j)
-        for (to, i), (origin, j) in follower.diagram.connection_map().items()
+    robot = follower.robots["robot"].diagram
+    found = wires(robot)
+    outside = {
+        robot.get_input_port(k).get_name() for k in range(robot.num_input_ports())
     }
-    for block in follower.blocks.values():
+    for block in follower.robots["robot"].blocks.values():
         for index in range(block.num_input_ports()):
             name = block.get_input_port(index).get_name()
-            assert wires[block.get_name(), name].get_name() == name
+            wire = found.get((block.get_name(), name))
+            assert wire[1] == name if wire else name in outside
+    around = wires(follower.diagram)
+    assert {name for block, name in around if block == "robot"} == outside
+    assert all(entry == output for (_, entry), (_, output) in around.items())
     assert follower.diagram.num_input_ports() == 0
 
 
-def test_log_records_what_the_build_has():
+def test_log_records_what_the_blocks_name_columns_for():
     scenario = Scenario.model_validate(IDEAL)
     follower = build_sound_follower(scenario, log=True)
-    assert follower.logged == tuple(k for k in LOGGED_PORTS if k[0] != "ultrasonic")
+    assert set(follower.logged) == {
+        (part, name)
+        for part, block in follower.robots["robot"].blocks.items()
+        for name in block_facts(block).columns
+    }
+    assert ("ultrasonic", "ranges") not in follower.logged
     assert build().log is None
 
 
 def test_log_records_slip_where_there_is_friction():
-    scenario = Scenario.model_validate(IDEAL | {"plant": {"friction": 0.3}})
+    slipping = {"plant": {"friction": 0.3}, "duration_s": 0.1}
+    scenario = Scenario.model_validate(IDEAL | slipping)
     follower = build_sound_follower(scenario, log=True)
-    assert follower.logged[-1] == ("plant", "slip_velocities")
+    assert ("plant", "slip_velocities") in follower.logged
+    assert "slip_left" in simulate(scenario).columns
 
 
 def test_log_holds_the_ports_values_at_every_tick():
@@ -162,7 +200,7 @@ def connect(*blocks: Any) -> None:
     builder = DiagramBuilder()
     for index, block in enumerate(blocks):
         builder.AddNamedSystem(f"block {index}", block)
-    _connect_by_name(builder, blocks)
+    connect_by_name(builder, blocks)
 
 
 def test_a_quantity_nobody_publishes_is_an_error():

@@ -30,6 +30,8 @@ seed: 7
 duration_s: 0.1
 arena_m: [5, 6]
 law: conventional
+follows: source
+loudspeaker: {start_s: 1}
 hearing: ideal
 obstacle_sensing: ideal
 start: {position_m: [-1, 0.5], heading_deg: 10}
@@ -39,8 +41,8 @@ obstacles:
   - {name: cart, waypoints_m: [[3, 3], [3, -3]], speed_m_s: 0.1, start_time_s: 1}
 stop: {goal_margin_m: 0.2, stuck_after_s: 5}
 room: {size_m: [8, 8, 3], reverberation_time_s: 0.3}
-interferers:
-  - {name: fan, waypoints_m: [[0, 3]], sound: {kind: band_noise}}
+sources: {source: {}, fan: {waypoints_m: [[0, 3]], sound: {kind: band_noise}}}
+robots: {robot: {}, second: {hearing: audio, start: {position_m: [-2, -1]}}}
 acoustics: {temperature_c: 25}
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
@@ -116,16 +118,19 @@ def test_relative_files_lie_beside_the_scenario(tmp_path):
     text = """
 sound: {kind: wav, file: a.wav}
 microphones: {ego_noise_file: c.wav}
-interferers:
-  - {name: fan, sound: {kind: wav, file: b.wav}}
-  - {name: drill}
+sources:
+  fan: {sound: {kind: wav, file: b.wav}}
+robots:
+  robot: {}
+  second: {start: {position_m: [-2, 0]}, loudspeaker: {kind: wav, file: d.wav}}
 """
     scenario = load_scenario(write(tmp_path, text))
     assert [
         scenario.sound.file,
-        scenario.interferers[0].sound.file,
+        scenario.all_sources["fan"].sound.file,
         scenario.microphones.ego_noise_file,
-    ] == [str((tmp_path / name).resolve()) for name in ("a.wav", "b.wav", "c.wav")]
+        scenario.sounds()["second"].file,
+    ] == [str((tmp_path / f"{name}.wav").resolve()) for name in "abcd"]
 
 
 def test_fields_of_a_group_that_is_unset_may_be_overridden(tmp_path):

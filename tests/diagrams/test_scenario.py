@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from diagrams.scenario import Scenario, StartParameters, robot_rectangle
+from diagrams.bodies import robot_rectangle
+from diagrams.participants import StartParameters
+from diagrams.scenario import Scenario
 from systems.base.robot import RobotParameters
 from systems.world.geometry import rectangle_corners
 
@@ -89,8 +91,8 @@ def test_skew_is_given_for_every_microphone_or_none():
             r"source\.waypoints_m: \(3, 4\) is outside the room",
         ),
         (
-            {"interferers": [{"name": "fan", "waypoints_m": [[-3.6, 0.0]]}]},
-            r"interferers\.0\.waypoints_m: \(-3\.6, 0\)",
+            {"sources": {"source": {}, "fan": {"waypoints_m": [[-3.6, 0.0]]}}},
+            r"sources\.fan\.waypoints_m: \(-3\.6, 0\)",
         ),
         (
             {"start": {"position_m": [3.4, 0.0]}},
@@ -103,14 +105,6 @@ def test_skew_is_given_for_every_microphone_or_none():
 def test_all_that_sounds_is_in_the_room(data, message):
     with pytest.raises(ValidationError, match=message):
         Scenario.model_validate({"room": {}} | data)
-
-
-def test_every_interferer_has_a_name_of_its_own():
-    twice = [{"name": "fan"}, {"name": "fan", "waypoints_m": [[1.0, 2.0]]}]
-    with pytest.raises(ValidationError, match=r"interferers: the name 'fan' is taken"):
-        Scenario.model_validate({"interferers": twice})
-    with pytest.raises(ValidationError, match="name"):
-        Scenario.model_validate({"interferers": [{"name": "Fan 1"}]})
 
 
 def test_seed_fits_the_generators():

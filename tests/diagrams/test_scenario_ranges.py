@@ -11,8 +11,8 @@ import pytest
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from diagrams.participants import SourceParameters
 from diagrams.scenario import Scenario
-from systems.sound.interferers import InterfererParameters
 from systems.sound.room import RoomParameters
 from systems.world.obstacles import ObstacleParameters
 
@@ -88,7 +88,7 @@ def test_no_quantity_that_must_be_positive_may_be_as_good_as_zero():
         (Scenario, "obstacles", ({},) * 101),
         (RoomParameters, "size_m", (1e6, 7.0, 3.0)),
         (ObstacleParameters, "waypoints_m", ((1e300, 0.0),)),
-        (InterfererParameters, "waypoints_m", ((0.0, 0.0),) * 1_001),
+        (SourceParameters, "waypoints_m", ((0.0, 0.0),) * 1_001),
     ],
 )
 def test_what_would_never_end_is_refused(model, field, value):

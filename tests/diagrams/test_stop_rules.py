@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from diagrams import RunResult, build_sound_follower, make_simulator, simulate
-from diagrams.scenario import Scenario, robot_rectangle
+from diagrams.bodies import robot_rectangle
+from diagrams.scenario import Scenario
 from diagrams.stop_rules import StopRules
 from systems.world.geometry import rectangle_clearance
 

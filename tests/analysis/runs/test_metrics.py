@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -13,9 +14,8 @@ from numpy.typing import NDArray
 from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
-from diagrams import load_scenario, simulate
+from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.scenario import Scenario
-from diagrams.simulation import COLUMNS, RunResult
 from diagrams.stop_rules import Collision
 from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
 
@@ -26,6 +26,14 @@ FRONT = 0.175
 SIDE = 0.41
 
 
+@cache
+def logged_columns() -> list[str]:
+    """All that a run with cones and friction logs."""
+    data = {"hearing": "ideal", "plant": {"friction": 0.3}}
+    follower = build_sound_follower(Scenario.model_validate(data), log=True)
+    return [name for columns in follower.logged.values() for name in columns]
+
+
 def motion(
     x, y, theta, *, cause: str = "completed", columns: Any = None, **scenario: Any
 ) -> RunResult:
@@ -33,8 +41,7 @@ def motion(
     settings = Scenario.model_validate({"hearing": "ideal", **scenario})
     time = np.arange(len(x)) * TICK
     source = settings.bodies()["source"].path.poses(time)
-    names = [name for group in COLUMNS.values() for name in group]
-    table: dict[str, Any] = {name: np.zeros(len(x)) for name in names}
+    table: dict[str, Any] = {name: np.zeros(len(x)) for name in logged_columns()}
     table["t"] = time
     table["p_WB_x"], table["p_WB_y"], table["theta_WB"] = x, y, theta
     table["v_WB_x"], table["v_WB_y"] = np.gradient(x, TICK), np.gradient(y, TICK)

@@ -41,7 +41,7 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
     # Fired at once, it reads neither ages nor pose.
     "CollisionVector": ({"sensors": UltrasonicParameters(firing="sequential")},),
     "IdealObstacleSensor": ({"obstacle_count": 2},),
-    "MicArray": ({}, {"interferers": ["radio"]}),
+    "MicArray": ({}, {"others": ["radio"]}),
     "UltrasonicArray": (
         {"obstacle_count": 2},
         {"obstacle_count": 2, "parameters": UltrasonicParameters(firing="sequential")},

@@ -94,14 +94,14 @@ LENGTHS = {
     "Scenario.name": (1, None),
     "Scenario.law": (1, None),
     "Scenario.obstacles": (None, 100),
-    "Scenario.interferers": (None, 16),
+    "Scenario.robots": (None, 16),
+    "Scenario.sources": (None, 16),
     "ObstacleParameters.name": (1, None),
     "ObstacleParameters.waypoints_m": (None, 1000),
     "SourceRobotParameters.waypoints_m": (None, 1000),
-    "InterfererParameters.waypoints_m": (None, 1000),
     "RobotParameters.microphones_m": (3, None),
 }
-#: A room, an obstacle and an interferer of which nothing is said.
+#: A room and an obstacle of which nothing is said.
 DEFAULTS = {
     "RoomParameters.size_m": [7.0, 7.0, 3.0],
     "RoomParameters.reverberation_time_s": 0.4,
@@ -117,8 +117,6 @@ DEFAULTS = {
     "ObstacleParameters.start_time_s": 0.0,
     "ObstacleParameters.at_end": "stop",
     "ObstacleParameters.corner_radius_m": 0.05,
-    "InterfererParameters.name": "interferer",
-    "InterfererParameters.waypoints_m": [[0.0, 2.0]],
 }
 
 
@@ -180,6 +178,7 @@ def test_lengths_of_texts_and_lists():
     for name, schema in schemas().items():
         least = schema.get("minLength", schema.get("minItems"))
         greatest = schema.get("maxLength", schema.get("maxItems"))
+        greatest = schema.get("maxProperties", greatest)
         if least != greatest:
             found[name] = (least, greatest)
     assert found == LENGTHS

@@ -273,7 +273,7 @@ def test_skew_of_another_number_of_channels_is_refused():
 
 def test_sources_add_up():
     """Two places, two sources: what one block hears of both is the sum."""
-    array = MicArray(parameters=quiet(), interferers=["fan"])
+    array = MicArray(parameters=quiet(), others=["fan"])
     silent = emission((2.0, 0.5), sounding=False)
     sent = emission((2.0, 0.5)), emission((1.0, -2.0))
     heard = []
