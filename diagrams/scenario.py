@@ -178,20 +178,20 @@ class Scenario(FollowerParameters, RunParameters):
         return self.model_copy(update=own | {"robots": {}, "sources": {}})
 
     def require_one_robot(self, purpose: str) -> None:
-        """Refuses what is defined for one robot and one source alone.
+        """Refuses named robots and sources for what is of the plain ones alone.
 
         Args:
             purpose: What is, as 'a linear model'.
 
         Raises:
-            InputError: There are others.
+            InputError: Some are named.
         """
         for field, named in (("robots", self.robots), ("sources", self.sources)):
             if named:
                 raise InputError(
                     field,
-                    f"{', '.join(named)}: {purpose} is of one robot and one source; "
-                    f"leave {field} out",
+                    f"has {', '.join(named)}, but {purpose} is of one robot and one "
+                    f"source; leave {field} out",
                 )
 
     def surroundings(

@@ -24,7 +24,7 @@ from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import load_scenario
 from diagrams.explain import explain
 from diagrams.laws import LAWS
-from diagrams.loading import read_mapping
+from diagrams.loading import read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
 
 __all__ = [
@@ -127,6 +127,7 @@ def comparison_plan(
         InputError: Something of that is unknown or no good; names the field.
     """
     plan = _layouts(scenario)
+    scenario_from_mapping(plan.base).require_one_robot("a comparison of laws")
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
     fields |= {
         "set": plan.set | (settings or {}),

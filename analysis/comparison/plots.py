@@ -13,12 +13,12 @@ from matplotlib.ticker import MaxNLocator
 from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison
 from analysis.reporting.palette import COLOURS
-from analysis.runs.scene import bounds
+from analysis.runs.scene import bounds, looks
 from analysis.runs.trajectory_artists import (
     draw_collision,
     draw_obstacles,
     draw_robot,
-    draw_source,
+    draw_sources,
 )
 from diagrams import RunResult
 from systems.world.geometry import rectangle_corners
@@ -121,8 +121,9 @@ def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure
 def _example(axes: Axes, result: RunResult) -> None:
     end = result.simulated_s
     draw_obstacles(axes, result)
-    draw_source(axes, result, [end])
-    draw_robot(axes, result, [0.0, end])
+    draw_sources(axes, result, [end])
+    (look,) = looks(result)
+    draw_robot(axes, look, [0.0, end])
     draw_collision(axes, result)
     for obstacle in result.scenario.obstacles:
         path = obstacle.path()

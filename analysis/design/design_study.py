@@ -128,8 +128,10 @@ def study_design(
         progress: Called with the number of simulated runs, of ``STUDY_RUNS``.
 
     Raises:
-        ValueError: Nothing meets a requirement that has to be met.
+        InputError: There are several robots, or nothing meets a requirement that has
+            to be met.
     """
+    scenario.require_one_robot("a design of gains")
     requirements = requirements or DesignRequirements()
     repulsion = search_gains(scenario, requirements)
     designed = scenario.model_copy(update={"repulsion": repulsion})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["COLOURS"]
+__all__ = ["COLOURS", "ROBOT_COLOURS"]
 
 #: Okabe and Ito's palette: told apart with any colour vision.
 COLOURS = {
@@ -18,3 +18,5 @@ COLOURS = {
     "left": "#56B4E9",
     "right": "#E69F00",
 }
+#: Of several robots, in turn.
+ROBOT_COLOURS = ("#0072B2", "#009E73", "#AA4499", "#56B4E9", "#B07D00", "#332288")

@@ -14,11 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
 from analysis.runs.replay_scene import upright
-from analysis.runs.scene import moving_and_static, sound_bursts
-from diagrams import RunResult
+from analysis.runs.scene import looks, moving_and_static, run_title, sound_bursts
+from diagrams import RunResult, Scenario
 from systems.framework.signals import FRAME_PERIOD_S
+from systems.sound.waveforms import SoundParameters
 
 __all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
 
@@ -54,7 +56,7 @@ def write_replay(result: RunResult, path: str | Path) -> None:
         meshcat.PublishRecording()
         page = meshcat.StaticHtml()
         del meshcat
-    title = html.escape(f"{_title(result)} - replay")
+    title = html.escape(f"{run_title(result)} - replay")
     page = re.sub(
         "<title>.*?</title>", lambda _: f"<title>{title}</title>", page, count=1
     )
@@ -73,29 +75,53 @@ def _quiet_drake() -> Iterator[None]:
         logger.setLevel(level)
 
 
-def _title(result: RunResult) -> str:
-    scenario = result.scenario
-    return f"{scenario.name}, law {scenario.law}: {result.cause}"
-
-
 def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
-    scenario = result.scenario
-    replay_scene.add_floor(meshcat, result, _title(result))
+    scenario = result.full_scenario
+    replay_scene.add_floor(meshcat, result, run_title(result))
     replay_scene.add_obstacles(meshcat, scenario)
-    replay_scene.add_source(meshcat, scenario)
-    replay_scene.add_robot(meshcat, scenario)
+    for name, source in scenario.all_sources.items():
+        replay_scene.add_source(meshcat, source, source_path(scenario, name))
+    for look in looks(result):
+        path = robot_path(look.result, result)
+        replay_scene.add_robot(meshcat, look, path, estimate_path(path))
     replay_scene.set_stage(meshcat, result)
+
+
+def source_path(scenario: Scenario, name: str) -> str:
+    """Where a source is in Meshcat's tree: the only one is ``source``."""
+    return f"sources/{name}" if scenario.sources else "source"
+
+
+def robot_path(own: RunResult, result: RunResult) -> str:
+    """Where one robot of a run is in Meshcat's tree: the only one is ``robot``."""
+    return f"robots/{own.name}" if result.several else "robot"
+
+
+def estimate_path(robot: str) -> str:
+    """Where the ball is that shows where a robot takes the source to be."""
+    return robot.replace("robot", "estimate", 1)
 
 
 def record_run(meshcat: Meshcat, result: RunResult) -> None:
     """Records all motion of a run; the bodies must have been made before."""
     frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
-    _record_robot(meshcat, result, frames)
-    _record_source(meshcat, result, frames)
-    _record_estimate(meshcat, result)
+    scenario = result.full_scenario
+    sounds = scenario.sounds()
+    for look in looks(result):
+        own, path = look.result, robot_path(look.result, result)
+        _record_robot(meshcat, own, path, frames)
+        _record_estimate(meshcat, own, estimate_path(path))
+        p_WP = np.stack([own.columns["p_WP_x"], own.columns["p_WP_y"]], axis=1)
+        _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
+        if own.name in sounds:
+            _record_rings(meshcat, result, path, sounds[own.name])
+    for name, source in scenario.all_sources.items():
+        path = source_path(scenario, name)
+        poses = source.path().poses(result.time)
+        _record_source(meshcat, result, path, poses, frames)
+        _record_rings(meshcat, result, path, sounds[name])
+        _record_trail(meshcat, result, f"trail/{path}", poses[:, :2], COLOURS["source"])
     _record_obstacles(meshcat, result, frames)
-    _record_trail(meshcat, result, "trail/robot", ("p_WP_x", "p_WP_y"), "robot")
-    _record_trail(meshcat, result, "trail/source", ("p_WS_x", "p_WS_y"), "source")
 
 
 def _at_frames(
@@ -138,19 +164,19 @@ def _record_switch(
 
 
 def _record_robot(
-    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
+    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
-    path = _at_frames(result, result.poses("WB"), frames)
-    _record_path(meshcat, "robot", frames, path)
+    poses = _at_frames(result, result.poses("WB"), frames)
+    _record_path(meshcat, path, frames, poses)
     for side, angles in wheel_angles(result).items():
         turned = np.interp(frames, result.time, angles)
         for time, angle in zip(frames, turned, strict=True):
             spin = upright(0.0, 0.0, 0.0, angle)
-            meshcat.SetTransform(f"robot/{side}/wheel", spin, float(time))
+            meshcat.SetTransform(f"{path}/{side}/wheel", spin, float(time))
     for number in (1, 2, 3):
         if f"echo_{number}" in result.columns:
             echo = result.columns[f"echo_{number}"] > 0.5
-            cone = f"robot/cone_{number}"
+            cone = f"{path}/cone_{number}"
             _record_switch(meshcat, f"{cone}/echo", result.time, echo)
             _record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
 
@@ -170,17 +196,26 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
 
 
 def _record_source(
-    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
+    meshcat: Meshcat,
+    result: RunResult,
+    path: str,
+    poses: NDArray[np.float64],
+    frames: NDArray[np.float64],
 ) -> None:
-    path = _at_frames(result, result.poses("WS"), frames)
-    if not result.scenario.source.path().moves:
-        frames, path = frames[:1], path[:1]
-    _record_path(meshcat, "source", frames, path)
-    bursts = sound_bursts(result.scenario, result.simulated_s)
+    places = _at_frames(result, poses, frames)
+    if not np.ptp(poses, axis=0).any():
+        frames, places = frames[:1], places[:1]
+    _record_path(meshcat, path, frames, places)
+
+
+def _record_rings(
+    meshcat: Meshcat, result: RunResult, path: str, sound: SoundParameters
+) -> None:
+    bursts = sound_bursts(sound, result.simulated_s)
     times = np.arange(0.0, result.simulated_s, RING_S / 2.0)
     for number in range(len(replay_scene.RINGS)):
         seen = [ring_at(time, bursts) == number for time in times]
-        _record_switch(meshcat, f"source/ring_{number + 1}", times, seen)
+        _record_switch(meshcat, f"{path}/ring_{number + 1}", times, seen)
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
@@ -191,11 +226,11 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
     return None
 
 
-def _record_estimate(meshcat: Meshcat, result: RunResult) -> None:
+def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
     """The ball jumps when a frame is heard and rests in between."""
     columns = result.columns
     valid = columns["target_valid"] > 0.5
-    _record_switch(meshcat, "estimate", result.time, valid)
+    _record_switch(meshcat, path, result.time, valid)
     height = replay_scene.SOURCE_HEIGHT_M + 0.12
     places = np.stack(
         [columns["p_WS_estimated_x"], columns["p_WS_estimated_y"]], axis=1
@@ -208,15 +243,15 @@ def _record_estimate(meshcat: Meshcat, result: RunResult) -> None:
             # Without this the ball would glide here from the last burst on.
             x_0, y_0 = places[tick - 1]
             before = float(result.time[tick - 1])
-            meshcat.SetTransform("estimate", upright(x_0, y_0, height, 0.0), before)
+            meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
         time = float(result.time[tick])
-        meshcat.SetTransform("estimate", upright(x, y, height, 0.0), time)
+        meshcat.SetTransform(path, upright(x, y, height, 0.0), time)
 
 
 def _record_obstacles(
     meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
 ) -> None:
-    moving, _ = moving_and_static(result.scenario)
+    moving, _ = moving_and_static(result.full_scenario)
     for obstacle in moving:
         pose: Callable[[float], tuple[float, float, float]] = obstacle.path().pose
         places = [pose(float(time)) for time in frames]
@@ -225,16 +260,19 @@ def _record_obstacles(
 
 
 def _record_trail(
-    meshcat: Meshcat, result: RunResult, path: str, names: tuple[str, str], role: str
+    meshcat: Meshcat,
+    result: RunResult,
+    path: str,
+    points: NDArray[np.float64],
+    colour: str,
 ) -> None:
     """Pieces that are there from the start and seen once they are driven."""
-    points = np.stack([result.columns[name] for name in names], axis=1)
     step = round(TRAIL_PIECE_S / FRAME_PERIOD_S)
     for number, start in enumerate(range(0, len(points) - 1, step)):
         piece = points[start : start + step + 1]
         if not np.ptp(piece, axis=0).any():
             continue
         name = f"{path}/{number}"
-        replay_scene.add_trail(meshcat, name, piece, role)
+        replay_scene.add_trail(meshcat, name, piece, colour)
         drawn = result.time[min(start + step, len(points) - 1)]
         _record_switch(meshcat, name, (0.0, drawn), (False, True))

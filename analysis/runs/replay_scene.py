@@ -17,8 +17,9 @@ from pydrake.geometry import Box, Cylinder, Meshcat, MeshcatCone, Rgba, Sphere
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from analysis.reporting.palette import COLOURS
-from analysis.runs.scene import bounds, sensor_pose
+from analysis.runs.scene import Look, bounds, sensor_pose
 from diagrams import RunResult, Scenario
+from diagrams.participants import SourceParameters
 from systems.sound.mic_array import microphones_B
 
 __all__ = [
@@ -46,7 +47,7 @@ RINGS = (0.28, 0.38, 0.48, 0.58, 0.68)
 
 
 def _colour(role: str, alpha: float = 1.0) -> Rgba:
-    return Rgba(*to_rgb(COLOURS[role]), alpha)
+    return Rgba(*to_rgb(COLOURS.get(role, role)), alpha)
 
 
 def upright(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
@@ -107,7 +108,7 @@ def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
     At least the scenario's arena, about the middle of the run.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.8)
-    width, depth = result.scenario.arena_m
+    width, depth = result.full_scenario.arena_m
     x_more = max(width - (x_high - x_low), 0.0) / 2.0
     y_more = max(depth - (y_high - y_low), 0.0) / 2.0
     return (
@@ -141,24 +142,37 @@ def _write(
     _segments(meshcat, path, starts, ends, Rgba(0.25, 0.25, 0.25))
 
 
-def add_robot(meshcat: Meshcat, scenario: Scenario) -> None:
-    """The robot about the origin of B: body, wheels, microphone bar, cones."""
+def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
+    """A robot about the origin of B: body, wheels, microphone bar, cones.
+
+    Args:
+        meshcat: The scene.
+        look: The robot.
+        path: Where it is in Meshcat's tree.
+        estimate: Where the ball is that shows where it takes the source to be.
+    """
+    scenario = look.result.scenario
     robot = scenario.robot
     width = BODY_WIDTH_FRACTION * robot.width_m
     body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
-    meshcat.SetObject("robot/body", body, _colour("robot"))
-    meshcat.SetTransform("robot/body", upright(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02))
+    meshcat.SetObject(f"{path}/body", body, _colour(look.colour))
+    middle = upright(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02)
+    meshcat.SetTransform(f"{path}/body", middle)
     for side, y in (("left", 0.5), ("right", -0.5)):
-        _add_wheel(meshcat, scenario, side, y * robot.wheel_separation_m)
-    _add_microphones(meshcat, scenario)
+        place = y * robot.wheel_separation_m
+        _add_wheel(meshcat, scenario, f"{path}/{side}", place)
+    _add_microphones(meshcat, scenario, path)
     if scenario.obstacle_sensing == "ultrasonic":
         for sensor in range(3):
-            _add_cone(meshcat, scenario, sensor)
+            _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
+    if scenario.loudspeaker is not None:
+        _add_loudspeaker(meshcat, path, ROBOT_HEIGHT_M, look.colour)
+    meshcat.SetObject(estimate, Sphere(0.06), _colour(look.estimates))
 
 
-def _add_wheel(meshcat: Meshcat, scenario: Scenario, side: str, y: float) -> None:
+def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> None:
     """A wheel that can be seen to turn: its axle is the z axis of ``wheel``."""
-    radius, path = scenario.robot.wheel_radius_m, f"robot/{side}"
+    radius = scenario.robot.wheel_radius_m
     meshcat.SetTransform(path, _placed(-0.5 * math.pi, 0.0, 0.0, [0.0, y, radius]))
     tyre = Cylinder(radius, WHEEL_WIDTH_M)
     meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
@@ -166,29 +180,28 @@ def _add_wheel(meshcat: Meshcat, scenario: Scenario, side: str, y: float) -> Non
     meshcat.SetObject(f"{path}/wheel/spoke", spoke, Rgba(0.95, 0.95, 0.95))
 
 
-def _add_microphones(meshcat: Meshcat, scenario: Scenario) -> None:
+def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:
     robot = scenario.robot
     bar = Box(0.02, robot.width_m, 0.02)
     x = robot.control_point_m - 0.01
-    meshcat.SetObject("robot/bar", bar, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform("robot/bar", upright(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
+    meshcat.SetObject(f"{path}/bar", bar, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform(f"{path}/bar", upright(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
     mast = Cylinder(0.012, MICROPHONE_HEIGHT_M - ROBOT_HEIGHT_M)
     middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
-    meshcat.SetObject("robot/mast", mast, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform("robot/mast", upright(x, 0.0, middle))
+    meshcat.SetObject(f"{path}/mast", mast, Rgba(0.35, 0.35, 0.38))
+    meshcat.SetTransform(f"{path}/mast", upright(x, 0.0, middle))
     for number, (x_M, y_M) in enumerate(microphones_B(scenario.robot), start=1):
-        path = f"robot/microphone_{number}"
-        meshcat.SetObject(path, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
-        meshcat.SetTransform(path, upright(x_M, y_M, MICROPHONE_HEIGHT_M))
+        microphone = f"{path}/microphone_{number}"
+        meshcat.SetObject(microphone, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
+        meshcat.SetTransform(microphone, upright(x_M, y_M, MICROPHONE_HEIGHT_M))
 
 
-def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
+def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> None:
     """Both looks of a cone; the recording shows one at a time.
 
     A cone without an echo is short: at its full 3 m it would hide the scene.
     """
     x, y, axis = sensor_pose(scenario, sensor)
-    path = f"robot/cone_{sensor + 1}"
     # The cone's axis is z: tilt it forward, then turn it to the sensor's axis.
     tilted = _placed(0.0, 0.5 * math.pi, axis, [x, y, SENSOR_HEIGHT_M])
     meshcat.SetTransform(path, tilted)
@@ -199,23 +212,26 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, sensor: int) -> None:
         meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))
 
 
-def add_source(meshcat: Meshcat, scenario: Scenario) -> None:
+def add_source(meshcat: Meshcat, source: SourceParameters, path: str) -> None:
     """The master robot about the origin of S, its loudspeaker and its rings."""
-    length, width = scenario.source_size
-    body = Box(length, width, SOURCE_HEIGHT_M)
-    meshcat.SetObject("source/body", body, _colour("source"))
-    meshcat.SetTransform("source/body", upright(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M))
+    if source.body:
+        body = Box(source.length_m, source.width_m, SOURCE_HEIGHT_M)
+        meshcat.SetObject(f"{path}/body", body, _colour("source"))
+        middle = upright(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M)
+        meshcat.SetTransform(f"{path}/body", middle)
+    _add_loudspeaker(meshcat, path, SOURCE_HEIGHT_M, COLOURS["source"])
+
+
+def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) -> None:
+    """On a body of some height, m, with rings of its colour."""
     horn = Cylinder(0.07, 0.06)
-    meshcat.SetObject("source/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
-    meshcat.SetTransform(
-        "source/loudspeaker", upright(0.0, 0.0, SOURCE_HEIGHT_M + 0.03)
-    )
+    meshcat.SetObject(f"{path}/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
+    meshcat.SetTransform(f"{path}/loudspeaker", upright(0.0, 0.0, height + 0.03))
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     for number, radius in enumerate(RINGS, start=1):
         circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
-        path = f"source/ring_{number}"
-        _ribbon(meshcat, path, circle, _colour("source"), SOURCE_HEIGHT_M, 0.03)
-    meshcat.SetObject("estimate", Sphere(0.06), _colour("estimate"))
+        ring = f"{path}/ring_{number}"
+        _ribbon(meshcat, ring, circle, _colour(colour), height, 0.03)
 
 
 def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
@@ -229,10 +245,10 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
 
 
 def add_trail(
-    meshcat: Meshcat, path: str, points: NDArray[np.float64], role: str
+    meshcat: Meshcat, path: str, points: NDArray[np.float64], colour: str
 ) -> None:
     """One piece of a trail on the floor, through (n, 2) points in W, m."""
-    _ribbon(meshcat, path, points, _colour(role), 0.008, 0.03)
+    _ribbon(meshcat, path, points, _colour(colour), 0.008, 0.03)
 
 
 def set_stage(meshcat: Meshcat, result: RunResult) -> None:

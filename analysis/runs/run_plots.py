@@ -9,14 +9,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import COLOURS
-from analysis.runs.scene import bounds, sound_bursts
+from analysis.runs.scene import bounds, looks, run_title, sound_bursts
 from analysis.runs.trajectory_artists import (
     draw_collision,
     draw_cones,
     draw_estimates,
     draw_obstacles,
     draw_robot,
-    draw_source,
+    draw_sources,
     times_apart,
 )
 from diagrams import RunResult
@@ -42,16 +42,24 @@ def plot_trajectory(result: RunResult) -> Figure:
     axes.grid(color="#E5E5E5", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.set_title(_title(result), fontsize=11)
-    times = times_apart(result)
-    draw_cones(axes, result, times)
+    for own in result.robots.values():
+        draw_cones(axes, own, times_apart(own))
     draw_obstacles(axes, result)
-    draw_source(axes, result, times)
-    draw_estimates(axes, result)
-    draw_robot(axes, result, times)
+    shown = looks(result)
+    draw_sources(axes, result, times_apart(shown[0].result))
+    for look in shown:
+        draw_estimates(axes, look)
+        draw_robot(axes, look, times_apart(look.result))
     draw_collision(axes, result)
     handles, labels = axes.get_legend_handles_labels()
+    shown_once = dict(zip(labels, handles, strict=True))
     figure.legend(
-        handles, labels, loc="lower center", ncols=3, fontsize=8.5, frameon=False
+        shown_once.values(),
+        shown_once,
+        loc="lower center",
+        ncols=3,
+        fontsize=8.5,
+        frameon=False,
     )
     return figure
 
@@ -89,7 +97,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     """What was heard, felt and done over time; bursts of the source are shaded.
 
     Args:
-        result: The run.
+        result: The run of one robot.
         clearance: (n,) distance from the robot to the nearest body at each
             tick, m (``analysis.runs.proximity``); none leaves its panel out.
 
@@ -111,7 +119,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
         panel(axes, result)
     if distance is not None:
         _clearance(all_axes[-1], result, distance)
-    bursts = sound_bursts(result.scenario, result.simulated_s)
+    bursts = sound_bursts(result.scenario.sound, result.simulated_s)
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
@@ -132,12 +140,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
 
 
 def _title(result: RunResult) -> str:
-    scenario, hit = result.scenario, result.collision
-    by = f" with {hit.object} ({hit.fault}'s fault)" if hit else ""
-    return (
-        f"{scenario.name}, law {scenario.law}: {result.cause}{by} "
-        f"after {result.simulated_s:.1f} s"
-    )
+    fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
+    return f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
 
 
 def _heard(axes: Axes, result: RunResult, values: NDArray[np.float64]) -> None:
@@ -177,7 +181,8 @@ def _bearing(axes: Axes, result: RunResult) -> None:
 
 
 def _forces(axes: Axes, result: RunResult) -> None:
-    for name in ("attraction", "repulsion"):
+    said = "attraction_x" in result.columns
+    for name in ("attraction", "repulsion") if said else ():
         size = np.hypot(result.columns[f"{name}_x"], result.columns[f"{name}_y"])
         axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
     axes.set_ylabel("force on P\n(N)")

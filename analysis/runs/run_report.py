@@ -11,25 +11,19 @@ from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
+from diagrams.stop_rules import SUCCESSFUL
 
 __all__ = ["run_summary", "summary_text", "write_run"]
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     """The JSON document of a run."""
-    collision = result.collision
     document = {
         "schema_version": SCHEMA_VERSION,
-        "scenario": result.scenario.name,
-        "law": result.scenario.law,
-        "seed": result.scenario.seed,
-        "cause": result.cause,
-        "collision": collision
-        and {
-            "object": collision.object,
-            "fault": collision.fault,
-            "time_s": collision.time,
-        },
+        "scenario": result.full_scenario.name,
+        "law": result.full_scenario.law,
+        "seed": result.full_scenario.seed,
+        **_outcome(result),
         "metrics": run_metrics(result),
         "timing": {
             "wall_s": result.wall_s,
@@ -39,8 +33,19 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
         "versions": versions(),
         "out": str(out) if out is not None else None,
     }
+    if result.several:
+        document["robots"] = {
+            name: {"law": own.scenario.law, **_outcome(own)}
+            for name, own in result.several.items()
+        }
     summary: dict[str, Any] = plain(document)
     return summary
+
+
+def _outcome(result: RunResult) -> dict[str, Any]:
+    hit = result.collision
+    collision = hit and {"object": hit.object, "fault": hit.fault, "time_s": hit.time}
+    return {"cause": result.cause, "collision": collision}
 
 
 def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
@@ -48,53 +53,90 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
 
     ``scenario.yaml`` (effective, can be run again), ``summary.json``,
     ``trajectory.parquet``, ``trajectory.png``, ``time_series.png``,
-    ``diagram.svg`` and ``replay.html``.
+    ``diagram.svg`` and ``replay.html``. Of several robots each has its own
+    ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows
+    how they are joined.
     """
     from analysis.runs.block_diagram import write_block_diagram
     from analysis.runs.replay import write_replay
     from analysis.runs.run_plots import plot_time_series, plot_trajectory
 
-    (directory / "scenario.yaml").write_text(dump_scenario(result.scenario), "utf-8")
+    (directory / "scenario.yaml").write_text(
+        dump_scenario(result.full_scenario), "utf-8"
+    )
     (directory / "summary.json").write_text(
         json.dumps(summary, indent=2, allow_nan=False) + "\n"
     )
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
-    plot_time_series(result, Proximity(result).clearance).savefig(
-        directory / "time_series.png", dpi=150
+    for name, own in result.robots.items():
+        ending = f"_{name}" if result.several else ""
+        figure = plot_time_series(own, Proximity(own).clearance)
+        figure.savefig(directory / f"time_series{ending}.png", dpi=150)
+    follower = build_sound_follower(result.full_scenario)
+    write_block_diagram(
+        follower.diagram, directory / "diagram.svg", flat=not result.several
     )
-    diagram = build_sound_follower(result.scenario).diagram
-    write_block_diagram(diagram, directory / "diagram.svg")
+    if result.several:
+        for name, parts in follower.robots.items():
+            write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
     write_replay(result, directory / "replay.html")
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
     """The run on one screen."""
-    metrics, timing = summary["metrics"], summary["timing"]
-    hit = summary["collision"]
-    by = f" with {hit['object']}, the {hit['fault']}'s fault" if hit else ""
-    attraction, stop = result.scenario.attraction, result.scenario.stop
+    timing = summary["timing"]
+    scenario = result.full_scenario
+    alone = not result.several or result.cause in SUCCESSFUL
+    who = "" if alone else f"{result.name}: "
     rows = {
-        "scenario": f"{summary['scenario']}: {result.scenario.description}",
+        "scenario": f"{summary['scenario']}: {scenario.description}",
         "law": f"{summary['law']}, seed {summary['seed']}",
-        "ended": f"{summary['cause']}{by}, after {timing['simulated_s']:.1f} s",
-        "least clearance": _metres(metrics["minimum_clearance_m"]),
-        "distance at the end": _metres(metrics["final_distance_m"]),
-        "follow distance": _metres(attraction.follow_distance_m),
-        "following": _percent(metrics["following_fraction"])
-        + f" of the time within {stop.following_band_m:.2f} m of it",
-        "following error": _metres(metrics["following_error_rms_m"]) + " rms",
-        "frames heard": f"{metrics['frames_with_sound_heard']} of "
-        f"{metrics['frames_with_sound']} with sound; "
-        f"{metrics['detections_with_range']} of {metrics['detections']} with a range",
-        "position error": _metres(metrics["source_error_median_m"])
-        + " median, "
-        + _metres(metrics["source_error_p95_m"])
-        + " at 95 %",
-        "path length": _metres(metrics["path_length_m"]),
-        "speed": f"{timing['real_time_factor']:.0f} times real time",
+        "ended": f"{who}{_ended(result)}, after {timing['simulated_s']:.1f} s",
     }
-    return "\n".join(f"{name:<21} {value}" for name, value in rows.items())
+    if not result.several:
+        rows |= _robot_rows(result, summary["metrics"], "")
+    for name, own in result.several.items():
+        rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.law}"}
+        rows |= _robot_rows(own, summary["metrics"], f"{name}.")
+    rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
+    return "\n".join(
+        f"{name.split('.')[-1]:<21} {value}" for name, value in rows.items()
+    )
+
+
+def _ended(result: RunResult) -> str:
+    hit = result.collision
+    by = f" with {hit.object}, the {hit.fault}'s fault" if hit else ""
+    return f"{result.cause}{by}"
+
+
+def _robot_rows(
+    result: RunResult, metrics: dict[str, Any], prefix: str
+) -> dict[str, str]:
+    """What one robot did; names of rows and metrics begin with the prefix."""
+    attraction, stop = result.scenario.attraction, result.scenario.stop
+
+    def metric(name: str) -> Any:
+        return metrics[f"{prefix}{name}"]
+
+    rows = {
+        "least clearance": _metres(metric("minimum_clearance_m")),
+        "distance at the end": _metres(metric("final_distance_m")),
+        "follow distance": _metres(attraction.follow_distance_m),
+        "following": _percent(metric("following_fraction"))
+        + f" of the time within {stop.following_band_m:.2f} m of it",
+        "following error": _metres(metric("following_error_rms_m")) + " rms",
+        "frames heard": f"{metric('frames_with_sound_heard')} of "
+        f"{metric('frames_with_sound')} with sound; "
+        f"{metric('detections_with_range')} of {metric('detections')} with a range",
+        "position error": _metres(metric("source_error_median_m"))
+        + " median, "
+        + _metres(metric("source_error_p95_m"))
+        + " at 95 %",
+        "path length": _metres(metric("path_length_m")),
+    }
+    return {f"{prefix}{name}": value for name, value in rows.items()}
 
 
 def _metres(value: float | None) -> str:

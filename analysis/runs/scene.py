@@ -3,22 +3,30 @@
 from __future__ import annotations
 
 import math
+from itertools import cycle
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from diagrams import RunResult, Scenario
 from diagrams.bodies import robot_rectangle
+from diagrams.stop_rules import SUCCESSFUL
 from systems.framework.input_error import InputError
+from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 from systems.world.obstacles import ObstacleParameters
 
 __all__ = [
+    "Look",
     "bounds",
     "compose",
     "contact_point",
+    "looks",
     "moving_and_static",
     "picture_times",
+    "run_title",
     "sensor_pose",
     "sound_bursts",
     "tick_at",
@@ -41,9 +49,50 @@ def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
     return np.arange(0.0, end + 1e-9, period)
 
 
-def sound_bursts(scenario: Scenario, end: float) -> list[tuple[float, float]]:
+class Look(NamedTuple):
+    """How one robot is shown."""
+
+    result: RunResult
+    """What it did."""
+    colour: str
+    """Of its path and its body."""
+    estimates: str
+    """Colour of where it takes the source to be."""
+    path_label: str = "path of the control point P"
+    body_label: str = "robot with its microphones"
+    estimates_label: str = "estimates of the source, faint: early"
+
+
+def looks(result: RunResult) -> list[Look]:
+    """Each robot of a run, in colours of its own where there are several."""
+    if not result.several:
+        return [Look(result, COLOURS["robot"], COLOURS["estimate"])]
+    colours = cycle(ROBOT_COLOURS)
+    return [
+        Look(
+            own,
+            colour,
+            colour,
+            f"path of {name}'s P",
+            f"{name} with its microphones",
+            f"{name}'s estimates, faint: early",
+        )
+        for (name, own), colour in zip(result.several.items(), colours, strict=False)
+    ]
+
+
+def run_title(result: RunResult) -> str:
+    """What was run and how it ended, on one line."""
+    scenario, hit = result.full_scenario, result.collision
+    by = f" with {hit.object}" if hit else ""
+    told = result.several and result.cause not in SUCCESSFUL
+    who = f"{result.name} " if told else ""
+    laws = ", ".join(dict.fromkeys(own.scenario.law for own in result.robots.values()))
+    return f"{scenario.name}, law {laws}: {who}{result.cause}{by}"
+
+
+def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
     """(from, to) of every burst that begins before ``end``, s."""
-    sound = scenario.sound
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
 
@@ -98,6 +147,7 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
     Raises:
         InputError: The run had no collision.
     """
+    result = result.robots[result.name]
     hit, scenario = result.collision, result.scenario
     if hit is None:
         raise InputError("contact_point", f"the run ended by {result.cause!r}")

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import (
+    Look,
     compose,
     contact_point,
     moving_and_static,
@@ -31,7 +32,7 @@ __all__ = [
     "draw_estimates",
     "draw_obstacles",
     "draw_robot",
-    "draw_source",
+    "draw_sources",
     "times_apart",
 ]
 
@@ -67,22 +68,22 @@ def _seconds(time: float) -> str:
     return f"{round(time, 1):g} s"
 
 
-def draw_robot(axes: Axes, result: RunResult, times: list[float]) -> None:
+def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
     """The path of P, and footprints with their microphones at some times, s."""
-    colour, scenario = COLOURS["robot"], result.scenario
+    result, colour, scenario = look.result, look.colour, look.result.scenario
     axes.plot(
         result.columns["p_WP_x"],
         result.columns["p_WP_y"],
         color=colour,
         linewidth=1.8,
-        label="path of the control point P",
+        label=look.path_label,
         zorder=4,
     )
     microphones = microphones_B(scenario.robot)
     for index, time in enumerate(times):
         pose = result.poses("WB")[tick_at(result, time)]
         corners = rectangle_corners(robot_rectangle(pose, scenario.robot))
-        label = "robot with its microphones" if index == 0 else None
+        label = look.body_label if index == 0 else None
         patch = Polygon(
             corners,
             facecolor=(*to_rgb(colour), 0.10),
@@ -119,20 +120,35 @@ def _write_time(
     )
 
 
-def draw_source(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """The path of the source, its body at both ends, dots at some times, s."""
-    colour, path = COLOURS["source"], result.poses("WS")
+def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
+    """The path of each source, its body at both ends, dots at some times, s."""
+    sources = result.full_scenario.all_sources
+    for name, source in sources.items():
+        path = source.path().poses(result.time)
+        size = source.length_m, source.width_m
+        what = "the source" if len(sources) == 1 else name
+        _draw_source(axes, result, what, path, size, times)
+
+
+def _draw_source(
+    axes: Axes,
+    result: RunResult,
+    what: str,
+    path: NDArray[np.float64],
+    size: tuple[float, float],
+    times: list[float],
+) -> None:
+    colour = COLOURS["source"]
     axes.plot(
-        path[:, 0], path[:, 1], "--", color=colour, label="path of the source", zorder=3
+        path[:, 0], path[:, 1], "--", color=colour, label=f"path of {what}", zorder=3
     )
     ends = (0, len(path) - 1) if np.ptp(path[:, :2], axis=0).any() else (0,)
-    size = result.scenario.source_size
     for index in ends:
         patch = Polygon(
             rectangle_corners(np.array([*path[index], *size])),
             facecolor=(*to_rgb(colour), 0.25 if index == 0 else 0.6),
             edgecolor=colour,
-            label="source, first and last" if index == 0 else None,
+            label=f"{what.removeprefix('the ')}, first and last" if not index else None,
             zorder=2.5,
         )
         patch.set_gid("source")
@@ -147,13 +163,13 @@ def draw_source(axes: Axes, result: RunResult, times: list[float]) -> None:
         _write_time(axes, pose, -0.5 * size[1], time, colour)
 
 
-def draw_estimates(axes: Axes, result: RunResult) -> None:
+def draw_estimates(axes: Axes, look: Look) -> None:
     """A cross a heard frame, where the robot then took the source to be."""
-    columns = result.columns
+    result, columns = look.result, look.result.columns
     heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
     if not heard.any():
         return
-    colour = COLOURS["estimate"]
+    colour = look.estimates
     part = result.time[heard] / max(result.simulated_s, 1e-9)
     colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
     axes.scatter(
@@ -166,13 +182,13 @@ def draw_estimates(axes: Axes, result: RunResult) -> None:
         zorder=6,
     )
     # A legend's sample would else be as faint as the first estimate.
-    axes.scatter([], [], color=colour, marker="x", s=16, label=_ESTIMATES)
+    axes.scatter([], [], color=colour, marker="x", s=16, label=look.estimates_label)
 
 
 def draw_obstacles(axes: Axes, result: RunResult) -> None:
     """Resting boxes filled; moving ones in outline, with the time beside."""
     colour = COLOURS["obstacle"]
-    moving, static = moving_and_static(result.scenario)
+    moving, static = moving_and_static(result.full_scenario)
     for index, obstacle in enumerate(static):
         pose = np.array([*obstacle.path().pose(0.0), *obstacle.size_m])
         label = "obstacle at rest" if index == 0 else None
@@ -232,7 +248,6 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
             axes.add_patch(wedge)
 
 
-_ESTIMATES = "estimates of the source, faint: early"
 _CONE_LABELS = {True: "ultrasonic cone with an echo", False: "cone without an echo"}
 
 

@@ -25,6 +25,7 @@ __all__ = [
     "cell_label",
     "ended",
     "marginal",
+    "quantities",
     "short",
     "shown",
 ]
@@ -75,7 +76,7 @@ class Quantity:
         return Estimate(float(np.median(values)), *median_interval(values))
 
 
-#: What pages and pictures show.
+#: What pages and pictures show of one robot; see ``quantities``.
 QUANTITIES = (
     Quantity("success", "runs that end well", causes=SUCCESSFUL),
     Quantity("collision", "runs that end in a collision", causes=("collision",)),
@@ -90,6 +91,27 @@ QUANTITIES = (
         metric="following_error_rms_m",
     ),
 )
+
+
+def quantities(results: pd.DataFrame) -> tuple[Quantity, ...]:
+    """What pages and pictures show: of several robots, each one's own figures."""
+    shown_: list[Quantity] = []
+    for quantity in QUANTITIES:
+        ending = f".{quantity.metric}"
+        robots = [
+            column.removesuffix(ending)
+            for column in results.columns
+            if column.endswith(ending) and not quantity.rate
+        ]
+        shown_ += [
+            Quantity(
+                f"{robot}.{quantity.name}",
+                f"{robot}: {quantity.title}",
+                metric=f"{robot}{ending}",
+            )
+            for robot in robots
+        ] or [quantity]
+    return tuple(shown_)
 
 
 def ended(results: pd.DataFrame) -> pd.DataFrame:

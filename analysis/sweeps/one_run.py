@@ -40,7 +40,8 @@ class Outcome:
 
     row: dict[str, Any]
     """Plain values: the point's own (``fields`` a mapping), ``cause``,
-    ``collision_object``, ``collision_fault``, ``collision_time_s``, ``metrics``
+    ``collision_object``, ``collision_fault``, ``collision_time_s``, ``robots`` (the
+    same of each of several, ``<name>.cause`` ...), ``metrics``
     (a mapping), ``simulated_s``, ``wall_s`` and ``error``."""
     trajectory: bytes | None = None
     """A Parquet file."""
@@ -101,11 +102,23 @@ def _row(
         "collision_object": collision.object if collision else None,
         "collision_fault": collision.fault if collision else None,
         "collision_time_s": collision.time if collision else None,
+        "robots": _endings(result) if result else {},
         "metrics": metrics,
         "simulated_s": result.simulated_s if result else None,
         "error": error,
         "wall_s": perf_counter() - start,
     }
+
+
+def _endings(result: RunResult) -> dict[str, str | None]:
+    """How each of several robots ended, by its name, a dot and the row's name."""
+    endings: dict[str, str | None] = {}
+    for name, own in result.several.items():
+        hit = own.collision
+        endings[f"{name}.cause"] = own.cause
+        endings[f"{name}.collision_object"] = hit.object if hit else None
+        endings[f"{name}.collision_fault"] = hit.fault if hit else None
+    return endings
 
 
 def _trajectory(result: RunResult) -> bytes:

@@ -19,7 +19,7 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
-from analysis.sweeps.estimates import QUANTITIES, cell_label, ended, shown
+from analysis.sweeps.estimates import cell_label, ended, quantities, shown
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.plots import (
@@ -139,11 +139,12 @@ def _causes(plan: SweepPlan, results: pd.DataFrame) -> str:
 
 def _figures(plan: SweepPlan, results: pd.DataFrame) -> str:
     rows: list[list[Cell]] = []
+    figured = quantities(results)
     for cell, fields in enumerate(plan.cells()):
         runs = ended(results[results["cell"] == cell])
-        figures = [shown(quantity, quantity.estimate(runs)) for quantity in QUANTITIES]
+        figures = [shown(quantity, quantity.estimate(runs)) for quantity in figured]
         rows.append([cell_label(fields), *figures])
-    headings = ["cell", *(quantity.title for quantity in QUANTITIES)]
+    headings = ["cell", *(quantity.title for quantity in figured)]
     return table(headings, rows, caption="Figures with 95 % intervals")
 
 

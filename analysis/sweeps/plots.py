@@ -12,12 +12,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.sweeps.estimates import (
-    QUANTITIES,
     Estimate,
     Quantity,
     cell_label,
     ended,
     marginal,
+    quantities,
     short,
 )
 from analysis.sweeps.plan import SweepPlan
@@ -47,8 +47,8 @@ def plot_heat_maps(
         rest: Values of the grid's other fields.
     """
     cells = plan.cells()
-    figure = Figure(figsize=(WIDTH_IN, 7.0), layout="constrained")
-    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+    figure, panels = _panels(results, 3.5)
+    for axes, quantity in panels:
         values = np.full((len(plan.grid[y]), len(plan.grid[x])), np.nan)
         for row, y_value in enumerate(plan.grid[y]):
             for column, x_value in enumerate(plan.grid[x]):
@@ -59,6 +59,19 @@ def plot_heat_maps(
         _ticks(axes, "x", x, plan.grid[x])
         _ticks(axes, "y", y, plan.grid[y])
     return figure
+
+
+def _panels(
+    results: pd.DataFrame, height_in: float
+) -> tuple[Figure, list[tuple[Axes, Quantity]]]:
+    """Two panels a row, each of so many inch, for all that is shown."""
+    shown = quantities(results)
+    rows = math.ceil(len(shown) / 2)
+    figure = Figure(figsize=(WIDTH_IN, height_in * rows), layout="constrained")
+    all_axes = list(figure.subplots(rows, 2).flat)
+    for axes in all_axes[len(shown) :]:
+        axes.set_axis_off()
+    return figure, list(zip(all_axes, shown, strict=False))
 
 
 def _heat_map(axes: Axes, quantity: Quantity, values: np.ndarray) -> None:
@@ -97,8 +110,8 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
     """Every quantity over the one field of the grid, with 95 % intervals."""
-    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
-    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+    figure, panels = _panels(results, 3.0)
+    for axes, quantity in panels:
         estimates = [
             quantity.estimate(ended(results[results["cell"] == cell]))
             for cell in range(len(plan.grid[x]))
@@ -129,8 +142,8 @@ def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
             ]
             for value in plan.grid[split]
         }
-    figure = Figure(figsize=(WIDTH_IN, 6.0), layout="constrained")
-    for axes, quantity in zip(figure.subplots(2, 2).flat, QUANTITIES, strict=True):
+    figure, panels = _panels(results, 3.0)
+    for axes, quantity in panels:
         for (label, group), colour in zip(groups.items(), COLOURS, strict=False):
             if group.empty:
                 continue

@@ -15,6 +15,7 @@ from analysis.sweeps.estimates import (
     Quantity,
     cell_label,
     ended,
+    quantities,
     shown,
 )
 from analysis.sweeps.one_run import FAILED
@@ -94,11 +95,12 @@ def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
 
 def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
     """A line a cell, with 95 % intervals."""
-    headings = ["cell", "runs", *(quantity.title for quantity in QUANTITIES)]
+    figured = quantities(results)
+    headings = ["cell", "runs", *(quantity.title for quantity in figured)]
     rows = [headings]
     for cell, fields in enumerate(plan.cells()):
         runs = ended(results[results["cell"] == cell])
-        figures = [shown(q, q.estimate(runs)) for q in QUANTITIES]
+        figures = [shown(q, q.estimate(runs)) for q in figured]
         rows.append([cell_label(fields), str(len(runs)), *figures])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [

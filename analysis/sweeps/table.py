@@ -33,6 +33,9 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
         columns[path] = _field_column([row["fields"][path] for row in ordered])
     for name in _TEXTS:
         columns[name] = pd.array([row[name] for row in ordered], dtype="str")
+    for name in _keys(ordered, "robots"):
+        values = [row["robots"].get(name) for row in ordered]
+        columns[name] = pd.array(values, dtype="str")
     for name in _LAST[:1]:
         columns[name] = _numbers(row[name] for row in ordered)
     for metric in _keys(ordered, "metrics"):

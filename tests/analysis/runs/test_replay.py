@@ -15,6 +15,7 @@ import pytest
 
 from analysis.runs.replay import record_run, ring_at, wheel_angles, write_replay
 from analysis.runs.replay_scene import RINGS, add_robot
+from analysis.runs.scene import looks
 
 FRAME_S = 1.0 / 32.0
 
@@ -167,7 +168,7 @@ def test_a_turn_on_the_spot_turns_the_wheels_against_each_other(ideal_run):
 
 def test_the_robot_has_its_bar_and_three_microphones(crossing_run):
     built = Recorder()
-    add_robot(cast("Any", built), crossing_run.scenario)
+    add_robot(cast("Any", built), looks(crossing_run)[0], "robot", "estimate")
     assert built.shapes["robot/bar"].depth() == pytest.approx(0.82)
     places = [built.transforms[f"robot/microphone_{k}"][0][1] for k in (1, 2, 3)]
     np.testing.assert_allclose(
@@ -186,7 +187,7 @@ def test_wheels_turn_forward_when_the_robot_drives_forward(recorded, crossing_ru
         assert math.remainder(turned, math.tau) == pytest.approx(0.0, abs=1e-9)
     # The wheel's own axis is y of B: its top moves along +x of B.
     built = Recorder()
-    add_robot(cast("Any", built), crossing_run.scenario)
+    add_robot(cast("Any", built), looks(crossing_run)[0], "robot", "estimate")
     X_BL = built.transforms["robot/left"][0][1]
     axis = X_BL.rotation().matrix()[:, 2]
     top = np.array([0.0, 0.0, 0.06])

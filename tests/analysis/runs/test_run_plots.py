@@ -221,8 +221,8 @@ def test_each_burst_is_shaded_in_every_panel(crossing_run):
 
 
 def test_a_burst_ends_with_the_run(collision_run):
-    scenario = collision_run.scenario
-    assert sound_bursts(scenario, 2.2) == [(0.0, 0.5), (2.0, 2.2)]
+    sound = collision_run.scenario.sound
+    assert sound_bursts(sound, 2.2) == [(0.0, 0.5), (2.0, 2.2)]
 
 
 def test_the_clearance_panel_marks_the_least(crossing_run):
