@@ -9,26 +9,13 @@ from pydrake.systems.framework import LeafSystem
 
 from diagrams.own_laws import checked_law, import_law, law_files, try_law
 from diagrams.scenario import Scenario
-from systems import (
-    ActiveImpedance2017Controller,
-    ActiveImpedanceController,
-    ConventionalImpedance2017Controller,
-    ConventionalImpedanceController,
-    RadialLawController,
-)
+from systems import RadialLawController
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
+from systems.laws.law import Law
 
 __all__ = ["LAWS", "law_files", "make_controller"]
 
-_CONTROLLERS = {
-    "none": RadialLawController,
-    "conventional": ConventionalImpedanceController,
-    "active": ActiveImpedanceController,
-    "conventional2017": ConventionalImpedance2017Controller,
-    "active2017": ActiveImpedance2017Controller,
-}
-#: The laws that come with the package.
-LAWS = tuple(_CONTROLLERS)
 #: Output ports that the diagram or its log needs, with their sizes.
 _OUTPUTS = {"acceleration_W": 2, "forces_W": 4, "obstacle_speeds": 3}
 
@@ -54,8 +41,8 @@ def make_controller(scenario: Scenario) -> Any:
     if scenario.obstacle_sensing == "ideal":
         sensors = sensors.model_copy(update={"firing": "simultaneous"})
     name = scenario.law
-    if name in _CONTROLLERS:
-        return _CONTROLLERS[name](**parts, sensors=sensors)
+    if name in LAWS:
+        return _block(LAWS[name], parts | {"sensors": sensors})
     if ":" not in name:
         raise InputError(
             "law",
@@ -69,6 +56,17 @@ def make_controller(scenario: Scenario) -> Any:
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)
     return RadialLawController(**parts, sensors=sensors, law=function)
+
+
+def _block(law: Law, parts: dict[str, Any]) -> Any:
+    if law.controller is not None:
+        return law.controller(**parts)
+    force = law.force
+    assert force is not None, f"{law.name} has neither force nor block"
+    arguments = law.arguments(parts["repulsion"], parts["sensors"].minimum_range_m)
+    return RadialLawController(
+        **parts, law=lambda c, s, repulsion: force(c, s, *arguments)
+    )
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:

@@ -6,7 +6,7 @@ are missing. The forces here come from the blocks that simulate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,7 +52,7 @@ class LawCurves:
 
 def law_curves(
     scenario: Scenario,
-    laws: Sequence[str],
+    laws: Iterable[str],
     *,
     distance_m: NDArray[np.float64] = DISTANCES_M,
     speed_m_s: NDArray[np.float64] = SPEEDS_M_S,
