@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
-from diagrams.laws import make_controller
+from diagrams.laws import make_command, make_controller
 from diagrams.scenario import Scenario
 from systems import (
     CollisionVector,
@@ -26,7 +26,6 @@ from systems import (
     TDOAEstimator,
     UltrasonicArray,
     WheelOdometry,
-    WheelSpeedCommand,
 )
 from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S
@@ -120,8 +119,8 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         **_hearing(scenario),
         "tracker": _tracker(scenario),
         **_obstacle_sensing(scenario),
-        "controller": make_controller(scenario),
-        "command": WheelSpeedCommand(robot=scenario.robot),
+        "controller": (controller := make_controller(scenario)),
+        "command": make_command(controller, scenario.robot),
     }
     for block in blocks.values():
         builder.AddNamedSystem(block.get_name(), block)
