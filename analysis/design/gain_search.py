@@ -47,8 +47,13 @@ def search_gains(
 ) -> RepulsionParameters:
     """The gains that the requirements give to each law.
 
-    Reaches, limits of speed and saturations are the scenario's, as are the
-    attraction, the robot and the sensors.
+    Args:
+        scenario: Reaches, limits of speed and saturations are its, as are the
+            attraction, the robot and the sensors.
+        requirements: What the gains must achieve.
+
+    Returns:
+        The scenario's parameters with the gains that were found.
 
     Raises:
         InputError: No gain meets a requirement that has to be met.

@@ -48,7 +48,14 @@ _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
-    """``f(c, s)`` of a law with the scenario's gains, N.
+    """A law with the scenario's gains.
+
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and sensors count.
+
+    Returns:
+        ``f(c, s)`` in N, of m and m/s.
 
     Raises:
         InputError: The law has no gains to choose.
@@ -61,7 +68,18 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """A law's push at rest, without its velocity term, N."""
+    """A law's push at rest, without its velocity term.
+
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and sensors count.
+
+    Returns:
+        Push in N at a distance in m.
+
+    Raises:
+        InputError: The law has no gains to choose.
+    """
     force = law_force(law, scenario)
     speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.repulsion, law))
     return lambda c: force(c, speed)
@@ -123,7 +141,15 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
 
 
 def stiffest(law: str, scenario: Scenario) -> float:
-    """Largest -df/dc at rest, N/m: the worst distance to rest at."""
+    """The slope at the worst distance to rest at.
+
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and the sensors' least range count.
+
+    Returns:
+        Largest -df/dc at rest, N/m.
+    """
     gains = getattr(scenario.repulsion, law)
     nearest = scenario.ultrasonic.minimum_range_m
     return DESIGNED_LAWS[law].stiffest(gains, nearest)
