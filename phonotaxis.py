@@ -16,7 +16,8 @@ from typing import Any, NoReturn
 __all__ = ["main"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-_LAWS = "none, conventional, active, conventional2017, active2017"
+#: Stands in a help text for the names of the laws.
+_LAWS = "{laws}"
 
 
 class _UsageError(Exception):
@@ -26,6 +27,15 @@ class _UsageError(Exception):
 class _Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         raise _UsageError(f"{message}; see {self.prog} --help")
+
+    def format_help(self) -> str:
+        for action in self._actions:
+            if _LAWS in (action.help or ""):
+                # Only here: the import takes seconds, a command's words do not.
+                from systems.laws.catalogue import LAWS
+
+                action.help = str(action.help).replace(_LAWS, ", ".join(LAWS))
+        return super().format_help()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -196,7 +206,7 @@ def _add_compare(commands: Any) -> None:
         "(default: the papers' four experiments)",
     )
     compare.add_argument(
-        "--laws", metavar="LAW,...", help="laws to compare (default: all of ours)"
+        "--laws", metavar="LAW,...", help=f"laws to compare (default: {_LAWS})"
     )
     compare.add_argument(
         "--velocity-term",
@@ -240,7 +250,7 @@ def _add_stability(commands: Any) -> None:
         metavar="LAW",
         action="append",
         help=f"{_LAWS}, or package.module:Name; may be repeated, to compare laws; "
-        "all: the three laws that avoid obstacles (default: the scenario's law)",
+        "all: those that avoid obstacles (default: the scenario's law)",
     )
     _take_scenario(stability)
     stability.add_argument(

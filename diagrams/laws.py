@@ -1,8 +1,9 @@
-"""From the name of a law to its controller block."""
+"""From the name of a law to its controller block, and to what drives the wheels."""
 
 from __future__ import annotations
 
 import inspect
+from collections.abc import Callable
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem
@@ -10,27 +11,27 @@ from pydrake.systems.framework import LeafSystem
 from diagrams.own_laws import checked_law, import_law, law_files, try_law
 from diagrams.scenario import Scenario
 from systems import (
-    ActiveImpedance2017Controller,
-    ActiveImpedanceController,
-    ConventionalImpedance2017Controller,
-    ConventionalImpedanceController,
     RadialLawController,
+    TwistWheelCommand,
+    VelocityWheelCommand,
+    WheelSpeedCommand,
 )
+from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
+from systems.laws.law import Law
+from systems.ranging.collision_vector import SLOTS
 
-__all__ = ["LAWS", "law_files", "make_controller"]
+__all__ = ["LAWS", "law_files", "make_command", "make_controller"]
 
-_CONTROLLERS = {
-    "none": RadialLawController,
-    "conventional": ConventionalImpedanceController,
-    "active": ActiveImpedanceController,
-    "conventional2017": ConventionalImpedance2017Controller,
-    "active2017": ActiveImpedance2017Controller,
+#: What a controller may command, each of size 2, and the block that obeys.
+_COMMANDS: dict[str, Callable[..., Any]] = {
+    "acceleration_W": WheelSpeedCommand,
+    "velocity_W": VelocityWheelCommand,
+    "twist_B": TwistWheelCommand,
 }
-#: The laws that come with the package.
-LAWS = tuple(_CONTROLLERS)
-#: Output ports that the diagram or its log needs, with their sizes.
-_OUTPUTS = {"acceleration_W": 2, "forces_W": 4, "obstacle_speeds": 3}
+#: What it may tell the log besides, with sizes.
+_TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
 
 def make_controller(scenario: Scenario) -> Any:
@@ -38,9 +39,16 @@ def make_controller(scenario: Scenario) -> Any:
 
     ``package.module:Name`` or ``path/to/file.py:Name`` is a function
     ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
-    a LeafSystem class with the ports of ``RadialLawController`` that takes
-    ``robot``, ``attraction`` and ``repulsion``. It is looked up in the working
-    directory, too. A function is tried at a few distances and speeds.
+    a LeafSystem class that takes ``robot``, ``attraction`` and ``repulsion``. Its
+    inputs are output ports of the diagram, by name; it has one of the outputs that
+    ``make_command`` knows. Either is looked up in the working directory, too. A
+    function is tried at a few distances and speeds.
+
+    Args:
+        scenario: Its law, and the parameters of the law's block.
+
+    Returns:
+        The block.
 
     Raises:
         InputError: There is no such law, or it does not do what a law does.
@@ -54,8 +62,8 @@ def make_controller(scenario: Scenario) -> Any:
     if scenario.obstacle_sensing == "ideal":
         sensors = sensors.model_copy(update={"firing": "simultaneous"})
     name = scenario.law
-    if name in _CONTROLLERS:
-        return _CONTROLLERS[name](**parts, sensors=sensors)
+    if name in LAWS:
+        return _block(LAWS[name], parts | {"sensors": sensors})
     if ":" not in name:
         raise InputError(
             "law",
@@ -69,6 +77,17 @@ def make_controller(scenario: Scenario) -> Any:
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)
     return RadialLawController(**parts, sensors=sensors, law=function)
+
+
+def _block(law: Law, parts: dict[str, Any]) -> Any:
+    if law.controller is not None:
+        return law.controller(**parts)
+    force = law.force
+    assert force is not None, f"{law.name} has neither force nor block"
+    arguments = law.arguments(parts["repulsion"], parts["sensors"].minimum_range_m)
+    return RadialLawController(
+        **parts, law=lambda c, s, repulsion: force(c, s, *arguments)
+    )
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
@@ -86,13 +105,50 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
             f"{name!r} cannot be built with robot, attraction and repulsion "
             f"({type(error).__name__}: {error}); mend it",
         ) from error
-    sizes = {
-        port.get_name(): port.size()
-        for port in map(block.get_output_port, range(block.num_output_ports()))
-    }
-    for port, size in _OUTPUTS.items():
-        if sizes.get(port) != size:
+    _commanded(block, name)
+    sizes = _output_sizes(block)
+    for port, size in _TOLD.items():
+        if sizes.get(port, size) != size:
             raise InputError(
-                "law", f"{name!r} needs an output port {port} of size {size}; add it"
+                "law",
+                f"{name!r} has an output port {port} of size {sizes[port]}; make it "
+                f"{size}, or leave it out",
             )
     return block
+
+
+def make_command(controller: Any, robot: RobotParameters) -> Any:
+    """Builds the block that drives the wheels as a controller commands.
+
+    Args:
+        controller: A block with one output of size 2 out of ``acceleration_W`` (of
+            P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
+            yaw rate, m/s and rad/s).
+        robot: Dimensions and limits.
+
+    Returns:
+        The block, with an input of that name.
+
+    Raises:
+        InputError: The controller has none of them, or several.
+    """
+    return _COMMANDS[_commanded(controller, controller.get_name())](robot=robot)
+
+
+def _commanded(controller: Any, name: str) -> str:
+    """Output port by which a controller commands; its law's name is for the error."""
+    sizes = _output_sizes(controller)
+    found = [port for port in _COMMANDS if port in sizes]
+    if len(found) == 1 and sizes[found[0]] == 2:
+        return found[0]
+    has = ", ".join(f"{port} of size {sizes[port]}" for port in found) or "none"
+    raise InputError(
+        "law",
+        f"{name!r} needs one output port of size 2 out of {', '.join(_COMMANDS)}, and "
+        f"has {has}; {'add one' if not found else 'leave one of size 2'}",
+    )
+
+
+def _output_sizes(block: Any) -> dict[str, int]:
+    ports = map(block.get_output_port, range(block.num_output_ports()))
+    return {port.get_name(): port.size() for port in ports}

@@ -49,8 +49,8 @@ class FollowerParameters(Parameters):
     """One robot that follows a sound: its law, ears, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
-    """``none``, ``conventional``, ``active`` (2019), ``conventional2017``,
-    ``active2017``, or ``package.module:Name``."""
+    """A name out of ``systems.laws.LAWS``, ``package.module:Name``, or
+    ``path/to/file.py:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """Sound waves and microphones, or exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"

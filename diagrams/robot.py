@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
-from diagrams.laws import make_controller
+from diagrams.laws import make_command, make_controller
 from diagrams.participants import SourceParameters
 from diagrams.scenario import ROBOT, SOURCE, Scenario
 from systems import (
@@ -26,7 +26,6 @@ from systems import (
     TDOAEstimator,
     UltrasonicArray,
     WheelOdometry,
-    WheelSpeedCommand,
 )
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
@@ -138,7 +137,7 @@ def make_robot(
         _tracker(scenario),
         *_obstacle_sensing(scenario, name, bodies),
         controller,
-        WheelSpeedCommand(robot=scenario.robot),
+        make_command(controller, scenario.robot),
     ]
     builder = DiagramBuilder()
     for block in blocks:

@@ -8,7 +8,14 @@ import systems.framework.compiling  # noqa: F401  # before anything is compiled
 from systems.base.diff_drive_plant import DiffDrivePlant, DiffDrivePlant_
 from systems.base.source_robot import SourceRobot, SourceRobot_
 from systems.base.wheel_odometry import WheelOdometry, WheelOdometry_
-from systems.base.wheel_speed_command import WheelSpeedCommand, WheelSpeedCommand_
+from systems.base.wheel_speed_command import (
+    TwistWheelCommand,
+    TwistWheelCommand_,
+    VelocityWheelCommand,
+    VelocityWheelCommand_,
+    WheelSpeedCommand,
+    WheelSpeedCommand_,
+)
 from systems.hearing.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
 from systems.hearing.source_tracker import SourceTracker, SourceTracker_
 from systems.hearing.tdoa_estimator import TDOAEstimator
@@ -67,7 +74,11 @@ __all__ = [
     "SourceTracker",
     "SourceTracker_",
     "TDOAEstimator",
+    "TwistWheelCommand",
+    "TwistWheelCommand_",
     "UltrasonicArray",
+    "VelocityWheelCommand",
+    "VelocityWheelCommand_",
     "WheelOdometry",
     "WheelOdometry_",
     "WheelSpeedCommand",

@@ -29,7 +29,9 @@ BLOCKS = {
     "SourceRobot",
     "SourceTracker",
     "TDOAEstimator",
+    "TwistWheelCommand",
     "UltrasonicArray",
+    "VelocityWheelCommand",
     "WheelOdometry",
     "WheelSpeedCommand",
 }
@@ -43,6 +45,8 @@ TEMPLATED = {
     "IdealObstacleSensor",
     "IdealSourceSensor",
     "SourceTracker",
+    "TwistWheelCommand",
+    "VelocityWheelCommand",
     "WheelOdometry",
     "WheelSpeedCommand",
 }

@@ -47,9 +47,9 @@ def claims_table(summaries: Sequence[dict[str, Any]]) -> str:
 
     Args:
         summaries: JSON documents of ``phonotaxis compare`` that hold, together,
-            the papers' experiments with obstacles with the laws conventional,
-            active, conventional2017 and active2017, and ``obstacle_free`` with
-            active; and ``two_static_obstacles`` with ``--grid plant.friction=[...]``.
+            the papers' experiments with obstacles with the papers' laws, and
+            ``obstacle_free`` with active; and ``two_static_obstacles`` with ``--grid
+            plant.friction=[...]``.
     """
     summary = {
         part: [entry for document in summaries for entry in document[part]]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -23,9 +23,9 @@ from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import load_scenario
 from diagrams.explain import explain
-from diagrams.laws import LAWS
 from diagrams.loading import read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 __all__ = [
     "EXPERIMENTS",
@@ -105,7 +105,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: Sequence[str] = LAWS,
+    laws: Iterable[str] = LAWS,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,

@@ -8,9 +8,9 @@ from typing import Any
 
 from analysis.comparison.compare import EXPERIMENTS, comparison_plan
 from analysis.sweeps.plan import SweepPlan
-from diagrams.laws import LAWS
 from diagrams.loading import parse_setting
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 __all__ = ["comparison_plans"]
 

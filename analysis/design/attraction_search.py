@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law, metres_to_go
+from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.linear.contact_mode import contact_matrix
 from analysis.models.ideal_loop import ideal_scenario
 from diagrams.scenario import Scenario
@@ -36,9 +37,10 @@ _STEP_M = 0.05
 #: A source so far away that P reaches top speed, and a follow distance so large
 #: that it stops before the source, m.
 _APPROACH_M, _STAND_OFF_M = 8.0, 3.0
-#: Laws whose offset the follow distance has to allow for: Kim's law pushes a
-#: robot off any distance that is worth following at.
-_FOLLOWING_LAWS = ("conventional", "active")
+#: Laws whose offset the follow distance has to allow for.
+_FOLLOWING_LAWS = tuple(
+    law for law, tuning in DESIGNED_LAWS.items() if tuning.sets_follow_distance
+)
 
 
 def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> Scenario:

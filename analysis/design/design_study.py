@@ -170,7 +170,7 @@ def _alternative(
         metres_to_go=metres_to_go(scenario, requirements),
         allowed_stiffness_n_m=allowed_stiffness(scenario, requirements),
         laws=tuple(check_law(scenario, law, requirements) for law in DESIGNED_LAWS),
-        jams=tuple(jam_runs(scenario, DESIGNED_LAWS, progress=progress)),
+        jams=tuple(jam_runs(scenario, tuple(DESIGNED_LAWS), progress=progress)),
     )
 
 

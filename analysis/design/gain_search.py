@@ -18,6 +18,7 @@ from analysis.design.requirements import (
     with_gains,
 )
 from analysis.laws.push_and_pull import (
+    DESIGNED_LAWS,
     injected_share,
     kinetic_energy,
     largest_rise,
@@ -28,6 +29,7 @@ from analysis.laws.push_and_pull import (
 )
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 from systems.laws.repulsion import RepulsionParameters
 
 __all__ = ["gain_for_barrier", "search_gains"]
@@ -36,7 +38,7 @@ __all__ = ["gain_for_barrier", "search_gains"]
 _FIGURES = 3
 #: Springs that are tried, N/m or N m.
 _GAINS = (1e-3, 1e5)
-#: Decay lengths that are tried for the active law, m.
+#: Decay lengths that are tried by the rule ``matched``, m.
 _ALPHAS_M = (0.05, 1.0)
 
 
@@ -45,26 +47,19 @@ def search_gains(
 ) -> RepulsionParameters:
     """The gains that the requirements give to each law.
 
-    Reaches, limits of speed and saturations are the scenario's, as are the
-    attraction, the robot and the sensors.
+    Args:
+        scenario: Reaches, limits of speed and saturations are its, as are the
+            attraction, the robot and the sensors.
+        requirements: What the gains must achieve.
+
+    Returns:
+        The scenario's parameters with the gains that were found.
 
     Raises:
         InputError: No gain meets a requirement that has to be met.
     """
-    D_r = scenario.attraction.damping_n_s_m
-    # The secant of D_0 s is D_0: it puts back D_0/D_r.
-    damping = _rounded(requirements.injected_share * D_r)
-    for law, field in (
-        ("conventional", "stiffness_n_m"),
-        ("conventional2017", "distance_gain_j"),
-        ("active2017", "distance_gain_j"),
-    ):
-        gain = _rounded(gain_for_barrier(scenario, law, field, requirements), up=True)
-        scenario = with_gains(scenario, law, **{field: gain, "damping_n_s_m": damping})
-    # A far echo meets the spring's tail as well: the second round knows it.
-    for _ in range(2):
-        scenario = _active_damper(scenario, requirements)
-        scenario = _active_spring(scenario, requirements)
+    for law, tuning in DESIGNED_LAWS.items():
+        scenario = _RULES[tuning.rule](scenario, law, requirements)
     return RepulsionParameters.model_validate(scenario.repulsion.model_dump())
 
 
@@ -99,66 +94,100 @@ def gain_for_barrier(
     return _root(missing, *_GAINS, f"repulsion.{law}.{field}")
 
 
-def _active_damper(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
+def _barrier_gains(
+    scenario: Scenario, law: str, requirements: DesignRequirements
+) -> Scenario:
+    """The spring from the barrier, the damper from the energy put back."""
+    gains = LAWS[law].loop_gains
+    assert gains is not None, f"{law} is tuned by gains that it does not name"
+    spring_gain, damper_gain = gains
+    # The secant of D_0 s is D_0: it puts back D_0/D_r.
+    D_r = scenario.attraction.damping_n_s_m
+    damping = _rounded(requirements.injected_share * D_r)
+    found = gain_for_barrier(scenario, law, spring_gain, requirements)
+    found = _rounded(found, up=True)
+    return with_gains(scenario, law, **{spring_gain: found, damper_gain: damping})
+
+
+def _matched_gains(
+    scenario: Scenario, law: str, requirements: DesignRequirements
+) -> Scenario:
+    """Both terms of the active law of 2019."""
+    # A far echo meets the spring's tail as well: the second round knows it.
+    for _ in range(2):
+        scenario = _matched_damper(scenario, law, requirements)
+        scenario = _matched_spring(scenario, law, requirements)
+    return scenario
+
+
+#: By ``Tuning.rule``.
+_RULES = {"barrier": _barrier_gains, "matched": _matched_gains}
+
+
+def _matched_damper(
+    scenario: Scenario, law: str, requirements: DesignRequirements
+) -> Scenario:
     """d_ref from the offset by a far echo, D_0 from the energy put back."""
-    attraction, active = scenario.attraction, scenario.repulsion.active
-    tail = spring("active", scenario)(scenario.ultrasonic.maximum_range_m)
+    attraction, gains = scenario.attraction, getattr(scenario.repulsion, law)
+    tail = spring(law, scenario)(scenario.ultrasonic.maximum_range_m)
     at_rest = requirements.far_offset_m * attraction.stiffness_n_m - tail
-    d_ref = _rounded(at_rest / active.speed_limit_m_s)
+    d_ref = _rounded(at_rest / gains.speed_limit_m_s)
 
     def excess(D_0: float) -> float:
         changed = with_gains(
             scenario,
-            "active",
+            law,
             reference_damping_n_s_m=d_ref,
             matched_damping_n_s_m=D_0,
         )
-        return injected_share("active", changed) - requirements.injected_share
+        return injected_share(law, changed) - requirements.injected_share
 
     # Below sqrt(e) d_ref the term never rises above its value at rest.
-    field = "repulsion.active.matched_damping_n_s_m"
+    field = f"repulsion.{law}.matched_damping_n_s_m"
     D_0 = _root(excess, math.sqrt(math.e) * d_ref, 1e3 * d_ref, field)
     return with_gains(
         scenario,
-        "active",
+        law,
         reference_damping_n_s_m=d_ref,
         matched_damping_n_s_m=_rounded(D_0),
     )
 
 
-def _active_spring(scenario: Scenario, requirements: DesignRequirements) -> Scenario:
+def _matched_spring(
+    scenario: Scenario, law: str, requirements: DesignRequirements
+) -> Scenario:
     """k_ref from the barrier, alpha from offset and contact.
 
     The longer alpha, the softer the push and the farther it reaches. Of those
     that meet the offset the longest is taken; where even that is too stiff
     for the contact, the shortest that is not.
     """
-    reach = scenario.repulsion.active.reach_m
+    reach = getattr(scenario.repulsion, law).reach_m
 
     def with_alpha(alpha: float) -> Scenario:
         inverse_ratio = math.exp(-reach / (2.0 * alpha))
         k_ref = gain_for_barrier(
             scenario,
-            "active",
+            law,
             "reference_stiffness_n_m",
             requirements,
             matched_stiffness_n_m=inverse_ratio,
         )
         return with_gains(
             scenario,
-            "active",
+            law,
             reference_stiffness_n_m=_rounded(k_ref),
             matched_stiffness_n_m=_rounded(k_ref * inverse_ratio),
         )
 
     def too_far(alpha: float) -> float:
-        return rest_offset("active", with_alpha(alpha)) - scenario.stop.goal_margin_m
+        return rest_offset(law, with_alpha(alpha)) - scenario.stop.goal_margin_m
 
     def too_stiff(alpha: float) -> float:
         allowed = allowed_stiffness(scenario, requirements)
-        return stiffest("active", with_alpha(alpha)) - allowed
+        return stiffest(law, with_alpha(alpha)) - allowed
 
-    field = "repulsion.active.reference_stiffness_n_m"
+    field = f"repulsion.{law}.reference_stiffness_n_m"
     alpha = _root(too_far, *_ALPHAS_M, field)
     if too_stiff(alpha) > 0.0:
         alpha = _root(too_stiff, alpha, _ALPHAS_M[1], field)

@@ -6,7 +6,7 @@ are missing. The forces here come from the blocks that simulate.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from diagrams.laws import make_controller
 from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S
 from systems.ranging.collision_vector import SLOTS
 
@@ -52,7 +53,7 @@ class LawCurves:
 
 def law_curves(
     scenario: Scenario,
-    laws: Sequence[str],
+    laws: Iterable[str],
     *,
     distance_m: NDArray[np.float64] = DISTANCES_M,
     speed_m_s: NDArray[np.float64] = SPEEDS_M_S,
@@ -68,11 +69,15 @@ def law_curves(
         at_distance_m: Distance of the latter, m; half of rho_0.
 
     Raises:
-        InputError: There is no such law.
+        InputError: There is no such law, or it tells no forces.
     """
     curves = []
     for law in laws:
         controller = make_controller(scenario.model_copy(update={"law": law}))
+        if not controller.HasOutputPort("forces_W"):
+            raise InputError(
+                "law", f"{law!r} has no output port forces_W to draw; use another law"
+            )
         curves.append(
             LawCurves(
                 law=law,

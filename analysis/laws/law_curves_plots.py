@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 
 from matplotlib.figure import Figure
 
 from analysis.laws.law_curves import LawCurves
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import SERIES_COLOURS
+from systems.laws.catalogue import LAWS
 
 __all__ = ["LAW_STYLES", "plot_law_curves"]
 
 #: (colour, title) of the laws of the package.
 LAW_STYLES = {
-    "none": (COLOURS["empty"], "no avoidance"),
-    "conventional": (COLOURS["source"], "conventional"),
-    "active": (COLOURS["robot"], "active 2019"),
-    "conventional2017": (COLOURS["echo"], "conventional 2017"),
-    "active2017": (COLOURS["estimate"], "active 2017"),
+    law.name: (law.colour or colour, law.label)
+    for law, colour in zip(LAWS.values(), cycle(SERIES_COLOURS), strict=False)
 }
 
 

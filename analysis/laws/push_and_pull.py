@@ -6,7 +6,6 @@ are along the line; the obstacle rests and the velocity terms are left out.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 
 import numpy as np
@@ -16,6 +15,7 @@ from scipy.optimize import brentq
 from analysis.laws.radial_law import law_function
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 __all__ = [
     "DESIGNED_LAWS",
@@ -33,8 +33,10 @@ __all__ = [
     "stiffest",
 ]
 
-#: The laws whose gains are to be chosen.
-DESIGNED_LAWS = ("conventional", "active", "conventional2017", "active2017")
+#: The laws whose gains are to be chosen, by name.
+DESIGNED_LAWS = {
+    law.name: law.tuning for law in LAWS.values() if law.tuning is not None
+}
 
 #: Force away from the obstacle, N, at a distance in m.
 Push = Callable[[float], float]
@@ -46,7 +48,14 @@ _SPEEDS = np.linspace(0.0, 2.0, 401)[1:]
 
 
 def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
-    """``f(c, s)`` of a law with the scenario's gains, N.
+    """A law with the scenario's gains.
+
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and sensors count.
+
+    Returns:
+        ``f(c, s)`` in N, of m and m/s.
 
     Raises:
         InputError: The law has no gains to choose.
@@ -59,10 +68,20 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
 
 
 def spring(law: str, scenario: Scenario) -> Push:
-    """A law's push at rest, without its velocity term, N."""
+    """A law's push at rest, without its velocity term.
+
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and sensors count.
+
+    Returns:
+        Push in N at a distance in m.
+
+    Raises:
+        InputError: The law has no gains to choose.
+    """
     force = law_force(law, scenario)
-    # That of 2019 is d_ref mu_0 at rest, and off from mu_0 on.
-    speed = scenario.repulsion.active.speed_limit_m_s if law == "active" else 0.0
+    speed = DESIGNED_LAWS[law].spring_speed(getattr(scenario.repulsion, law))
     return lambda c: force(c, speed)
 
 
@@ -122,21 +141,18 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
 
 
 def stiffest(law: str, scenario: Scenario) -> float:
-    """Largest -df/dc at rest, N/m: the worst distance to rest at.
+    """The slope at the worst distance to rest at.
 
-    K_0 within rho_0; k_ref/e^2 at 2 alpha; K_0/c^2 just outside of the sensors'
-    least range (Kim's conventional law) or of rho_1 (his active one).
+    Args:
+        law: One of ``DESIGNED_LAWS``.
+        scenario: Its gains and the sensors' least range count.
+
+    Returns:
+        Largest -df/dc at rest, N/m.
     """
-    repulsion = scenario.repulsion
-    if law == "conventional":
-        return repulsion.conventional.stiffness_n_m
-    if law == "active":
-        return repulsion.active.reference_stiffness_n_m * math.exp(-2.0)
-    if law == "conventional2017":
-        nearest = scenario.ultrasonic.minimum_range_m
-        return repulsion.conventional2017.distance_gain_j / nearest**2
-    gains = repulsion.active2017
-    return gains.distance_gain_j / gains.saturation_distance_m**2
+    gains = getattr(scenario.repulsion, law)
+    nearest = scenario.ultrasonic.minimum_range_m
+    return DESIGNED_LAWS[law].stiffest(gains, nearest)
 
 
 def rest_offset(law: str, scenario: Scenario) -> float:

@@ -86,7 +86,7 @@ def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
         InputError: It is a block of its own that has no radial law.
     """
     controller = make_controller(scenario)
-    function = getattr(controller, "_radial_force", None)
+    function = getattr(controller, "radial_force", None)
     if function is None:
         raise InputError(
             "law",

@@ -14,6 +14,7 @@ from analysis.models.ideal_loop import frozen_scenario, ideal_loop, ideal_scenar
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S
+from systems.laws.catalogue import LAWS
 
 __all__ = ["ContactSlopes", "RootLocus", "contact_slopes", "root_loci"]
 
@@ -21,13 +22,6 @@ __all__ = ["ContactSlopes", "RootLocus", "contact_slopes", "root_loci"]
 _FACTORS = np.geomspace(0.05, 20.0, 121)
 #: Distances at which a law's slopes are taken, m.
 _DISTANCES_M = np.linspace(0.02, 2.0, 397)
-#: The gains of each law's distance and velocity term.
-_GAINS = {
-    "conventional": ("stiffness_n_m", "damping_n_s_m"),
-    "active": ("reference_stiffness_n_m", "reference_damping_n_s_m"),
-    "conventional2017": ("distance_gain_j", "damping_n_s_m"),
-    "active2017": ("distance_gain_j", "damping_n_s_m"),
-}
 
 
 @dataclass(frozen=True)
@@ -112,12 +106,13 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
             lambda value: contact_matrix(scenario, K, damping_n_s_m=value),
         ),
     ]
-    if scenario.law not in _GAINS:
+    record = LAWS.get(scenario.law)
+    if record is None or record.loop_gains is None:
         return tuple(loci)
     slopes = contact_slopes(scenario)
     k, d = slopes.stiffness_n_m, slopes.approach_damping_n_s_m
     law = getattr(scenario.repulsion, scenario.law)
-    spring, damper = _GAINS[scenario.law]
+    spring, damper = record.loop_gains
     today = getattr(law, spring)
     loci.append(
         _locus(

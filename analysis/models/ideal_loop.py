@@ -94,6 +94,7 @@ class IdealLoop:
         require_ideal(scenario)
         self.scenario = scenario
         self.follower = build_sound_follower(scenario)
+        self._require_forces()
         twin: Any = self.follower.diagram.ToAutoDiffXdMaybe()
         if twin is None:
             raise InputError(
@@ -114,6 +115,18 @@ class IdealLoop:
         """Continuous blocks as maps of one period, see
         ``analysis.models.block_models``."""
         self._simulators: dict[Any, Any] = {}
+
+    def _require_forces(self) -> None:
+        """Refuses a law whose loop is another than that of the virtual mass."""
+        block = self.follower.blocks["controller"]
+        for port in ("acceleration_W", "forces_W"):
+            if not block.HasOutputPort(port):
+                raise InputError(
+                    "law",
+                    f"{self.scenario.law!r} has no output port {port}, and linear "
+                    "models are of laws that push a virtual mass; use one of these, "
+                    "or simulate",
+                )
 
     def _try_law(self) -> None:
         """Lets a law that is a user's own meet a variable before all else does."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-__all__ = ["COLOURS", "ROBOT_COLOURS"]
+__all__ = ["COLOURS", "ROBOT_COLOURS", "SERIES_COLOURS"]
 
 #: Okabe and Ito's palette: told apart with any colour vision.
 COLOURS = {
@@ -20,3 +20,16 @@ COLOURS = {
 }
 #: Of several robots, in turn.
 ROBOT_COLOURS = ("#0072B2", "#009E73", "#AA4499", "#56B4E9", "#B07D00", "#332288")
+
+#: For curves that are no such thing, as of laws: in order, after the grey of none.
+SERIES_COLOURS = (
+    COLOURS["empty"],
+    "#D55E00",
+    "#0072B2",
+    "#E69F00",
+    "#CC79A7",
+    "#009E73",
+    "#56B4E9",
+    "#F0E442",
+    "#000000",
+)

@@ -17,9 +17,10 @@ from analysis.models.linear_models import LinearModel
 from analysis.run_error import failure_text
 from analysis.stability.model_sheet import ModelSheet, model_sheet
 from diagrams import Scenario
-from diagrams.laws import LAWS, make_controller
+from diagrams.laws import make_controller
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 __all__ = [
     "Finding",

@@ -13,11 +13,12 @@ from typing import Any
 
 from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
-from diagrams.laws import LAWS
 from systems.framework.parameters import Parameters
 from systems.framework.signals import FRAME_PERIOD_S
+from systems.laws.catalogue import LAWS
+from systems.laws.law import Equation
 
-__all__ = ["Equation", "Latency", "Limit", "ModelSheet", "ParameterRow", "model_sheet"]
+__all__ = ["Latency", "Limit", "ModelSheet", "ParameterRow", "model_sheet"]
 
 #: Parts of a scenario that a loop with exact sensors depends on.
 _PARTS = ("attraction", "repulsion", "robot", "plant", "tracker", "sound")
@@ -56,18 +57,6 @@ _ASSUMPTIONS = (
         "(z = 1) are left out where stability is judged."
     ),
 )
-
-
-@dataclass(frozen=True)
-class Equation:
-    """A formula."""
-
-    title: str
-    """What it is."""
-    tex: str
-    """In matplotlib's subset of TeX, without the dollar signs."""
-    text: str
-    """The same in plain signs."""
 
 
 @dataclass(frozen=True)
@@ -142,6 +131,7 @@ class ModelSheet:
 
 def model_sheet(scenario: Scenario) -> ModelSheet:
     """Collects the model sheet of a scenario's law."""
+    law = LAWS.get(scenario.law)
     return ModelSheet(
         scenario=scenario.name,
         description=scenario.description,
@@ -149,7 +139,7 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
         motion=_MOTION,
-        law_equations=_LAWS.get(scenario.law, ()),
+        law_equations=law.equations if law else (),
         parameters=tuple(_parameters(scenario)),
         envelope=_envelope(scenario),
         latencies=_latencies(scenario),
@@ -244,45 +234,3 @@ _MOTION = (
         "phi_i'' = (commanded - phi_i')/lag",
     ),
 )
-
-_LAWS: dict[str, tuple[Equation, ...]] = {
-    "none": (Equation("No avoidance", r"f = 0", "f = 0"),),
-    "conventional": (
-        Equation(
-            "Conventional law (Han 2019, eq. 19-a)",
-            r"f = K_0\,(\rho_0-c)+D_0\,s\quad (c<\rho_0),"
-            r"\quad f = 0\quad (c\geq\rho_0)",
-            "f = K_0 (rho_0 - c) + D_0 s for c < rho_0, else 0",
-        ),
-    ),
-    "active": (
-        Equation(
-            "Active law of 2019 (Han 2019, eq. 20)",
-            r"f = k_{ref}\,e^{-c/\alpha}\,c+d_{ref}\,e^{s/\beta}(\mu_0-s)"
-            r"\;[s<\mu_0]",
-            "f = k_ref exp(-c/alpha) c + d_ref exp(s/beta)(mu_0 - s) [s < mu_0]",
-        ),
-        Equation(
-            "with",
-            r"\alpha=\frac{\rho_0}{2\ln(k_{ref}/K_0)},"
-            r"\quad\beta=\frac{\mu_0}{2\ln(D_0/d_{ref})}",
-            "alpha = rho_0 / (2 ln(k_ref/K_0)), beta = mu_0 / (2 ln(D_0/d_ref))",
-        ),
-    ),
-    "conventional2017": (
-        Equation(
-            "Conventional law of 2017 (Kim 2017, eq. 20)",
-            r"f = \frac{K_0}{\max(c,\,c_{min})}+D_0\,s",
-            "f = K_0/max(c, c_min) + D_0 s, c_min the sensors' least range",
-        ),
-    ),
-    "active2017": (
-        Equation(
-            "Active law of 2017 (Kim 2017, eq. 21)",
-            r"f = \frac{K_a(c)}{c}+D_a(s)\,s,\quad K_a = K_0\min(1,\,c/\rho_1),"
-            r"\quad D_a = D_0\min(1,\,\mu_1/s)",
-            "f = K_a(c)/c + D_a(s) s, K_a = K_0 min(1, c/rho_1), "
-            "D_a = D_0 min(1, mu_1/s)",
-        ),
-    ),
-}

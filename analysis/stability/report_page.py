@@ -22,28 +22,22 @@ from analysis.reporting.html_page import (
 )
 from analysis.run_error import failure_text
 from analysis.stability.law_analysis import Finding, LawAnalysis
-from analysis.stability.model_sheet import Equation, ModelSheet, ParameterRow
+from analysis.stability.model_sheet import ModelSheet, ParameterRow
 from analysis.stability.verdicts import Verdict, VerdictRow, compare_verdicts
+from systems.laws.catalogue import law_title
+from systems.laws.law import Equation
 
 __all__ = ["stability_page"]
-
-_NAMES = {
-    "none": "No avoidance",
-    "conventional": "Conventional law",
-    "active": "Active law of 2019",
-    "conventional2017": "Conventional law of 2017",
-    "active2017": "Active law of 2017",
-}
 
 
 def stability_page(analyses: Sequence[LawAnalysis]) -> str:
     """The report as HTML, with everything in it."""
     first = analyses[0].scenario
-    laws = ", ".join(_NAMES.get(a.law, a.law).lower() for a in analyses)
+    laws = ", ".join(law_title(a.law).lower() for a in analyses)
     contents = [("summary", "Summary"), ("model", "Model sheet")]
     parts = [_summary(analyses), _model(analyses[0].sheet)]
     for k, analysis in enumerate(analyses):
-        law = _NAMES.get(analysis.law, analysis.law)
+        law = law_title(analysis.law)
         prefix = f"law{k}"
         contents.append((prefix, law))
         parts.append(section(prefix, law, _law_parts(analysis, prefix), fresh=True))
@@ -64,13 +58,13 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
         ]
     )
     counts = [
-        f"{_NAMES.get(law, law)}: {sum(v.verdict == 'pass' for v in found)} of "
+        f"{law_title(law)}: {sum(v.verdict == 'pass' for v in found)} of "
         f"{sum(v.verdict != 'not applicable' for v in found)} criteria pass."
         for law, found in verdicts.items()
     ]
     parts = [about, bullets(counts), _verdict_table(rows, list(verdicts))]
     parts += [
-        paragraph(f"{_NAMES.get(a.law, a.law)}: {gains.advice}")
+        paragraph(f"{law_title(a.law)}: {gains.advice}")
         for a in analyses
         if (gains := a.data("recommended_gains"))
     ]

@@ -21,6 +21,7 @@ from systems.framework.input_error import InputError
 
 __all__ = ["CertificateRow", "certificate_rows", "certificate_table"]
 
+#: Kim's conventional law is left out: between rho_1 and mu_1 his laws are the same.
 LAWS = ("conventional", "active", "active2017")
 
 

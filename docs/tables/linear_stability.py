@@ -36,6 +36,7 @@ __all__ = [
     "tables",
 ]
 
+#: Kim's conventional law is left out: between rho_1 and mu_1 his laws are the same.
 LAWS = ("none", "conventional", "active", "active2017")
 #: Slower modes are of the motion, faster ones of motors and filters, rad/s.
 _MOTION_RAD_S = 5.0

@@ -17,6 +17,10 @@ from systems.base.wheel_odometry import (
     advance_pose,
 )
 from systems.base.wheel_speed_command import (
+    TwistWheelCommand,
+    TwistWheelCommand_,
+    VelocityWheelCommand,
+    VelocityWheelCommand_,
     WheelSpeedCommand,
     WheelSpeedCommand_,
     hand_position_twist,
@@ -33,6 +37,10 @@ __all__ = [
     "SourceRobot",
     "SourceRobotParameters",
     "SourceRobot_",
+    "TwistWheelCommand",
+    "TwistWheelCommand_",
+    "VelocityWheelCommand",
+    "VelocityWheelCommand_",
     "WheelOdometry",
     "WheelOdometry_",
     "WheelSpeedCommand",

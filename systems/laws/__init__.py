@@ -10,6 +10,7 @@ from systems.laws.active_impedance_controller import (
     ActiveImpedanceController_,
     active_force,
 )
+from systems.laws.catalogue import LAWS, law_title
 from systems.laws.conventional_impedance_2017_controller import (
     ConventionalImpedance2017Controller,
     ConventionalImpedance2017Controller_,
@@ -25,10 +26,12 @@ from systems.laws.impedance import (
     attraction_force,
     repulsion_force,
 )
+from systems.laws.law import Equation, Law, Tuning
 from systems.laws.radial_law_controller import RadialLawController, RadialLawController_
 from systems.laws.repulsion import RepulsionParameters
 
 __all__ = [
+    "LAWS",
     "ActiveImpedance2017Controller",
     "ActiveImpedance2017Controller_",
     "ActiveImpedanceController",
@@ -38,13 +41,17 @@ __all__ = [
     "ConventionalImpedance2017Controller_",
     "ConventionalImpedanceController",
     "ConventionalImpedanceController_",
+    "Equation",
+    "Law",
     "RadialLawController",
     "RadialLawController_",
     "RepulsionParameters",
+    "Tuning",
     "active_2017_force",
     "active_force",
     "attraction_force",
     "conventional_2017_force",
     "conventional_force",
+    "law_title",
     "repulsion_force",
 ]

@@ -2,20 +2,37 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import LeafSystem_
+from dataclasses import replace
+from typing import Any
 
-from systems.framework.scalar_types import define_for_scalars
-from systems.laws.impedance import ImpedanceLoop
-from systems.laws.repulsion import Conventional2017Parameters
+from systems.framework.parameters import Damping, Parameters, Positive
+from systems.laws.law import Equation, Law, Tuning
+from systems.laws.law_controller import define_law_controller
 
 __all__ = [
+    "CONVENTIONAL_2017",
+    "Conventional2017Parameters",
     "ConventionalImpedance2017Controller",
     "ConventionalImpedance2017Controller_",
     "conventional_2017_force",
 ]
 
 
-def conventional_2017_force(c, s, gains: Conventional2017Parameters, least_range_m):
+class Conventional2017Parameters(Parameters):
+    """Push that grows with nearness without a bound (Kim 2017, eq. 20).
+
+    Kim 2017 prints neither gain.
+    """
+
+    distance_gain_j: Positive = 0.917
+    """K_0, N m: the push is K_0/c. Not the K_0 of Han's laws."""
+    damping_n_s_m: Damping = 0.8
+    """D_0, N s/m."""
+
+
+def conventional_2017_force(
+    c: Any, s: Any, gains: Conventional2017Parameters, least_range_m: float
+) -> Any:
     """K_0/c + D_0 s, at any distance (Kim 2017, eq. 20).
 
     Printed, the push has no bound as c falls to 0. What bounds it is the least
@@ -35,51 +52,35 @@ def conventional_2017_force(c, s, gains: Conventional2017Parameters, least_range
     return gains.distance_gain_j / nearest + gains.damping_n_s_m * s
 
 
-@define_for_scalars("ConventionalImpedance2017Controller_", __name__)
-def ConventionalImpedance2017Controller_(T):
-    class Impl(LeafSystem_[T], ImpedanceLoop):
-        """Follows the target; pushes off by inverse distance.
+_LAW = Law(
+    name="conventional2017",
+    title="Conventional law of 2017",
+    label="conventional 2017",
+    equations=(
+        Equation(
+            "Conventional law of 2017 (Kim 2017, eq. 20)",
+            r"f = \frac{K_0}{\max(c,\,c_{min})}+D_0\,s",
+            "f = K_0/max(c, c_min) + D_0 s, c_min the sensors' least range",
+        ),
+    ),
+    force=conventional_2017_force,
+    least_range=True,
+    gains=Conventional2017Parameters,
+    loop_gains=("distance_gain_j", "damping_n_s_m"),
+    tuning=Tuning(
+        rule="barrier",
+        # K_0/c^2 just outside of the least range.
+        stiffest=lambda gains, least_range_m: gains.distance_gain_j / least_range_m**2,
+    ),
+)
 
-        .. pydrake_system::
-
-            name: ConventionalImpedance2017Controller
-            input_ports:
-            - p_WS_estimated [m]
-            - target_valid [0 or 1]
-            - collision_vectors_B [m, three slots of x and y]
-            - features [number of what the vector stands on, 0 an empty slot]
-            - pose_WB_estimated [m, m, rad]
-            - v_WP [m/s, of the virtual mass]
-            output_ports:
-            - acceleration_W [m/s^2]
-            - forces_W [N, attraction then repulsion, x and y each]
-            - obstacle_speeds [m/s, s of each slot]
-
-        Discrete state, 25 ms: the collision vectors of the last round of the
-        sensors, for s. The outputs are functions of state and present input:
-        no latency.
-
-        Args:
-            robot: Mass and place of P.
-            attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``; uses ``conventional2017``.
-            sensors: ``UltrasonicParameters``: order of firing, least range.
-
-        Reference: Kim 2017, eq. 19 (F_m) and 20.
-        """
-
-        def _construct(self, *, converter=None, **options):
-            super().__init__(converter=converter)
-            self._declare_loop(T, "conventional_impedance_2017_controller", **options)
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, converter=converter, **other._options)
-
-        def _radial_force(self, c, s):
-            gains, least = self._repulsion.conventional2017, self._least_range_m
-            return conventional_2017_force(c, s, gains, least)
-
-    return Impl
-
-
+ConventionalImpedance2017Controller_ = define_law_controller(
+    "ConventionalImpedance2017Controller",
+    __name__,
+    _LAW,
+    about="pushes off by inverse distance",
+    reference="Kim 2017, eq. 19 (F_m) and 20",
+)
 ConventionalImpedance2017Controller = ConventionalImpedance2017Controller_[None]
+
+CONVENTIONAL_2017 = replace(_LAW, controller=ConventionalImpedance2017Controller)

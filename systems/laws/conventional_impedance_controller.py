@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from pydrake.systems.framework import LeafSystem_
+from dataclasses import replace
+from typing import Any
 
-from systems.framework.scalar_types import define_for_scalars
-from systems.laws.impedance import ImpedanceLoop
-from systems.laws.repulsion import ConventionalParameters
+from systems.framework.parameters import Damping, Length, Parameters, Stiffness
+from systems.laws.law import Equation, Law, Tuning
+from systems.laws.law_controller import define_law_controller
 
 __all__ = [
+    "CONVENTIONAL",
     "ConventionalImpedanceController",
     "ConventionalImpedanceController_",
+    "ConventionalParameters",
     "conventional_force",
 ]
 
 
-def conventional_force(c, s, gains: ConventionalParameters):
+class ConventionalParameters(Parameters):
+    """Spring and damper within a reach (Han 2019, eq. 19-a)."""
+
+    stiffness_n_m: Stiffness = 12.3
+    """K_0, N/m."""
+    damping_n_s_m: Damping = 0.8
+    """D_0, N s/m."""
+    reach_m: Length = 0.8
+    """rho_0: the law acts below this distance, m (Han 2019, 5.2)."""
+
+
+def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
     """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
 
     Args:
@@ -31,50 +45,35 @@ def conventional_force(c, s, gains: ConventionalParameters):
     return 0.0 * c
 
 
-@define_for_scalars("ConventionalImpedanceController_", __name__)
-def ConventionalImpedanceController_(T):
-    class Impl(LeafSystem_[T], ImpedanceLoop):
-        """Follows the target; pushes off linearly within rho_0.
+_LAW = Law(
+    name="conventional",
+    title="Conventional law",
+    label="conventional",
+    equations=(
+        Equation(
+            "Conventional law (Han 2019, eq. 19-a)",
+            r"f = K_0\,(\rho_0-c)+D_0\,s\quad (c<\rho_0),"
+            r"\quad f = 0\quad (c\geq\rho_0)",
+            "f = K_0 (rho_0 - c) + D_0 s for c < rho_0, else 0",
+        ),
+    ),
+    force=conventional_force,
+    gains=ConventionalParameters,
+    loop_gains=("stiffness_n_m", "damping_n_s_m"),
+    tuning=Tuning(
+        rule="barrier",
+        stiffest=lambda gains, least_range_m: gains.stiffness_n_m,
+        sets_follow_distance=True,
+    ),
+)
 
-        .. pydrake_system::
-
-            name: ConventionalImpedanceController
-            input_ports:
-            - p_WS_estimated [m]
-            - target_valid [0 or 1]
-            - collision_vectors_B [m, three slots of x and y]
-            - features [number of what the vector stands on, 0 an empty slot]
-            - pose_WB_estimated [m, m, rad]
-            - v_WP [m/s, of the virtual mass]
-            output_ports:
-            - acceleration_W [m/s^2]
-            - forces_W [N, attraction then repulsion, x and y each]
-            - obstacle_speeds [m/s, s of each slot]
-
-        Discrete state, 25 ms: the collision vectors of the last round of the
-        sensors, for s. The outputs are functions of state and present input:
-        no latency.
-
-        Args:
-            robot: Mass and place of P.
-            attraction: ``AttractionParameters``.
-            repulsion: ``RepulsionParameters``; uses ``conventional``.
-            sensors: ``UltrasonicParameters``: order of firing.
-
-        Reference: Han 2019, eq. 18 (F_m) and 19-a.
-        """
-
-        def _construct(self, *, converter=None, **options):
-            super().__init__(converter=converter)
-            self._declare_loop(T, "conventional_impedance_controller", **options)
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, converter=converter, **other._options)
-
-        def _radial_force(self, c, s):
-            return conventional_force(c, s, self._repulsion.conventional)
-
-    return Impl
-
-
+ConventionalImpedanceController_ = define_law_controller(
+    "ConventionalImpedanceController",
+    __name__,
+    _LAW,
+    about="pushes off linearly within rho_0",
+    reference="Han 2019, eq. 18 (F_m) and 19-a",
+)
 ConventionalImpedanceController = ConventionalImpedanceController_[None]
+
+CONVENTIONAL = replace(_LAW, controller=ConventionalImpedanceController)

@@ -9,6 +9,7 @@ that grow with distance; eq. 19 replaces them. See docs/errata.md.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Literal
 
 import numpy as np
 
@@ -25,7 +26,6 @@ from systems.framework.parameters import (
 )
 from systems.framework.scalar_math import float_of
 from systems.framework.signals import FRAME_PERIOD_S
-from systems.laws.repulsion import RepulsionParameters, VelocityTerm
 from systems.ranging.collision_vector import SLOTS
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -33,10 +33,14 @@ from systems.world.geometry import control_point, rotate, safe_norm
 __all__ = [
     "AttractionParameters",
     "ImpedanceLoop",
+    "SharedRepulsion",
+    "VelocityTerm",
     "attraction_force",
     "obstacle_speed",
     "repulsion_force",
 ]
+
+VelocityTerm = Literal["printed", "closing"]
 
 #: Numbers that are remembered a tick: feature, C_x and C_y of each slot.
 _ROW = 3 * SLOTS
@@ -54,6 +58,13 @@ class AttractionParameters(Parameters):
     0 is as printed: P is pulled onto the source itself."""
     brake_time_s: Duration = 0.5
     """Time constant of the stop when there is no target, s; ours."""
+
+
+class SharedRepulsion(Parameters):
+    """What every law reads beside its own gains."""
+
+    velocity_term: VelocityTerm = "printed"
+    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
 
 
 def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):
@@ -126,7 +137,7 @@ class ImpedanceLoop:
     """Ports, state and sum of forces of every impedance controller.
 
     A mix-in beside ``LeafSystem_[T]``: the controller's file adds its law as
-    ``_radial_force(c, s)`` in N. Each collision vector's s is the change of the
+    ``radial_force(c, s)`` in N. Each collision vector's s is the change of the
     same feature over one round of the sensors, over the time of that round; 0
     where the feature was not there a round ago. A round is a tick of 25 ms, and
     three where the sensors fire one after the other: every sensor has then
@@ -160,7 +171,8 @@ class ImpedanceLoop:
         self._scalar = scalar
         self._robot = robot or RobotParameters()
         self._attraction = attraction or AttractionParameters()
-        self._repulsion = repulsion or RepulsionParameters()
+        self._repulsion = repulsion
+        self._velocity_term = (repulsion or SharedRepulsion()).velocity_term
         sensors = sensors or UltrasonicParameters()
         self._round_ticks = sensors.round_ticks
         self._least_range_m = sensors.minimum_range_m
@@ -169,7 +181,7 @@ class ImpedanceLoop:
         self._options = {
             "robot": self._robot,
             "attraction": self._attraction,
-            "repulsion": self._repulsion,
+            "repulsion": repulsion,
             "sensors": sensors,
         }
         self.set_name(name)
@@ -226,8 +238,8 @@ class ImpedanceLoop:
         F_b, speeds = repulsion_force(
             vectors_W,
             self._before(context),
-            self._radial_force,
-            self._repulsion.velocity_term,
+            self.radial_force,
+            self._velocity_term,
             self._round_ticks * FRAME_PERIOD_S,
         )
         speeds = [zero + s for s in speeds] + [zero] * (SLOTS - len(speeds))

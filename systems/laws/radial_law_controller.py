@@ -6,14 +6,10 @@ from pydrake.systems.framework import LeafSystem_
 
 from systems.framework.scalar_types import define_for_scalars
 from systems.laws.impedance import ImpedanceLoop
+from systems.laws.no_avoidance import no_force
 from systems.laws.repulsion import RepulsionParameters
 
-__all__ = ["RadialLawController", "RadialLawController_", "no_force"]
-
-
-def no_force(c, s, repulsion: RepulsionParameters):
-    """No avoidance at all: the lower anchor of every comparison. N."""
-    return 0.0 * c
+__all__ = ["RadialLawController", "RadialLawController_"]
 
 
 @define_for_scalars("RadialLawController_", __name__)
@@ -50,15 +46,19 @@ def RadialLawController_(T):
                 it can be differentiated.
         """
 
-        def _construct(self, *, law=no_force, converter=None, **options):
+        def _construct(
+            self, *, law=no_force, repulsion=None, converter=None, **options
+        ):
             super().__init__(converter=converter)
             self._law = law
-            self._declare_loop(T, "radial_law_controller", **options)
+            repulsion = repulsion or RepulsionParameters()
+            name = "radial_law_controller"
+            self._declare_loop(T, name, repulsion=repulsion, **options)
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, law=other._law, converter=converter, **other._options)
 
-        def _radial_force(self, c, s):
+        def radial_force(self, c, s):
             return self._law(c, s, self._repulsion)
 
     return Impl

@@ -19,6 +19,8 @@ SAMPLED = {
     "SourceTracker": {},
     "TDOAEstimator": {},
     "UltrasonicArray": {"parameters": IN_TURN},
+    "TwistWheelCommand": {},
+    "VelocityWheelCommand": {},
     "WheelOdometry": {},
     "WheelSpeedCommand": {},
 }

@@ -49,7 +49,7 @@ def states(count, seed=3):
 def test_force_at_rest_is_that_of_the_blocks(two_boxes, law, aggregation):
     scenario = two_boxes(law, f"collision_vector.aggregation={aggregation}")
     model = point_mass(scenario)
-    function = make_controller(scenario)._radial_force
+    function = make_controller(scenario).radial_force
     free = states(200)
     free = free[model.clearances(free[:, :2]) > 0.0]
     expected = [block_force(scenario, function, state.tolist()) for state in free]
@@ -62,7 +62,7 @@ def test_force_in_motion_is_that_of_the_blocks(two_boxes, law, term):
     """The blocks' difference over a very short tick is the derivative here."""
     scenario = two_boxes(law, f"repulsion.velocity_term={term}")
     model = point_mass(scenario)
-    function = make_controller(scenario)._radial_force
+    function = make_controller(scenario).radial_force
     free = states(200)
     free = free[model.clearances(free[:, :2]) > 0.01]
     expected = [

@@ -1,4 +1,4 @@
-"""From acceleration to wheels: P must move as the virtual mass does."""
+"""From what is commanded to wheels: P must move as it says, within the limits."""
 
 from __future__ import annotations
 
@@ -17,8 +17,12 @@ from systems.base.diff_drive_plant import (
 )
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import (
+    TwistWheelCommand,
+    VelocityWheelCommand,
     WheelSpeedCommand,
+    clamped_velocity,
     hand_position_twist,
+    hand_position_velocity,
     integrate_velocity,
     limited_wheel_speeds,
 )
@@ -60,6 +64,25 @@ def test_speed_is_clamped_in_its_direction(vx, vy, ax, ay):
     speed = np.linalg.norm(free)
     expected = free if speed <= 0.72 else free * 0.72 / speed
     np.testing.assert_allclose(clamped, expected, atol=1e-11)
+
+
+@given(st.floats(-2, 2), st.floats(-2, 2))
+def test_clamp_keeps_the_direction(vx, vy):
+    found = np.array(clamped_velocity(vx, vy, 0.72))
+    assert np.linalg.norm(found) == pytest.approx(min(math.hypot(vx, vy), 0.72))
+    assert vx * found[1] == pytest.approx(vy * found[0], abs=1e-12)
+    assert found @ (vx, vy) >= 0.0
+
+
+@given(angle, st.floats(-1, 1), st.floats(-4, 4))
+def test_velocity_of_p_is_that_of_the_twist(theta, v, omega):
+    """By hand: v ahead, and epsilon omega to the left."""
+    vx, vy = hand_position_velocity((v, omega), theta, 0.175)
+    left = 0.175 * omega
+    assert vx == pytest.approx(v * math.cos(theta) - left * math.sin(theta), abs=1e-12)
+    assert vy == pytest.approx(v * math.sin(theta) + left * math.cos(theta), abs=1e-12)
+    back = hand_position_twist((vx, vy), theta, 0.175)
+    assert back == pytest.approx((v, omega), abs=1e-11)
 
 
 @given(st.floats(-2, 2), st.floats(-10, 10))
@@ -141,3 +164,58 @@ def test_gradient(bench, check_gradient, point):
 
     robot = RobotParameters(control_point_m=0.2, top_speed_m_s=0.7)
     check_gradient(WheelSpeedCommand(robot=robot), respond, point)
+
+
+def commanded(bench, block, port, command, theta=0.7):
+    """Velocity of P and wheel speeds after a tick with a command."""
+    at = bench(block, **{port: command}, pose_WB_estimated=[0.3, -0.1, theta])
+    np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
+    at.tick()
+    return at.output("v_WP"), at.output("wheel_speeds")
+
+
+def test_velocity_is_obeyed_at_once(bench):
+    v_WP, wheels = commanded(bench, VelocityWheelCommand(), "velocity_W", [0.1, -0.1])
+    np.testing.assert_allclose(v_WP, [0.1, -0.1])
+    np.testing.assert_allclose(wheels, wheels_for((0.1, -0.1), 0.7))
+
+
+def test_velocity_beyond_top_speed_keeps_its_direction(bench):
+    v_WP, wheels = commanded(bench, VelocityWheelCommand(), "velocity_W", [3.0, 4.0])
+    np.testing.assert_allclose(v_WP, [0.6 * 0.72, 0.8 * 0.72])
+    assert max(abs(wheels)) <= 12.0 + 1e-12
+
+
+def test_twist_is_obeyed_at_once_whatever_the_heading(bench):
+    for theta in (0.0, 0.7, -2.5):
+        v_WP, wheels = commanded(
+            bench, TwistWheelCommand(), "twist_B", [0.3, 0.5], theta
+        )
+        twist = body_twist(wheels, ROBOT)
+        assert twist == pytest.approx((0.3, 0.5))
+        assert np.linalg.norm(v_WP) == pytest.approx(math.hypot(0.3, 0.175 * 0.5))
+
+
+@pytest.mark.parametrize("twist", [[2.0, 1.0], [0.5, 6.0], [-1.0, 2.0], [0.0, 9.0]])
+def test_twist_beyond_the_limits_keeps_its_curvature(bench, twist):
+    v_WP, wheels = commanded(bench, TwistWheelCommand(), "twist_B", twist)
+    v, omega = body_twist(wheels, ROBOT)
+    assert v * twist[1] == pytest.approx(twist[0] * omega)
+    assert v * twist[0] + omega * twist[1] > 0.0
+    assert np.linalg.norm(v_WP) == pytest.approx(0.72)
+    assert max(abs(wheels)) <= 12.0 + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("block", "port"),
+    [(VelocityWheelCommand, "velocity_W"), (TwistWheelCommand, "twist_B")],
+)
+@pytest.mark.parametrize("point", [[0.2, -0.1, 0.4], [0.6, 0.7, 0.4], [0.1, 4.5, -0.4]])
+def test_gradient_of_other_commands(bench, check_gradient, block, port, point):
+    """Free, clamped, and with the wheels scaled."""
+
+    def respond(block, x):
+        at = bench(block, **{port: x[:2]}, pose_WB_estimated=[0.0, 0.0, x[2]])
+        return at.updated()
+
+    check_gradient(block(robot=RobotParameters(top_speed_m_s=0.7)), respond, point)

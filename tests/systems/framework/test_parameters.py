@@ -20,7 +20,7 @@ from systems.framework.parameters import (
     Positive,
     Size,
 )
-from systems.laws.repulsion import ActiveParameters
+from systems.laws.active_impedance_controller import ActiveParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.sound.acoustics import AcousticParameters, sound_speed
 

@@ -14,11 +14,12 @@ from scipy.integrate import quad
 
 from systems.base.robot import RobotParameters
 from systems.laws.active_impedance_2017_controller import (
+    Active2017Parameters,
     ActiveImpedance2017Controller,
     active_2017_force,
 )
 from systems.laws.impedance import AttractionParameters
-from systems.laws.repulsion import Active2017Parameters, RepulsionParameters
+from systems.laws.repulsion import RepulsionParameters
 
 GAINS = Active2017Parameters(
     distance_gain_j=1.2,

@@ -10,11 +10,12 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.laws.conventional_impedance_2017_controller import (
+    Conventional2017Parameters,
     ConventionalImpedance2017Controller,
     conventional_2017_force,
 )
 from systems.laws.impedance import AttractionParameters
-from systems.laws.repulsion import Conventional2017Parameters, RepulsionParameters
+from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 
 GAINS = Conventional2017Parameters(distance_gain_j=1.2, damping_n_s_m=3.0)

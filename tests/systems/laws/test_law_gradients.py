@@ -18,17 +18,20 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.laws.active_impedance_2017_controller import active_2017_force
-from systems.laws.active_impedance_controller import active_force
-from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
-from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.repulsion import (
+from systems.laws.active_impedance_2017_controller import (
     Active2017Parameters,
-    ActiveParameters,
-    Conventional2017Parameters,
-    ConventionalParameters,
-    RepulsionParameters,
+    active_2017_force,
 )
+from systems.laws.active_impedance_controller import ActiveParameters, active_force
+from systems.laws.conventional_impedance_2017_controller import (
+    Conventional2017Parameters,
+    conventional_2017_force,
+)
+from systems.laws.conventional_impedance_controller import (
+    ConventionalParameters,
+    conventional_force,
+)
+from systems.laws.repulsion import RepulsionParameters
 
 #: Nearer than this to a kink a law has two derivatives, m or m/s.
 KINK = 1e-6

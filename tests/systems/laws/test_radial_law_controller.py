@@ -9,8 +9,10 @@ import pytest
 from pydrake.math import exp
 
 from systems.base.robot import RobotParameters
-from systems.laws.radial_law_controller import RadialLawController, no_force
-from systems.laws.repulsion import ConventionalParameters, RepulsionParameters
+from systems.laws.conventional_impedance_controller import ConventionalParameters
+from systems.laws.no_avoidance import no_force
+from systems.laws.radial_law_controller import RadialLawController
+from systems.laws.repulsion import RepulsionParameters
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 REPULSION = RepulsionParameters(conventional=ConventionalParameters(stiffness_n_m=7.0))

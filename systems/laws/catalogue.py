@@ -1,0 +1,31 @@
+"""The laws that come with the package, in the order in which all lists have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from systems.laws.active_impedance_2017_controller import ACTIVE_2017
+from systems.laws.active_impedance_controller import ACTIVE
+from systems.laws.conventional_impedance_2017_controller import CONVENTIONAL_2017
+from systems.laws.conventional_impedance_controller import CONVENTIONAL
+from systems.laws.law import Law
+from systems.laws.no_avoidance import NONE
+
+__all__ = ["LAWS", "law_title"]
+
+#: By name.
+LAWS: Mapping[str, Law] = {
+    law.name: law
+    for law in (
+        NONE,
+        CONVENTIONAL,
+        ACTIVE,
+        CONVENTIONAL_2017,
+        ACTIVE_2017,
+    )
+}
+
+
+def law_title(name: str) -> str:
+    """A law's heading in reports; of a user's own law its name."""
+    return LAWS[name].title if name in LAWS else name

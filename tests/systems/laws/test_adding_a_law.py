@@ -1,0 +1,173 @@
+"""docs/extending.md is true: a law is its own file and a place in the list.
+
+A tree of links to ours, in which the page's law is added, answers for every list.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[3]
+
+#: Asks each part of the program for its list, with the law in it.
+QUESTIONS = """
+import contextlib, io, json
+
+import phonotaxis
+from analysis.comparison.options import comparison_plans
+from analysis.design.gain_search import search_gains
+from analysis.design.requirements import DesignRequirements, check_law
+from analysis.laws.law_curves import law_curves
+from analysis.laws.law_curves_plots import plot_law_curves
+from analysis.laws.push_and_pull import DESIGNED_LAWS
+from analysis.laws.radial_law import radial_law
+from analysis.linear.root_locus import root_loci
+from analysis.stability.law_analysis import analyse_law, chosen_laws
+from analysis.stability.model_sheet import model_sheet
+from analysis.stability.report_page import stability_page
+from diagrams import build_sound_follower, load_scenario
+
+
+def help_of(command):
+    with contextlib.redirect_stdout(io.StringIO()) as text:
+        with contextlib.suppress(SystemExit):
+            phonotaxis.main([command, "--help"])
+    return " ".join(text.getvalue().split())
+
+
+settings = ["law=gaussian", "repulsion.gaussian.width_m=0.4"]
+scenario = load_scenario("default", [*settings, "hearing=ideal"])
+sheet = model_sheet(scenario)
+curves = law_curves(scenario, DESIGNED_LAWS)
+lines = plot_law_curves(curves).axes[0].lines
+designed = search_gains(load_scenario("default"), DesignRequirements())
+tuned = scenario.model_copy(update={"repulsion": designed})
+checks = check_law(tuned, "gaussian", DesignRequirements())
+print(json.dumps({
+    "help": {name: help_of(name) for name in ("simulate", "compare", "stability")},
+    "block": build_sound_follower(scenario).blocks["controller"].get_name(),
+    "force": radial_law(scenario).force(0.4, 0.5),
+    "equations": [each.text for each in sheet.law_equations],
+    "parameters": [row.field for row in sheet.parameters if row.of_law],
+    "heading": stability_page([analyse_law(scenario, [])]),
+    "all": [each.law for each in chosen_laws(scenario, ["all"])],
+    "loci": [locus.parameter for locus in root_loci(scenario)],
+    "lines": {line.get_label(): line.get_color() for line in lines},
+    "compared": {name: plan.grid["law"] for name, plan in comparison_plans().items()},
+    "strength": designed.gaussian.strength_n,
+    "barrier": checks.check("barrier").ratio,
+}))
+"""
+
+
+def page_code() -> str:
+    """The file that the page shows."""
+    page = (ROOT / "docs/extending.md").read_text("utf-8")
+    found = re.search(r"(?ms)^```python\n(.*?)^```$", page)
+    assert found
+    return found[1]
+
+
+def add_law(tree: Path) -> None:
+    """Ours by links, but for the room of the laws: that is a copy with one more."""
+    (tree / "systems").mkdir(parents=True)
+    for name in ("analysis", "diagrams", "phonotaxis.py"):
+        (tree / name).symlink_to(ROOT / name)
+    for part in (ROOT / "systems").iterdir():
+        if part.name not in {"laws", "__pycache__"}:
+            (tree / "systems" / part.name).symlink_to(part)
+    laws = tree / "systems/laws"
+    shutil.copytree(
+        ROOT / "systems/laws", laws, ignore=shutil.ignore_patterns("__pycache__")
+    )
+    (laws / "gaussian.py").write_text(page_code(), "utf-8")
+    listed = (laws / "catalogue.py").read_text("utf-8")
+    for before, added in (
+        (
+            "from systems.laws.law import Law\n",
+            "{}from systems.laws.gaussian import GAUSSIAN\n",
+        ),
+        ("        ACTIVE_2017,\n", "{}        GAUSSIAN,\n"),
+    ):
+        assert listed.count(before) == 1
+        listed = listed.replace(before, added.format(before))
+    (laws / "catalogue.py").write_text(listed, "utf-8")
+    (tree / "questions.py").write_text(QUESTIONS, "utf-8")
+
+
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory: pytest.TempPathFactory) -> Any:
+    tree = tmp_path_factory.mktemp("adding") / "tree"
+    add_law(tree)
+    run = subprocess.run(
+        [sys.executable, "questions.py"],
+        cwd=tree,
+        env=os.environ | {"PYTHONPATH": str(tree)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return json.loads(run.stdout)
+
+
+OURS = ["conventional", "active", "conventional2017", "active2017"]
+
+
+def test_commands_name_it(answers):
+    names = ", ".join(["none", *OURS, "gaussian"])
+    for command, text in answers["help"].items():
+        assert names in text, command
+
+
+def test_it_runs_in_the_general_block_with_its_own_gains(answers):
+    """F_0/e at its width, and 0.5 m/s times D_0."""
+    assert answers["block"] == "radial_law_controller"
+    assert answers["force"] == pytest.approx(6.4 * 0.36787944117 + 0.4)
+
+
+def test_model_sheet_and_report_have_it(answers):
+    assert answers["equations"] == ["f = F_0 exp(-c^2/w^2) + D_0 s"]
+    own = {"strength_n", "width_m", "damping_n_s_m"}
+    fields = {f"repulsion.gaussian.{name}" for name in own}
+    assert set(answers["parameters"]) == fields | {"repulsion.velocity_term"}
+    assert "Gaussian law" in answers["heading"]
+    assert answers["all"] == [*OURS, "gaussian"]
+
+
+def test_root_loci_vary_its_gains(answers):
+    assert answers["loci"][2:] == [
+        "repulsion.gaussian.strength_n",
+        "repulsion.gaussian.damping_n_s_m",
+    ]
+
+
+def test_pictures_draw_it_in_a_colour_of_its_own(answers):
+    assert answers["lines"].pop("bell curve") == "#009E73"
+    assert answers["lines"] == {
+        "conventional": "#D55E00",
+        "active 2019": "#0072B2",
+        "conventional 2017": "#E69F00",
+        "active 2017": "#CC79A7",
+    }
+
+
+def test_comparisons_count_it_in(answers):
+    assert answers["compared"]
+    for laws in answers["compared"].values():
+        assert laws == ["none", *OURS, "gaussian"]
+
+
+def test_design_finds_its_gain(answers):
+    """Three figures, rounded up."""
+    assert answers["strength"] != 6.4
+    assert 1.0 <= answers["barrier"] < 1.02
