@@ -58,9 +58,10 @@ class SoundFollower:
     @cached_property
     def blocks(self) -> dict[str, Any]:
         """By part: the only robot's, those of its source, and ``obstacles``."""
-        (target,) = map(self.scenario.target, self.scenario.all_robots)
-        blocks = {**self.sources[target].blocks, "obstacles": self.obstacles}
-        return {**blocks, **self.only.blocks}
+        robot = self.only
+        target = self.scenario.target(next(iter(self.robots)))
+        world = {**self.sources[target].blocks, "obstacles": self.obstacles}
+        return {**world, **robot.blocks}
 
     @property
     def log(self) -> VectorLogSink | None:

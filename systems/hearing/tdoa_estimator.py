@@ -53,8 +53,10 @@ def may_sound(sound: SoundParameters, time: float, longest_way: float) -> bool:
         longest_way: Longest that sound can take to the microphones, s.
     """
     phase = time - sound.start_s
+    # A frame that ends as a burst begins holds none of it.
+    since_burst = phase % sound.period_s or sound.period_s
     open_for = sound.on_s + longest_way + FRAME_PERIOD_S
-    return phase > 0.0 and phase % sound.period_s < open_for
+    return phase > 0.0 and since_burst < open_for
 
 
 class TDOAEstimator(LeafSystem):

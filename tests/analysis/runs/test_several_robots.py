@@ -1,0 +1,86 @@
+"""Metrics, summary, pictures and replay of a run of several robots."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.runs.metrics import run_metrics
+from analysis.runs.replay import record_run, write_replay
+from analysis.runs.run_plots import plot_trajectory
+from analysis.runs.run_report import run_summary, summary_text, write_run
+from analysis.runs.scene import looks
+from diagrams import RunResult, load_scenario, simulate
+
+
+@pytest.fixture(scope="module")
+def convoy() -> RunResult:
+    return simulate(load_scenario("convoy", ["hearing=ideal", "duration_s=8"]))
+
+
+def test_metrics_are_those_of_each_robot(convoy):
+    """The clearance between two robots is the same from both."""
+    metrics = run_metrics(convoy)
+    for name, own in convoy.robots.items():
+        for metric, value in run_metrics(own).items():
+            assert metrics[f"{name}.{metric}"] == value
+    gap = metrics["second.minimum_clearance_m"]
+    assert gap == pytest.approx(metrics["leader.minimum_obstacle_clearance_m"])
+    assert metrics["second.minimum_obstacle_clearance_m"] is not None, "the source"
+
+
+def test_summary_names_each_robot(convoy):
+    summary = run_summary(convoy, None)
+    assert {name: row["cause"] for name, row in summary["robots"].items()} == {
+        "leader": "completed",
+        "second": "completed",
+    }
+    text = summary_text(convoy, summary)
+    assert text.count("follow distance") == 2
+    assert "second                completed, law active" in text
+
+
+def test_a_directory_holds_files_of_each_robot(convoy, tmp_path):
+    write_run(convoy, run_summary(convoy, tmp_path), tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
+    assert {f"time_series_{robot}.png" for robot in convoy.robots} <= names
+    assert {f"diagram_{robot}.svg" for robot in convoy.robots} <= names
+    assert load_scenario(tmp_path / "scenario.yaml") == convoy.full_scenario
+    assert "robots" in json.loads((tmp_path / "summary.json").read_text())
+    world = (tmp_path / "diagram.svg").read_text()
+    assert ">leader<" in world
+    assert "tdoa estimator" not in world
+
+
+def test_each_robot_has_its_own_colour_and_label(convoy):
+    colours = [look.colour for look in looks(convoy)]
+    assert len(set(colours)) == len(colours) == 2
+    (axes,) = plot_trajectory(convoy).axes
+    _, labels = axes.get_legend_handles_labels()
+    for name, own in convoy.robots.items():
+        (line,) = (k for k in axes.lines if k.get_label() == f"path of {name}'s P")
+        np.testing.assert_array_equal(line.get_xdata(), own.columns["p_WP_x"])
+        assert f"{name} with its microphones" in labels
+
+
+def test_the_replay_has_every_robot_and_source(convoy, tmp_path: Path):
+    write_replay(convoy, tmp_path / "replay.html")
+    page = (tmp_path / "replay.html").read_bytes()
+    assert len(page) > 100_000
+
+
+def test_each_robot_moves_in_the_replay(convoy):
+    paths: set[str] = set()
+
+    class Recorder:
+        def __getattr__(self, name: str):
+            return lambda path, *rest, **_: paths.add(path)
+
+    record_run(Recorder(), convoy)  # type: ignore[arg-type]
+    expected = {"robots/leader", "robots/second", "source", "estimates/second"}
+    assert expected <= paths
+    assert "robots/leader/ring_1" in paths, "its loudspeaker"
+    assert "robots/second/ring_1" not in paths

@@ -1,0 +1,49 @@
+"""What blocks say of themselves agrees with their ports and states."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+import pytest
+from pydrake.systems.primitives import Gain
+
+from diagrams import build_sound_follower, load_scenario
+from systems.framework.block_facts import BlockFacts, block_facts
+
+BUILDS = (
+    ["hearing=audio", "loudspeaker={}"],
+    ["hearing=ideal", "ultrasonic.firing=sequential"],
+    ["hearing=ideal", "obstacle_sensing=ideal", "law=conventional2017"],
+    ["hearing=ideal", "plant.friction=0.5"],
+)
+
+
+@pytest.mark.parametrize("overrides", BUILDS)
+def test_each_logged_element_has_a_column_of_its_own(overrides):
+    follower = build_sound_follower(load_scenario("default", overrides), log=True)
+    robot = follower.robots["robot"]
+    for (part, port), names in robot.logged.items():
+        assert robot.port(part, port).size() == len(names)
+    columns = list(chain.from_iterable(robot.logged.values()))
+    assert len(columns) == len(set(columns))
+    assert robot.log is not None
+    assert robot.log.get_input_port().size() == len(columns)
+
+
+@pytest.mark.parametrize("overrides", BUILDS)
+def test_each_state_that_is_named_is_named_once(overrides):
+    """The emitter's past, the microphones' and the estimator's are not named."""
+    follower = build_sound_follower(load_scenario("default", overrides))
+    context = follower.diagram.CreateDefaultContext()
+    unnamed = set()
+    for part, block in follower.robots["robot"].blocks.items():
+        own = block.GetMyContextFromRoot(context)
+        states = block_facts(block).states
+        assert len(set(states)) == len(states)
+        if len(states) != own.num_total_states():
+            unnamed.add(part)
+    assert unnamed <= {"emitter", "microphones", "hearing", "ultrasonic", "collision"}
+
+
+def test_a_block_that_says_nothing_is_a_controller():
+    assert block_facts(Gain(1.0, 1)) == BlockFacts("controller", "control")
