@@ -8,7 +8,8 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_laws import checked_law, import_law, law_files, try_law
+from diagrams.own_code import import_own
+from diagrams.own_laws import checked_law, try_law
 from diagrams.scenario import Scenario
 from systems import (
     RadialLawController,
@@ -22,7 +23,7 @@ from systems.laws.catalogue import LAWS
 from systems.laws.law import Law
 from systems.ranging.collision_vector import SLOTS
 
-__all__ = ["LAWS", "law_files", "make_command", "make_controller"]
+__all__ = ["LAWS", "make_command", "make_controller"]
 
 #: What a controller may command, each of size 2, and the block that obeys.
 _COMMANDS: dict[str, Callable[..., Any]] = {
@@ -70,7 +71,7 @@ def make_controller(scenario: Scenario) -> Any:
             f"{name!r} is not known; use {', '.join(LAWS)}, package.module:Name, or "
             "path/to/file.py:Name",
         )
-    law = import_law(name)
+    law = import_own(name, "law")
     if inspect.isclass(law):
         return _own_block(name, law, parts)
     function = checked_law(name, law)

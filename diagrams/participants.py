@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, Strict, model_validator
 
 from systems.base.diff_drive_plant import PlantParameters
 from systems.base.robot import RobotParameters
@@ -55,6 +55,9 @@ class FollowerParameters(Parameters):
     """Sound waves and microphones, or exact positions."""
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
     """Cones, or exact nearest points."""
+    blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
+    """Blocks of a user's own, ``package.module:Name`` or ``path/to/file.py:Name``, that
+    the robot has besides, or in the place of the block of the same part."""
     follows: str = ""
     """Name of the source, or of a robot with a loudspeaker; empty: the first source."""
     loudspeaker: SoundParameters | None = None

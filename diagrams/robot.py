@@ -12,6 +12,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from diagrams.laws import make_command, make_controller
+from diagrams.own_blocks import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.scenario import ROBOT, SOURCE, Scenario
 from systems import (
@@ -122,7 +123,7 @@ def make_robot(
         InputError: The law is not known, or a sound file cannot be played.
     """
     controller = make_controller(scenario)
-    blocks = [
+    ours = [
         DiffDrivePlant(
             robot=scenario.robot,
             plant=scenario.plant,
@@ -139,11 +140,21 @@ def make_robot(
         controller,
         make_command(controller, scenario.robot),
     ]
+    by_part = with_own_blocks(
+        {block_facts(block).part: block for block in ours},
+        scenario.blocks,
+        {
+            "scenario": scenario,
+            "robot": scenario.robot,
+            "bodies": bodies,
+            "seed": _seed(scenario, "own_block", name),
+        },
+    )
+    blocks, plant = [*by_part.values()], by_part["plant"]
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
     connect_by_name(builder, blocks, _OUTSIDE)
-    plant = blocks[0]
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
     if scenario.loudspeaker is not None:

@@ -22,13 +22,13 @@ from ruamel.yaml import YAML
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
 from diagrams.explain import explain
-from diagrams.laws import law_files
 from diagrams.loading import (
     read_mapping,
     resolve_sound,
     scenario_from_mapping,
     set_field,
 )
+from diagrams.own_code import own_files
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 
@@ -184,12 +184,12 @@ class SweepPlan(Parameters):
 
     @cached_property
     def file_digests(self) -> dict[str, str]:
-        """SHA-256 of each file on which runs depend: sounds, and laws' modules."""
+        """SHA-256 of each file on which runs depend: sounds, and users' modules."""
         values = {**self.base, **self.grid, **self.model_dump(include={"draw"})["draw"]}
         files: set[Path] = set()
         for field, text in _texts("", values):
-            if field == "law":
-                files.update(law_files(text))
+            if field in ("law", "blocks"):
+                files.update(own_files(text, field))
             elif field in ("file", "ego_noise_file"):
                 files.add(Path(self.folder, text).resolve())
         return {

@@ -1,0 +1,116 @@
+"""A user's own functions and classes, named in a scenario."""
+
+from __future__ import annotations
+
+import importlib
+import importlib.util
+import sys
+import traceback
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from systems.framework.input_error import InputError
+
+__all__ = ["import_own", "own_files", "why"]
+
+_OURS = ("analysis", "diagrams", "systems")
+
+
+def import_own(name: str, field: str) -> Any:
+    """The function or class that a name stands for.
+
+    Args:
+        name: ``package.module:Name`` or ``path/to/file.py:Name``; both are looked
+            up in the working directory, too.
+        field: Of the scenario, which names it.
+
+    Raises:
+        InputError: There is none, or its module cannot be imported.
+    """
+    module_name, _, attribute = name.rpartition(":")
+    if not module_name or not attribute:
+        raise InputError(
+            field, f"{name!r} is not known; write package.module:Name or file.py:Name"
+        )
+    try:
+        module = _import(module_name)
+        found = getattr(module, attribute, None)
+    except (Exception, SystemExit) as error:  # noqa: BLE001  # a user's module
+        raise InputError(field, f"{name!r} cannot be imported: {why(error)}") from None
+    if not callable(found):
+        raise InputError(
+            field, f"{module_name} has no function or class {attribute!r}; check it"
+        )
+    return found
+
+
+def _import(name: str) -> ModuleType:
+    if not name.endswith(".py"):
+        here = str(Path.cwd())
+        if here not in sys.path:
+            sys.path.append(here)
+        return importlib.import_module(name)
+    path = Path(name).expanduser().resolve()
+    known = f"own_code_of_{path}"
+    if known in sys.modules:
+        return sys.modules[known]
+    spec = importlib.util.spec_from_file_location(known, path)
+    if spec is None or spec.loader is None:
+        raise ImportError(f"{path} is no Python file")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[known] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[known]
+        raise
+    return module
+
+
+def own_files(name: str, field: str) -> tuple[Path, ...]:
+    """Source files of a module of the user's, and of those of theirs that it uses.
+
+    Args:
+        name: Of a law or a block; those of the package have none.
+        field: Of the scenario, which names it.
+    """
+    if ":" not in name:
+        return ()
+    import_own(name, field)
+    module_name = name.rpartition(":")[0]
+    found: dict[str, Path] = {}
+    waiting = [_import(module_name)]
+    while waiting:
+        module = waiting.pop()
+        file = getattr(module, "__file__", None)
+        if module.__name__ in found or file is None or not _is_users(module, file):
+            continue
+        found[module.__name__] = Path(file).resolve()
+        for value in list(vars(module).values()):
+            owner = str(getattr(value, "__module__", None))
+            used = value if isinstance(value, ModuleType) else sys.modules.get(owner)
+            if isinstance(used, ModuleType):
+                waiting.append(used)
+    return tuple(sorted(found.values()))
+
+
+def _is_users(module: ModuleType, file: str) -> bool:
+    """Whether versions of packages do not tell what the module holds."""
+    if module.__name__.partition(".")[0] in _OURS:
+        return False
+    # The standard library, and what pip has installed.
+    return (
+        "site-packages" not in file and Path(sys.base_prefix) not in Path(file).parents
+    )
+
+
+def why(error: BaseException) -> str:
+    """Kind and text of an error in a user's code, with its line."""
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = Path(__file__).resolve().parent
+    own = [f for f in frames if Path(f.filename).resolve().parent != ours]
+    own = [f for f in own if "importlib" not in f.filename]
+    at = f" in line {own[-1].lineno} of {Path(own[-1].filename).name}" if own else ""
+    text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
+    return f"{text}{at}"
