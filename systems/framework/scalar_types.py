@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
+from types import ModuleType
 from typing import Any
 
 from pydrake.autodiffutils import AutoDiffXd
@@ -21,14 +22,18 @@ class _Template(TemplateSystem):
     always its own. Where imports are deep, that takes a quarter second a block.
     """
 
+    def __init__(self, name: str, scalars: Any, pairs: Any, scope: ModuleType) -> None:
+        super().__init__(name, scalars, pairs, scope)
+        self.__module__ = scope.__name__
+
     def _on_add(self, param: Any, cls: type, skip_rename: Any) -> Any:
-        searching = scalar_conversion.TemplateMethod
-        told = functools.partial(searching, scope=scalar_conversion)
-        scalar_conversion.TemplateMethod = told
+        theirs = vars(scalar_conversion)
+        searching = theirs["TemplateMethod"]
+        theirs["TemplateMethod"] = functools.partial(searching, scope=scalar_conversion)
         try:
             return super()._on_add(param, cls, skip_rename)
         finally:
-            scalar_conversion.TemplateMethod = searching
+            theirs["TemplateMethod"] = searching
 
 
 def define_for_scalars(name: str, module: str) -> Any:

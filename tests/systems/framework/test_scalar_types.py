@@ -17,7 +17,7 @@ def test_classes_are_made_without_a_search_and_convert(monkeypatch):
         pytest.fail("the stack was searched, a quarter second a block")
 
     monkeypatch.setattr(inspect, "stack", search)
-    drakes = scalar_conversion.TemplateMethod
+    drakes = vars(scalar_conversion)["TemplateMethod"]
 
     @define_for_scalars("Gain_", __name__)
     def Gain_(T):
@@ -36,4 +36,4 @@ def test_classes_are_made_without_a_search_and_convert(monkeypatch):
         assert type(converted) is Gain_[AutoDiffXd]
         assert converted.gain == 3.0
     assert Gain_[float].__module__ == __name__
-    assert scalar_conversion.TemplateMethod is drakes
+    assert vars(scalar_conversion)["TemplateMethod"] is drakes
