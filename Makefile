@@ -22,10 +22,10 @@ demo: .venv/.installed ## run the default scenario, with full audio, into result
 	@$(PY) -m phonotaxis simulate
 
 test: .venv/.installed ## run all tests but those that need a browser
-	@$(PYTEST) -n 2
+	@$(PYTEST) -n 2 --dist worksteal
 
 test-fast: .venv/.installed ## run the tests that take seconds
-	@$(PYTEST) -n 2 -m "not slow and not browser"
+	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser"
 
 browser-test: .venv/.installed ## run the tests that open a page in Chromium
 	@$(PYTEST) -m browser

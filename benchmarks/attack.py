@@ -64,7 +64,10 @@ def _load() -> None:
         "analysis.comparison.report",
         "analysis.sweeps.dask_cluster",
         "analysis.sweeps.page",
+        "control",
         "matplotlib.figure",
+        "scipy.signal",
+        "scipy.stats",
         "soundfile",
     ):
         import_module(name)

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.stats import chi2
 
 __all__ = [
     "CONFIDENCE",
@@ -58,6 +57,8 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
         errors: (k,) in any unit.
         stds: (k,) in the same one, or one for all.
     """
+    from scipy.stats import chi2
+
     errors = np.asarray(errors, dtype=float)
     if errors.size == 0:
         return RatioEstimate(math.inf, 0.0, math.inf)
@@ -83,6 +84,8 @@ def consistency(
         errors: (k, d).
         covariances: (k, d, d).
     """
+    from scipy.stats import chi2
+
     count, dimension = errors.shape
     solved = np.linalg.solve(covariances, errors[:, :, None])[:, :, 0]
     low, high = chi2.interval(CONFIDENCE, dimension * count) / np.array(count)

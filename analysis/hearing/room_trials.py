@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import oaconvolve
 
 from analysis.reporting.intervals import Interval, wilson_interval
 from systems.base.robot import RobotParameters
@@ -177,6 +176,8 @@ def _frames(
     seed: int,
 ) -> Iterator[NDArray[np.int16]]:
     """(m, FRAME_SAMPLES) counts, until the burst has been emitted."""
+    from scipy.signal import oaconvolve
+
     # Sound begins at any place of a frame, after some frames of noise alone.
     lead = int(tick_generator(seed, 1).integers(4, 5 * FRAME_SAMPLES)) + FRAME_SAMPLES
     frames = -(-(lead + len(burst)) // FRAME_SAMPLES)

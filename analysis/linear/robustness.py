@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import qmc
 
 from systems.framework.input_error import InputError
 
@@ -160,6 +159,8 @@ def pole_cloud(
         seed: Of these.
         progress: Called after each point.
     """
+    from scipy.stats import qmc
+
     low = np.array([p.low for p in parameters])
     high = np.array([p.high for p in parameters])
     unit = qmc.LatinHypercube(len(parameters), rng=np.random.default_rng(seed))

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
-import control
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
@@ -100,6 +99,8 @@ def _chain(scheme: Scheme) -> LinearModel:
         return built
     if scheme == "held velocity, one tick late":
         return delayed_output(built, "p_WP", 1)  # the velocity is the mass's own
+    import control
+
     double = control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), np.zeros((2, 1)))
     A, B, C, D = control.ssdata(control.sample_system(double, FRAME_PERIOD_S))
     names = built.input_names, built.output_names

@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
-from scipy.signal.windows import hann
 
 __all__ = ["RecordingSpectra"]
 
@@ -50,6 +49,8 @@ class RecordingSpectra:
     @cached_property
     def window(self) -> NDArray[np.float32]:
         """(w,) shape of a snapshot."""
+        from scipy.signal.windows import hann
+
         seconds = max(WINDOW_S, TRAVELS * self.travel_s)
         size = fft.next_fast_len(math.ceil(seconds * self.sample_rate_hz), real=True)
         return hann(size, sym=False).astype(np.float32)

@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy import stats
 
 __all__ = ["Interval", "bootstrap_interval", "median_interval", "wilson_interval"]
 
@@ -27,7 +26,9 @@ def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> I
         runs: All runs, at least one.
         confidence: Share of such intervals that hold the true value.
     """
-    result = stats.binomtest(successes, runs).proportion_ci(confidence, method="wilson")
+    from scipy.stats import binomtest
+
+    result = binomtest(successes, runs).proportion_ci(confidence, method="wilson")
     return Interval(float(result.low), float(result.high))
 
 
@@ -67,7 +68,9 @@ def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
         values: (n,) independent samples, at least one.
         confidence: As of ``wilson_interval``, at least.
     """
+    from scipy.stats import binom
+
     ordered = np.sort(np.asarray(values, dtype=float))
-    below = int(stats.binom.ppf(0.5 * (1.0 - confidence), len(ordered), 0.5))
+    below = int(binom.ppf(0.5 * (1.0 - confidence), len(ordered), 0.5))
     rank = max(below - 1, 0)
     return Interval(float(ordered[rank]), float(ordered[-1 - rank]))
