@@ -30,7 +30,6 @@ from systems.laws.active_impedance_controller import active_force
 from systems.laws.impedance import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ultrasonic_array import (
-    SENSORS,
     cone_ranges,
     measured_ranges,
     world_rectangles,
@@ -134,10 +133,14 @@ class PlainLoop:
             true,
             scenario.ultrasonic,
             scenario.acoustics.c,
-            standard_normals((2, SENSORS), self.ultrasonic_seed, tick),
+            standard_normals(
+                (2, scenario.ultrasonic.count), self.ultrasonic_seed, tick
+            ),
         )
         points = echo_points(ranges.tolist(), echo.tolist(), scenario.ultrasonic)
-        vectors = collision_vectors(points, scenario.collision_vector)
+        vectors = collision_vectors(
+            points, scenario.collision_vector, scenario.ultrasonic.neighbours
+        )
         return [[feature, *rotate(theta, x, y)] for feature, x, y in vectors]
 
     def _law(

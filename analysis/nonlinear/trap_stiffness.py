@@ -115,7 +115,9 @@ def _block_force(
         ranges = cone_ranges(np.array(pose), np.array(bodies), case.ultrasonic, offset)
         echo = ranges <= case.ultrasonic.maximum_range_m
         points = echo_points(ranges.tolist(), echo.tolist(), case.ultrasonic)
-        vectors = collision_vectors(points, case.collision_vector)
+        vectors = collision_vectors(
+            points, case.collision_vector, case.ultrasonic.neighbours
+        )
     vectors_W = [(v[0], *rotate(theta, v[1], v[2])) for v in vectors]
     term = case.repulsion.velocity_term
     F_b, _ = repulsion_force(vectors_W, {}, law, term, FRAME_PERIOD_S)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.simulation import RunResult
-from systems.ranging.ultrasonic_array import SENSORS, cone_ranges
+from systems.ranging.ultrasonic_array import cone_ranges
 
 __all__ = ["CollisionWarning", "collision_warning"]
 
@@ -57,7 +57,7 @@ def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
         cone_ranges(pose, body[np.newaxis], sensors, control_point_m)
         for pose, body in zip(result.poses("WB"), bodies, strict=True)
     ]
-    numbers = range(1, SENSORS + 1)
+    numbers = range(1, sensors.count + 1)
     read = np.stack([columns[f"range_{k}"] for k in numbers], axis=1)
     echo = np.stack([columns[f"echo_{k}"] for k in numbers], axis=1) > 0.5
     return np.any(echo & (np.abs(read - ranges) <= SAME_M), axis=1)

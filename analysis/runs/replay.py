@@ -173,7 +173,7 @@ def _record_robot(
         for time, angle in zip(frames, turned, strict=True):
             spin = upright(0.0, 0.0, 0.0, angle)
             meshcat.SetTransform(f"{path}/{side}/wheel", spin, float(time))
-    for number in (1, 2, 3):
+    for number in range(1, result.scenario.ultrasonic.count + 1):
         if f"echo_{number}" in result.columns:
             echo = result.columns[f"echo_{number}"] > 0.5
             cone = f"{path}/cone_{number}"

@@ -163,7 +163,7 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
         _add_wheel(meshcat, scenario, f"{path}/{side}", place)
     _add_microphones(meshcat, scenario, path)
     if scenario.obstacle_sensing == "ultrasonic":
-        for sensor in range(3):
+        for sensor in range(scenario.ultrasonic.count):
             _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
     if scenario.loudspeaker is not None:
         _add_loudspeaker(meshcat, path, ROBOT_HEIGHT_M, look.colour)

@@ -98,8 +98,8 @@ def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]
 
 
 def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
-    """(x, y, theta) of an ultrasonic sensor in B, m and rad; sensor 0, 1 or 2."""
-    x, y = scenario.ultrasonic.positions_m[sensor]
+    """(x, y, theta) of an ultrasonic sensor in B, m and rad; from 0."""
+    x, y = scenario.ultrasonic.places[sensor]
     axis = math.radians(scenario.ultrasonic.axes_deg[sensor])
     return scenario.robot.control_point_m + x, y, axis
 

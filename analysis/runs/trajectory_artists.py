@@ -225,7 +225,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
     labelled: set[bool] = set()
     for time in times[::step]:
         tick = tick_at(result, time)
-        for sensor in range(3):
+        for sensor in range(result.scenario.ultrasonic.count):
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
             pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -16,7 +17,7 @@ from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import FRAME_PERIOD_S
-from systems.ranging.ultrasonic_array import SENSORS, UltrasonicParameters
+from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
 __all__ = [
@@ -44,7 +45,7 @@ class CollisionVectorParameters(Parameters):
     aggregation: Aggregation = "paper"
     """``paper``: nearest echo, joined with its nearer neighbour where close
     enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
-    own vector, whose forces add."""
+    own vector, whose forces add; of more than three the nearest three."""
     pair_separation_m: NonNegativeLength = 0.5
     """Echoes farther apart than this are taken as two obstacles, m."""
 
@@ -68,11 +69,11 @@ def echo_point(range_, axis, position):
 
 
 def echo_points(ranges, echo, sensors: UltrasonicParameters):
-    """The three points that the sensors see, None where there is no echo."""
+    """The points that the sensors see, None where there is no echo."""
     return [
         echo_point(range_, axis, position) if heard > 0.5 else None
         for range_, heard, axis, position in zip(
-            ranges, echo, sensors.axes, sensors.positions_m, strict=True
+            ranges, echo, sensors.axes, sensors.places, strict=True
         )
     ]
 
@@ -121,31 +122,42 @@ def foot_on_segment(a, b):
     return a[0] + t * ex, a[1] + t * ey
 
 
-def collision_vectors(points, parameters: CollisionVectorParameters):
+def collision_vectors(points, parameters: CollisionVectorParameters, neighbours=None):
     """Collision vectors from the points that the sensors see.
 
     Args:
-        points: Three entries, left to right: (x, y) from P in m, or None
-            where there is no echo.
+        points: n entries, left to right: (x, y) from P in m, or None where there
+            is no echo.
         parameters: The aggregation rule.
+        neighbours: Pairs of sensors next to one another, from 0, the left one first
+            (``UltrasonicParameters.neighbours``); none: each and the next.
 
     Returns:
-        Up to three (feature, x, y). The feature names what the vector stands
-        on, so that a jump from one to another is not taken for a motion:
-        1, 2, 3 one sensor (case I, Han 2019, eq. 12), 4 sensors 1 and 2,
-        5 sensors 2 and 3 (case II, eq. 14).
+        Up to ``SLOTS`` (feature, x, y), the nearest ones. The feature names what the
+        vector stands on, so that a jump from one to another is not taken for a
+        motion: 1 to n one sensor (case I, Han 2019, eq. 12), n + k sensor k and its
+        right neighbour (case II, eq. 14).
     """
-    heard = [k for k in range(SENSORS) if points[k] is not None]
+    heard = [k for k, point in enumerate(points) if point is not None]
     if not heard:
         return []
+    if neighbours is None:
+        neighbours = pairwise(range(len(points)))
+    pairs = [
+        (left, right)
+        for left, right in neighbours
+        if points[left] is not None
+        and points[right] is not None
+        and _close(points[left], points[right], parameters.pair_separation_m)
+    ]
     if parameters.aggregation == "sum":
-        return _all_vectors(points, parameters.pair_separation_m)
+        return _all_vectors(points, heard, pairs)
     nearest = min(heard, key=lambda k: _squared(points[k]))
     if parameters.aggregation == "paper":
-        partner = _partner(points, nearest, parameters.pair_separation_m)
-        if partner is not None:
-            left = min(nearest, partner)
-            return [_pair(points, left)]
+        # Of the neighbours that are close enough the nearer to P.
+        mine = [pair for pair in pairs if nearest in pair]
+        if mine:
+            return [_pair(points, *min(mine, key=_other_is_near(points, nearest)))]
     return [(1.0 + nearest, *points[nearest])]
 
 
@@ -157,36 +169,28 @@ def _close(a, b, separation):
     return _squared((b[0] - a[0], b[1] - a[1])) < separation * separation
 
 
-def _pair(points, left):
-    return (4.0 + left, *foot_on_segment(points[left], points[left + 1]))
+def _pair(points, left, right):
+    feature = 1.0 + len(points) + left
+    return (feature, *foot_on_segment(points[left], points[right]))
 
 
-def _partner(points, sensor, separation):
-    """The neighbour to join with: of those close enough the nearer to P."""
-    neighbours = [
-        k
-        for k in (sensor - 1, sensor + 1)
-        if 0 <= k < SENSORS
-        and points[k] is not None
-        and _close(points[sensor], points[k], separation)
-    ]
-    return min(neighbours, key=lambda k: _squared(points[k]), default=None)
+def _other_is_near(points, sensor):
+    """Key of a pair: the squared distance of its other point."""
+
+    def key(pair):
+        left, right = pair
+        return _squared(points[right if left == sensor else left])
+
+    return key
 
 
-def _all_vectors(points, separation):
-    vectors = []
-    paired = set()
-    for left in range(SENSORS - 1):
-        a, b = points[left], points[left + 1]
-        if a is not None and b is not None and _close(a, b, separation):
-            vectors.append(_pair(points, left))
-            paired |= {left, left + 1}
-    vectors += [
-        (1.0 + k, *points[k])
-        for k in range(SENSORS)
-        if points[k] is not None and k not in paired
-    ]
-    return vectors
+def _all_vectors(points, heard, pairs):
+    vectors = [_pair(points, left, right) for left, right in pairs]
+    paired = {sensor for pair in pairs for sensor in pair}
+    vectors += [(1.0 + k, *points[k]) for k in heard if k not in paired]
+    if len(vectors) > SLOTS:
+        vectors.sort(key=lambda vector: float_of(_squared(vector[1:])))
+    return vectors[:SLOTS]
 
 
 def fill_slots(vectors, scalar):
@@ -254,9 +258,10 @@ def CollisionVector_(T):
         ranges: no state, no latency; the ports of age and pose are not read.
         With ``firing: sequential`` a range that is held stands for a point
         that rests in W: it is carried on to the present pose. An obstacle's
-        own motion since that sensor fired, 50 ms at most, remains an error.
+        own motion since that sensor fired, 50 ms at most of three, remains an error.
 
-        Discrete state, 25 ms, with ``firing: sequential``: the last two poses.
+        Discrete state, 25 ms, with ``firing: sequential``: the poses of the ticks of a
+        round before this one, two for three sensors.
 
         Args:
             parameters: ``CollisionVectorParameters``.
@@ -284,9 +289,15 @@ def CollisionVector_(T):
             self._robot = robot or RobotParameters()
             self._initial_pose = tuple(initial_pose)
             self.set_name("collision_vector")
+            count = self._sensors.count
             inputs = [
-                self.DeclareVectorInputPort(name=name, size=3)
-                for name in ("ranges", "echo", "range_ages", "pose_WB_estimated")
+                self.DeclareVectorInputPort(name=name, size=size)
+                for name, size in (
+                    ("ranges", count),
+                    ("echo", count),
+                    ("range_ages", count),
+                    ("pose_WB_estimated", 3),
+                )
             ]
             self._echoes, self._motion = inputs[:2], inputs[2:]
             sources = {port.ticket() for port in self._echoes}
@@ -317,7 +328,9 @@ def CollisionVector_(T):
             points = echo_points(ranges, echo, self._sensors)
             if self._past_poses:
                 points = self._carried(context, points)
-            return fill_slots(collision_vectors(points, self._parameters), T)
+            neighbours = self._sensors.neighbours
+            vectors = collision_vectors(points, self._parameters, neighbours)
+            return fill_slots(vectors, T)
 
         def _carried(self, context, points):
             """The points as they lie from the present pose."""
@@ -332,7 +345,7 @@ def CollisionVector_(T):
             ]
 
         def _poses(self, context, now):
-            """The pose now, a tick ago, two ticks ago."""
+            """The pose now, a tick ago, two ticks ago, as far back as a round."""
             past = context.get_discrete_state(0).CopyToVector().tolist()
             starts = range(0, len(past), 3)
             return [now, *(past[k : k + 3] for k in starts)]

@@ -1,15 +1,17 @@
-"""Three ultrasonic range finders at the control point."""
+"""Ultrasonic range finders, the papers' three or any others."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import cached_property
+from itertools import pairwise
 from typing import Annotated, Any, Literal
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 from pydrake.systems.framework import LeafSystem
 from scipy.special import ndtri
 
@@ -17,7 +19,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, read_arrays
-from systems.framework.input_error import InputError
+from systems.framework.input_error import InputError, shortened
 from systems.framework.noise import standard_normals
 from systems.framework.parameters import (
     Angle,
@@ -34,7 +36,6 @@ from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
 __all__ = [
-    "SENSORS",
     "UltrasonicArray",
     "UltrasonicParameters",
     "cone_ranges",
@@ -42,20 +43,22 @@ __all__ = [
     "world_rectangles",
 ]
 
-#: The model holds three sensors, numbered from left to right.
-SENSORS = 3
+#: Neighbours are sensors next to one another whose directions differ by this at most,
+#: deg.
+NEIGHBOURS_DEG = 90.0
 
-_Triple = Annotated[tuple[Angle, Angle, Angle], Strict(False)]
-_Places = Annotated[tuple[Point, Point, Point], Strict(False)]
+_Axes = Annotated[tuple[Angle, ...], Strict(False), Field(min_length=1, max_length=360)]
+_Places = Annotated[tuple[Point, ...], Strict(False), Field(max_length=360)]
 
 
 class UltrasonicParameters(Parameters):
-    """SRF-05 range finders (Han 2019, 4.2)."""
+    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
 
-    axes_deg: _Triple = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, left to right, deg CCW from x."""
-    positions_m: _Places = ((0.0, 0.0), (0.0, 0.0), (0.0, 0.0))
-    """Places of the sensors from P, in B axes, m."""
+    axes_deg: _Axes = (30.0, 0.0, -30.0)
+    """Directions of the cones in B, left to right, deg CCW from x; or a whole number,
+    of as many all around."""
+    positions_m: _Places = ()
+    """Places of the sensors from P, in B axes, m; none: all at P."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
     """Half of each cone's opening angle, deg."""
     minimum_range_m: Length = 0.03
@@ -79,12 +82,56 @@ class UltrasonicParameters(Parameters):
                 f"{self.minimum_range_m} must be below "
                 f"maximum_range_m {self.maximum_range_m}",
             )
-        if not self.axes_deg[0] > self.axes_deg[1] > self.axes_deg[2]:
+        if any(b >= a for a, b in pairwise(self.axes_deg)):
             raise InputError(
                 "axes_deg",
-                f"{self.axes_deg} must fall from left to right, as 30, 0, -30",
+                f"{shortened(str(self.axes_deg), 80)} must fall from left to right, as "
+                "30, 0, -30",
+            )
+        if self.axes_deg[0] - self.axes_deg[-1] >= 360.0:
+            raise InputError(
+                "axes_deg",
+                f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or more; "
+                "end before the first direction comes again",
+            )
+        if self.positions_m and len(self.positions_m) != self.count:
+            raise InputError(
+                "positions_m",
+                f"has {len(self.positions_m)} places for {self.count} sensors of "
+                "axes_deg; give one each, or none",
             )
         return self
+
+    @field_validator("axes_deg", mode="before")
+    @classmethod
+    def _ring(cls, axes: Any) -> Any:
+        """So many directions all around, one of them ahead."""
+        if isinstance(axes, int) and not isinstance(axes, bool):
+            if not 1 <= axes <= 360:
+                raise InputError("", f"{axes} sensors; take 1 to 360")
+            return tuple(180.0 - 360.0 * k / axes for k in range(axes))
+        return axes
+
+    @property
+    def count(self) -> int:
+        """Number of sensors."""
+        return len(self.axes_deg)
+
+    @property
+    def places(self) -> tuple[tuple[float, float], ...]:
+        """Of the sensors from P, in B axes, m."""
+        return self.positions_m or ((0.0, 0.0),) * self.count
+
+    @cached_property
+    def neighbours(self) -> tuple[tuple[int, int], ...]:
+        """Pairs of sensors next to one another, the left one first."""
+        around = [*self.axes_deg, self.axes_deg[0] - 360.0]
+        pairs = [
+            (k, (k + 1) % self.count)
+            for k, (left, right) in enumerate(pairwise(around))
+            if left - right <= NEIGHBOURS_DEG
+        ]
+        return tuple(pair for pair in pairs if pair[0] != pair[1])
 
     @cached_property
     def axes(self) -> tuple[float, ...]:
@@ -93,14 +140,14 @@ class UltrasonicParameters(Parameters):
 
     @cached_property
     def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Axes (3,) in B, rad, places (3, 2) from P, m, and half angle, rad."""
+        """Axes (n,) in B, rad, places (n, 2) from P, m, and half angle, rad."""
         half_angle = math.radians(self.beam_half_angle_deg)
-        return np.array(self.axes), np.array(self.positions_m), half_angle
+        return np.array(self.axes), np.array(self.places), half_angle
 
     @property
     def round_ticks(self) -> int:
         """Ticks from one reading of a sensor to its next."""
-        return SENSORS if self.firing == "sequential" else 1
+        return self.count if self.firing == "sequential" else 1
 
     @cached_property
     def least_luck(self) -> float:
@@ -141,7 +188,7 @@ def cone_ranges(
         control_point_m: Distance of P ahead of the axle, m.
 
     Returns:
-        (3,) m; infinity where a cone is empty.
+        (n,) m; infinity where a cone is empty.
     """
     pose = np.asarray(pose_WB, dtype=np.float64)
     return fan_ranges(pose, rectangles, *parameters.beams, control_point_m)
@@ -156,14 +203,14 @@ def measured_ranges(
     """What the sensors report of the true ranges.
 
     Args:
-        true_ranges: (3,) m, infinity where a cone is empty.
+        true_ranges: (n,) m, infinity where a cone is empty.
         parameters: The sensors.
         sound_speed: True speed of sound, m/s.
-        numbers: (2, 3) standard normal: noise, and luck, which drops an echo
+        numbers: (2, n) standard normal: noise, and luck, which drops an echo
             where it is below the quantile of the probability of that.
 
     Returns:
-        (3,) ranges in [minimum, maximum], m, and (3,) echoes, 0 or 1. Without
+        (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without
         an echo the range is finite and means nothing.
     """
     stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
@@ -182,8 +229,9 @@ def _measured_ranges(
     low: float,
     high: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    ranges, echo = np.full(SENSORS, high), np.zeros(SENSORS)
-    for k in range(SENSORS):
+    count = len(true_ranges)
+    ranges, echo = np.full(count, high), np.zeros(count)
+    for k in range(count):
         noise, luck = numbers[0, k], numbers[1, k]
         if true_ranges[k] <= high and luck >= least_luck:
             measured = stretch * true_ranges[k] + noise_m * noise
@@ -193,7 +241,7 @@ def _measured_ranges(
 
 
 class UltrasonicArray(LeafSystem):
-    """Ranges of the nearest surfaces in three cones.
+    """Ranges of the nearest surfaces in cones, the papers' three or any others.
 
     .. pydrake_system::
 
@@ -216,8 +264,8 @@ class UltrasonicArray(LeafSystem):
     State: ranges and echoes of the last tick, for sequential firing.
     Rate and latency: a function of the present poses; no latency. Noise is
     drawn once a 25 ms tick. With ``firing: sequential`` one sensor fires a
-    tick, from left to right, and the others hold: ranges are 0, 25 and 50 ms
-    old, and a sensor's next comes after a round of 75 ms.
+    tick, from left to right, and the others hold: the ranges of three are 0, 25 and
+    50 ms old, and a sensor's next comes after a round of 75 ms.
 
     Args:
         parameters: The sensors.
@@ -228,14 +276,7 @@ class UltrasonicArray(LeafSystem):
         seed: Seed of the noise.
     """
 
-    FACTS = BlockFacts(
-        "ultrasonic",
-        "obstacle sensing",
-        columns={
-            "ranges": tuple(f"range_{k}" for k in range(1, SENSORS + 1)),
-            "echo": tuple(f"echo_{k}" for k in range(1, SENSORS + 1)),
-        },
-    )
+    FACTS = BlockFacts("ultrasonic", "obstacle sensing")
 
     def __init__(
         self,
@@ -255,6 +296,12 @@ class UltrasonicArray(LeafSystem):
         self._seed = seed
         check_finite("UltrasonicArray: source_size", source_size)
         self.set_name("ultrasonic_array")
+        count = self._parameters.count
+        columns = {
+            port: tuple(f"{name}_{k}" for k in range(1, count + 1))
+            for port, name in (("ranges", "range"), ("echo", "echo"))
+        }
+        self.FACTS = replace(self.FACTS, columns=columns)
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)
             for name, size in (
@@ -264,7 +311,8 @@ class UltrasonicArray(LeafSystem):
                 ("pose_WS", 3),
             )
         ]
-        held = np.r_[np.full(SENSORS, self._parameters.maximum_range_m), np.zeros(3)]
+        farthest = np.full(count, self._parameters.maximum_range_m)
+        held = np.concatenate([farthest, np.zeros(count)])
         self.DeclareDiscreteState(held)
         if self._parameters.firing == "sequential":
             self.DeclarePeriodicDiscreteUpdateEvent(
@@ -276,22 +324,22 @@ class UltrasonicArray(LeafSystem):
         for name, calc in (("ranges", self._calc_ranges), ("echo", self._calc_echo)):
             self.DeclareVectorOutputPort(
                 name=name,
-                size=SENSORS,
+                size=count,
                 calc=calc,
                 prerequisites_of_calc={self._readings.ticket()},
             )
         self.DeclareVectorOutputPort(
             name="range_ages",
-            size=SENSORS,
+            size=count,
             calc=self._calc_ages,
             prerequisites_of_calc={self.time_ticket()},
         )
 
     def _read(self, context: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(3,) ranges and (3,) echoes as they stand now."""
+        """(n,) ranges and (n,) echoes as they stand now."""
         pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
         tick = _tick(context)
-        numbers = standard_normals((2, SENSORS), self._seed, tick)
+        numbers = standard_normals((2, self._parameters.count), self._seed, tick)
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
         true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
         ranges, echo = measured_ranges(
@@ -299,8 +347,8 @@ class UltrasonicArray(LeafSystem):
         )
         if self._parameters.firing == "simultaneous":
             return ranges, echo
-        held = context.get_discrete_state(0).CopyToVector().reshape(2, SENSORS)
-        fires = tick % SENSORS
+        held = context.get_discrete_state(0).CopyToVector().reshape(2, -1)
+        fires = tick % self._parameters.count
         held[:, fires] = ranges[fires], echo[fires]
         return held[0], held[1]
 
@@ -315,7 +363,8 @@ class UltrasonicArray(LeafSystem):
 
     def _calc_ages(self, context: Any, output: Any) -> None:
         tick, round_ = _tick(context), self._parameters.round_ticks
-        ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in range(SENSORS)]
+        numbers = range(self._parameters.count)
+        ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in numbers]
         output.SetFromVector(ages)
 
 

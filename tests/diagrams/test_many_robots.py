@@ -139,7 +139,7 @@ def test_each_robot_has_an_end_of_its_own():
 
 @pytest.fixture(scope="module")
 def convoy() -> RunResult:
-    return simulate(load_scenario("convoy", ["duration_s=16"]))
+    return simulate(load_scenario("convoy", ["duration_s=12"]))
 
 
 def test_a_robot_is_heard_by_its_follower(convoy):
@@ -201,7 +201,7 @@ def test_frames_that_can_hold_the_sound(time, may):
 
 
 def test_both_followers_of_one_source_complete():
-    result = simulate(load_scenario("two_followers"))
+    result = simulate(load_scenario("two_followers", ["hearing=ideal"]))
     assert {own.cause for own in result.robots.values()} == {"completed"}
     assert result.cause == "completed"
 

@@ -93,6 +93,9 @@ FIELDS = {
 LENGTHS = {
     "Scenario.name": (1, None),
     "Scenario.law": (1, None),
+    "Scenario.blocks": (None, 32),
+    "UltrasonicParameters.axes_deg": (1, 360),
+    "UltrasonicParameters.positions_m": (None, 360),
     "Scenario.obstacles": (None, 100),
     "Scenario.robots": (None, 16),
     "Scenario.sources": (None, 16),
