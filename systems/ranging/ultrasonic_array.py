@@ -312,7 +312,7 @@ class UltrasonicArray(LeafSystem):
             )
         ]
         farthest = np.full(count, self._parameters.maximum_range_m)
-        held = np.concatenate([farthest, np.zeros(count)])
+        held: Any = np.concatenate([farthest, np.zeros(count)])
         self.DeclareDiscreteState(held)
         if self._parameters.firing == "sequential":
             self.DeclarePeriodicDiscreteUpdateEvent(
