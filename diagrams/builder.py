@@ -197,8 +197,8 @@ class _World:
         """The obstacles' port, or it and others one after the other."""
         first = self.obstacles.GetOutputPort(port)
         ports = [each for each in (first, *more) if each.size()]
-        if not more:
-            return first
+        if len(ports) < 2:
+            return ports[0] if ports else first
         multiplexer = Multiplexer([each.size() for each in ports])
         self.builder.AddNamedSystem(f"{port}_for_{name}", multiplexer)
         for index, each in enumerate(ports):

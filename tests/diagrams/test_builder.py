@@ -86,7 +86,7 @@ def test_other_sources_are_wired_to_the_microphones():
     assert found["robot", "pose_WS"] == ("source", "pose_WS")
     for name in ("fan", "drill"):
         assert found["robot", f"emission_{name}"] == (name, "emission")
-    assert found["robot", "poses_WO"] == ("poses_WO_for_robot", "y0")
+    assert found["robot", "poses_WO"] == ("fan", "pose_WS"), "the drill has no body"
     assert follower.robots["robot"].diagram.GetInputPort("poses_WO").size() == 3
 
 
