@@ -1,0 +1,89 @@
+"""What a run has beside its robots."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, Strict, StringConstraints
+
+from systems.base.source_robot import SourceRobotParameters
+from systems.framework.parameters import (
+    Duration,
+    Fraction,
+    Length,
+    Parameters,
+    Size,
+    Speed,
+)
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.room import RoomParameters
+from systems.sound.waveforms import SoundParameters
+from systems.world.obstacles import ObstacleParameters
+
+__all__ = ["IntegratorParameters", "RunParameters", "StopParameters"]
+
+_Name = Annotated[str, StringConstraints(pattern=r"\A[a-z][a-z0-9_]*\z")]
+_Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
+
+
+class StopParameters(Parameters):
+    """When a run ends, and what counts as following."""
+
+    goal_margin_m: Length = 0.3
+    """Goal of a resting source: P within the follow distance plus this, m."""
+    rest_speed_m_s: Speed = 0.05
+    """At rest: P is slower than this, m/s."""
+    rest_time_s: Duration = 1.0
+    """Reached: P is in the goal and at rest for so long without a break, s."""
+    following_band_m: Length = 0.8
+    """Following: P is this near to the follow distance, m."""
+    following_share: Fraction = 0.5
+    """Completed: P follows in this share of the time since the first detection."""
+    stuck_after_s: Duration = 10.0
+    """Stuck: P stays within ``stuck_radius_m`` for so long, outside of its goal."""
+    stuck_radius_m: Length = 0.1
+    """See ``stuck_after_s``, m."""
+    lost_after_s: Duration = 20.0
+    """Lost: no valid target for so long, s."""
+    diverged_range_m: Length = 20.0
+    """Diverged: the source is farther away than this, m."""
+
+
+class IntegratorParameters(Parameters):
+    """How Drake integrates the plant, with a fixed step."""
+
+    scheme: Literal["runge_kutta2", "runge_kutta3", "runge_kutta5"] = "runge_kutta3"
+    """Nothing changes between ticks but the motor lag's decay: one third-order
+    step a tick stays within 20 um of the true path over 20 s."""
+    step_s: float = Field(default=0.025, ge=1e-5, le=0.025)
+    """Largest step, s."""
+
+
+class RunParameters(Parameters):
+    """What a run has beside its robots: name, seed, world, sources, end."""
+
+    name: str = Field(default="default", min_length=1, pattern=r"\A[^\n]*\z")
+    """Name in results."""
+    description: str = Field(default="", pattern=r"\A[^\n]*\z")
+    """One line for ``phonotaxis scenarios``."""
+    seed: int = Field(default=1, ge=0, lt=2**63)
+    """Every random number of the run comes from it."""
+    duration_s: float = Field(default=40.0, ge=1e-9, le=3_600.0)
+    """Longest simulated time, s; an hour at most."""
+    arena_m: Size = (7.0, 7.0)
+    """Extents of the floor in pictures, m; it has no walls."""
+    robots: _Participants = Field(default={})
+    """By name, what each robot has other than the scenario says of a robot; empty:
+    one, named ``robot``, that has nothing other."""
+    sources: _Participants = Field(default={})
+    """By name, what each source has other than ``source`` and ``sound`` say; empty:
+    one, named ``source``."""
+    source: SourceRobotParameters = SourceRobotParameters()
+    sound: SoundParameters = SoundParameters()
+    obstacles: Annotated[
+        tuple[ObstacleParameters, ...], Strict(False), Field(max_length=100)
+    ] = ()
+    stop: StopParameters = StopParameters()
+    acoustics: AcousticParameters = AcousticParameters()
+    room: RoomParameters | None = None
+    integrator: IntegratorParameters = IntegratorParameters()
