@@ -37,6 +37,13 @@ def safe_norm(x: Any, y: Any) -> Any:
 
     Accepts floats and AutoDiffXd. Differs from the exact norm by at most
     1e-12.
+
+    Args:
+        x: First component, in any unit.
+        y: Second component, in the same one.
+
+    Returns:
+        In that unit, above 0; AutoDiffXd where a component is.
     """
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
@@ -46,6 +53,14 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
 
     Accepts floats and AutoDiffXd. This is R = [[cos, -sin], [sin, cos]], the
     transpose of what Han 2019, eq. 15 prints.
+
+    Args:
+        theta: Angle of the inner frame in the outer one, rad.
+        x: First component in the inner frame.
+        y: Second component in it.
+
+    Returns:
+        (x, y) in the outer frame, in the unit of the components.
     """
     c, s = cos(theta), sin(theta)
     return c * x - s * y, s * x + c * y
@@ -57,6 +72,9 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
     Args:
         pose: (x, y, theta) of the body frame in W; floats or AutoDiffXd.
         offset: Distance epsilon of P ahead of the origin, m.
+
+    Returns:
+        (x, y) in W, m.
     """
     x, y, theta = pose
     return x + offset * cos(theta), y + offset * sin(theta)
@@ -69,6 +87,9 @@ def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[An
         theta: Heading of the body frame in W, rad; a number or an array.
         velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each as theta.
         offset: Distance epsilon of P ahead of the origin, m.
+
+    Returns:
+        (vx, vy) in W, m/s, of the shape of theta.
     """
     vx, vy, omega = velocity
     turning = omega * offset
@@ -200,7 +221,7 @@ def fan_ranges(
     half_angle: float,
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """``cone_range`` of each sensor of a body, (n,) m.
+    """``cone_range`` of each sensor of a body.
 
     Args:
         pose_WB: (3,) x, y, theta of the body, m and rad.
@@ -209,6 +230,9 @@ def fan_ranges(
         places: (n, 2) sensors from P in B axes, m.
         half_angle: Half of the opening angle, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
+
+    Returns:
+        (n,) m; infinite where a cone is empty.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
