@@ -116,6 +116,9 @@ def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBou
         scenario: Gains, law and the source's corner radius.
         runs: Simulated encounters a speed.
 
+    Returns:
+        A row a speed below the top speed, for the source and for the obstacle.
+
     Raises:
         InputError: The law is not known.
         ValueError: The law has no radial force.
@@ -153,6 +156,9 @@ def source_bound(
         speed: Largest |v_S|, m/s.
         acceleration: Largest |a_S|, m/s^2.
         simulate: Whether to add a run at constant speed.
+
+    Returns:
+        Bound, offsets and peaks of the stretch, m.
     """
     disturbance = model.damping_n_s_m * speed + model.mass_kg * acceleration
     bounds = [
@@ -272,7 +278,7 @@ def encounter_contact_time(
     reach_m: float,
     duration_s: float,
 ) -> NDArray[np.float64]:
-    """(n,) times of contact with a box that comes from ahead, s; infinity: none.
+    """Times of contact with a box that comes from ahead.
 
     P rests at its follow point, the source behind it; the box moves towards P
     and on, its centre off the line by the given distances.
@@ -284,6 +290,9 @@ def encounter_contact_time(
         offsets_m: (n,) distances of the box's path from P, m.
         reach_m: Distance of the box from P at the start, m.
         duration_s: Simulated time, s.
+
+    Returns:
+        (n,) s from the start; infinity: none.
     """
     count = len(offsets_m)
     p = np.zeros((count, 2))
