@@ -47,7 +47,15 @@ def _nearest(
 
 @njit(cache=True)
 def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (compiled)
-    """(n, bodies) distances of points (n, 2), m; 0 inside a body."""
+    """Distances of points from bodies; 0 inside a body.
+
+    Args:
+        points: (n, 2) in W, m.
+        bodies: (k, 6), see above.
+
+    Returns:
+        (n, k) m.
+    """
     out = np.empty((points.shape[0], bodies.shape[0]))
     for i in range(points.shape[0]):
         for k in range(bodies.shape[0]):
@@ -134,7 +142,18 @@ def _force(
 def forces(
     states: _Array, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
 ) -> _Array:  # pragma: no cover  (compiled)
-    """(n, 2) sum of all forces at states (n, 4), N."""
+    """Sum of all forces at some states.
+
+    Args:
+        states: (n, 4) x, y, vx, vy, m and m/s.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        (n, 2) in W, N.
+    """
     out = np.empty((states.shape[0], 2))
     for i in range(states.shape[0]):
         state = (states[i, 0], states[i, 1], states[i, 2], states[i, 3])
@@ -212,7 +231,22 @@ def run(
     gains: _Gains,
     tables: _Tables,
 ) -> tuple[_Array, _Array, _Array, _Array]:  # pragma: no cover
-    """Contact times, closest distances, rises of V and ends of starts (n, 4)."""
+    """Integrates starts until contact or the end.
+
+    Args:
+        starts: (n, 4) x, y, vx, vy, m and m/s.
+        steps: Most steps.
+        h: Step, s.
+        contact: P nearer to a body is contact, m.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        Times of contact (n,), s, infinite without; least distances (n,), m; largest
+        rises of V above its least value so far (n,), J; and ends (n, 4).
+    """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
     rises, ends = np.zeros(count), np.empty((count, 4))
@@ -241,7 +275,20 @@ def trajectory(
     gains: _Gains,
     tables: _Tables,
 ) -> _Array:  # pragma: no cover
-    """(steps + 1, 4) states from one start (4,), h apart."""
+    """States from one start; contact is ignored.
+
+    Args:
+        start: (4,) x, y, vx, vy, m and m/s.
+        steps: Number of steps.
+        h: Step, s.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        (steps + 1, 4), h apart.
+    """
     out = np.empty((steps + 1, 4))
     out[0] = start
     state = (start[0], start[1], start[2], start[3])
