@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from analysis.models.point_mass import PointMass, point_mass
 from analysis.nonlinear.velocity_passivity import velocity_term_passivity
 from diagrams import Scenario
+from systems.world.geometry import beyond_each
 
 __all__ = [
     "DisturbanceBounds",
@@ -302,7 +303,7 @@ def encounter_contact_time(
     times = np.full(count, np.inf)
     for k in range(round(duration_s / _STEP_S)):
         gap = box - p
-        nearest = np.sign(gap) * np.maximum(np.abs(gap) - 0.5 * _SIDE_M, 0.0)
+        nearest = beyond_each(gap, 0.5 * _SIDE_M)
         c = np.hypot(*nearest.T)
         times = np.where((c <= contact_m) & np.isinf(times), k * _STEP_S, times)
         f = model.law.at_rest(c)

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
+from systems.world.geometry import beyond
 
 __all__ = ["distances", "forces", "run", "trajectory"]
 
@@ -34,13 +35,8 @@ def _nearest(
     """Vector to the nearest point, its length, and whether that is a corner."""
     dx, dy = x - body[0], y - body[1]
     u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
-    du = max(0.0, abs(u) - body[4])
-    dv = max(0.0, abs(v) - body[5])
-    corner = du > 0.0 and dv > 0.0
-    if u > 0.0:
-        du = -du
-    if v > 0.0:
-        dv = -dv
+    du, dv = -beyond(u, body[4]), -beyond(v, body[5])
+    corner = du != 0.0 and dv != 0.0
     cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
     return cx, cy, math.sqrt(cx * cx + cy * cy), corner
 
