@@ -72,7 +72,12 @@ class LivePath:
         self._then = self._now = 0.0, pose
 
     def move(self, time: float, pose: Sequence[float]) -> None:
-        """The next tick, at a time in s."""
+        """The next tick, at a time in s.
+
+        Args:
+            time: Of the tick, s.
+            pose: x, y, theta in W, m and rad.
+        """
         x, y, theta = pose
         self._then, self._now = self._now, (time, (x, y, theta))
 

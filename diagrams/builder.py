@@ -74,7 +74,15 @@ class SoundFollower:
         return self.only.logged
 
     def port(self, part: str, name: str) -> Any:
-        """Output port of a block of the only robot, its source or the obstacles."""
+        """Output port of a block of the only robot, its source or the obstacles.
+
+        Args:
+            part: A key of ``blocks``.
+            name: Of the port.
+
+        Returns:
+            The port; its value is read in the block's own context.
+        """
         return self.blocks[part].GetOutputPort(name)
 
 
@@ -88,6 +96,9 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     Args:
         scenario: What to build.
         log: Whether each robot logs what its blocks name columns for.
+
+    Returns:
+        The diagram, and its blocks by robot, source and part.
 
     Raises:
         InputError: The law is not known.

@@ -19,6 +19,9 @@ def explain(error: ValidationError, model: type[BaseModel], what: str) -> InputE
         error: What pydantic found.
         model: The model that it validated.
         what: What the model is to a user, as 'a scenario'.
+
+    Returns:
+        The error, to be raised.
     """
     first = error.errors(include_url=False)[0]
     field = ".".join(str(part) for part in first["loc"])

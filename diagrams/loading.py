@@ -121,7 +121,12 @@ def read_mapping(path: Path) -> dict[str, Any]:
 
 
 def resolve_sound(data: dict[str, Any], folder: Path) -> None:
-    """A relative sound file lies beside the scenario, or where one works."""
+    """A relative sound file lies beside the scenario, or where one works.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        folder: That of the file that the fields are from, or the working directory.
+    """
     for place in [
         data,
         *_participants(data, "robots"),

@@ -25,6 +25,9 @@ def with_own_blocks(
         names: Of the user's own; one stands in the place of ours of its part.
         parts: What a block may ask for, see ``make_own_block``.
 
+    Returns:
+        Blocks by part: a copy with the user's own in their places.
+
     Raises:
         InputError: Two of them have one part, or see ``make_own_block``.
     """
@@ -47,6 +50,9 @@ def make_own_block(name: str, parts: Mapping[str, Any]) -> Any:
     Args:
         name: ``package.module:Name`` or ``path/to/file.py:Name``.
         parts: What its ``__init__`` may ask for, by the names of its arguments.
+
+    Returns:
+        The block, a LeafSystem with a name.
 
     Raises:
         InputError: There is no such block, it does not say what it is, or it cannot

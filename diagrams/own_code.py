@@ -25,6 +25,9 @@ def import_own(name: str, field: str) -> Any:
             up in the working directory, too.
         field: Of the scenario, which names it.
 
+    Returns:
+        What has that name; it can be called.
+
     Raises:
         InputError: There is none, or its module cannot be imported.
     """
@@ -74,6 +77,9 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
     Args:
         name: Of a law or a block; those of the package have none.
         field: Of the scenario, which names it.
+
+    Returns:
+        Absolute paths in ascending order; none for a name of the package.
     """
     if ":" not in name:
         return ()

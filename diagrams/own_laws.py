@@ -17,7 +17,16 @@ __all__ = ["checked_law", "try_law"]
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
-    """The law, with an error that names it where it does not return a force."""
+    """The law, with an error that names it where it does not return a force.
+
+    Args:
+        name: Of the law, for messages.
+        law: ``law(c, s, repulsion)``; returns a force, N.
+
+    Returns:
+        A function of the same arguments. It returns a finite float or AutoDiffXd, N, or
+        raises InputError.
+    """
 
     def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
         try:
@@ -47,6 +56,12 @@ def try_law(
     top_speed_m_s: float,
 ) -> None:
     """Calls a law near and far, at rest and fast, as a run will.
+
+    Args:
+        law: From ``checked_law``.
+        repulsion: Gains of all laws.
+        range_m: Largest distance that is tried, m.
+        top_speed_m_s: Largest speed that is tried, m/s.
 
     Raises:
         InputError: It does not return a force everywhere.

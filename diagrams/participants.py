@@ -101,6 +101,9 @@ def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any
     Args:
         base: The tree.
         changes: A tree of the leaves to change, or to add.
+
+    Returns:
+        A new tree; neither argument is changed.
     """
     result = dict(base)
     for key, value in changes.items():

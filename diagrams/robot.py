@@ -56,7 +56,15 @@ class Parts:
     """What the log holds, in order: the columns of each (part, port)."""
 
     def port(self, part: str, name: str) -> Any:
-        """Output port of a block."""
+        """Output port of a block.
+
+        Args:
+            part: A key of ``blocks``.
+            name: Of the port.
+
+        Returns:
+            The port; its value is read in the block's own context.
+        """
         return self.blocks[part].GetOutputPort(name)
 
 
@@ -78,7 +86,15 @@ def parts_of(diagram: Diagram) -> Parts:
 
 
 def block_seed(seed: int, name: str) -> int:
-    """A block's own seed: depends on the scenario's seed and its name alone."""
+    """A block's own seed: depends on the scenario's seed and its name alone.
+
+    Args:
+        seed: Of the scenario.
+        name: Of the block.
+
+    Returns:
+        A whole number from 0 to 2^64 - 1.
+    """
     sequence = np.random.SeedSequence([seed, crc32(name.encode())])
     return int(sequence.generate_state(1, np.uint64)[0])
 
@@ -178,6 +194,9 @@ def make_source(
         name: Of the source; its random numbers depend on it.
         source: Its path, drive and sound.
         audible: Whether anybody hears its sound as waves.
+
+    Returns:
+        The diagram; its name is that of the source.
 
     Raises:
         InputError: Its sound file cannot be played.

@@ -115,6 +115,9 @@ def gather_result(
         robots: Each robot's parts, with their logs.
         context: Of the whole diagram.
         wall_s: Time that the simulation took, s.
+
+    Returns:
+        Of the only robot, or of all with each in ``several``.
     """
     logs = {name: _logged(parts, context) for name, parts in robots.items()}
     paths = {

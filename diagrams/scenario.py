@@ -126,6 +126,9 @@ class Scenario(FollowerParameters, RunParameters):
         Args:
             robot: Its name; empty: the first one.
             paths: Of the other robots; without them they rest at their starts.
+
+        Returns:
+            Bodies by name, what it follows last.
         """
         robot = robot or next(iter(self.all_robots))
         target, paths = self.target(robot), paths or {}

@@ -33,6 +33,9 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
         text: One document.
         field: Begins the message of an error.
 
+    Returns:
+        Mappings, lists and scalars; None of an empty text.
+
     Raises:
         InputError: It is not YAML, has more than 100 kB, is nested more than 20
             deep, or its aliases stand for more than a million characters.

@@ -90,12 +90,15 @@ class CertificateTrials:
 def draw_starts(
     certificate: EnergyCertificate, count: int, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """(n, 4) starts: places uniform on the free floor, velocities in the disc.
+    """Starts at random: places uniform on the free floor, velocities in the disc.
 
     Args:
         certificate: Gives the floor and the top speed.
         count: Places drawn; those in contact are dropped.
         rng: Source of random numbers.
+
+    Returns:
+        (n, 4) x, y, vx, vy, m and m/s; n is at most ``count``.
     """
     half = 0.5 * certificate.cell_m
     x, y = certificate.x_m, certificate.y_m
@@ -118,6 +121,9 @@ def try_certificate(
         certificate: What to try.
         starts: Starts inside, and outside as far as some are found.
         duration_s: Simulated time of each, s.
+
+    Returns:
+        How the runs ended, and which shares of the drawn starts are certified.
 
     Raises:
         InputError: There is nothing to try.

@@ -96,6 +96,9 @@ def try_diagram(
             second a run.
         progress: Called with the share that is done.
 
+    Returns:
+        Starts of P, and how each run ended.
+
     Raises:
         InputError: No start is certified, the wheels can slip, or ``starts`` is
             wrong.

@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 from analysis.models.point_mass import PointMass, point_mass
 from analysis.nonlinear.velocity_passivity import velocity_term_passivity
 from diagrams import Scenario
+from systems.world.geometry import beyond_each
 
 __all__ = [
     "DisturbanceBounds",
@@ -116,6 +117,9 @@ def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBou
         scenario: Gains, law and the source's corner radius.
         runs: Simulated encounters a speed.
 
+    Returns:
+        A row a speed below the top speed, for the source and for the obstacle.
+
     Raises:
         InputError: The law is not known.
         ValueError: The law has no radial force.
@@ -153,6 +157,9 @@ def source_bound(
         speed: Largest |v_S|, m/s.
         acceleration: Largest |a_S|, m/s^2.
         simulate: Whether to add a run at constant speed.
+
+    Returns:
+        Bound, offsets and peaks of the stretch, m.
     """
     disturbance = model.damping_n_s_m * speed + model.mass_kg * acceleration
     bounds = [
@@ -272,7 +279,7 @@ def encounter_contact_time(
     reach_m: float,
     duration_s: float,
 ) -> NDArray[np.float64]:
-    """(n,) times of contact with a box that comes from ahead, s; infinity: none.
+    """Times of contact with a box that comes from ahead.
 
     P rests at its follow point, the source behind it; the box moves towards P
     and on, its centre off the line by the given distances.
@@ -284,6 +291,9 @@ def encounter_contact_time(
         offsets_m: (n,) distances of the box's path from P, m.
         reach_m: Distance of the box from P at the start, m.
         duration_s: Simulated time, s.
+
+    Returns:
+        (n,) s from the start; infinity: none.
     """
     count = len(offsets_m)
     p = np.zeros((count, 2))
@@ -293,7 +303,7 @@ def encounter_contact_time(
     times = np.full(count, np.inf)
     for k in range(round(duration_s / _STEP_S)):
         gap = box - p
-        nearest = np.sign(gap) * np.maximum(np.abs(gap) - 0.5 * _SIDE_M, 0.0)
+        nearest = beyond_each(gap, 0.5 * _SIDE_M)
         c = np.hypot(*nearest.T)
         times = np.where((c <= contact_m) & np.isinf(times), k * _STEP_S, times)
         f = model.law.at_rest(c)

@@ -103,11 +103,14 @@ class EnergyCertificate:
         return np.minimum(slowest, top)
 
     def certified(self, states: ArrayLike, *, clamp: bool = True) -> NDArray[np.bool_]:
-        """(n,) whether starts (n, 4) never collide, on the grid or not at all.
+        """Whether starts never collide, on the grid or not at all.
 
         Args:
-            states: x, y, vx, vy, m and m/s.
+            states: (n, 4) x, y, vx, vy, m and m/s.
             clamp: Whether the limit on |v| may be used as well as the energy.
+
+        Returns:
+            (n,) False off the grid, in contact, and above the top speed.
         """
         states = np.asarray(states, dtype=float)
         i = np.floor((states[:, 0] - self.x_m[0]) / self.cell_m + 0.5).astype(int)
@@ -163,9 +166,13 @@ def certify_energy(
 
     Args:
         scenario: Bodies are taken to rest where they are at 0 s.
-        cell_m: Side of a cell; finer cells certify more.
-        contact_m: Contact distance of P; none: the sensors' least range.
+        cell_m: Side of a cell, m; finer cells certify more.
+        contact_m: Contact distance of P, m; none: the sensors' least range.
         velocity_term: Another term than the scenario's.
+
+    Returns:
+        Levels on a grid of cells, J, and the cells from which no speed leads to
+        contact.
 
     Raises:
         InputError: The law is not known.

@@ -23,7 +23,13 @@ __all__ = [
 
 
 def draw_bodies(axes: Axes, model: PointMass, *, start: bool = True) -> None:
-    """Obstacles, the source's body, the follow distance and P at the start."""
+    """Obstacles, the source's body, the follow distance and P at the start.
+
+    Args:
+        axes: Where to draw; gets labels, and one scale for x and y.
+        model: Bodies, source and start, in W.
+        start: Whether to mark P at the start.
+    """
     for k, rectangle in enumerate(model.rectangles):
         is_source = k == len(model.rectangles) - 1
         colour = COLOURS["source" if is_source else "obstacle"]

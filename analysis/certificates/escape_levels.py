@@ -25,6 +25,16 @@ def cell_bounds(
 
     The third has a row a body; it is infinite where the cell holds no point of
     contact with it.
+
+    Args:
+        model: Bodies and potential.
+        points: (n, 2) centres of square cells, m.
+        cell_m: Side of the cells, m.
+        contact_m: P nearer to a body than this is in contact, m.
+
+    Returns:
+        Least and largest potential (n,), J, energy at contact (bodies, n), J, and (n,)
+        whether all of the cell is in contact.
     """
     radius = cell_m / math.sqrt(2.0)
     r = np.hypot(*(points - model.p_WS).T)
@@ -62,6 +72,15 @@ def climb(
 
     Dijkstra's algorithm with the largest instead of the sum: cells are settled
     in the order of their levels; paths go to all eight neighbours.
+
+    Args:
+        lower: (nx, ny) least potential in each cell, J.
+        seeds: (nx, ny) energy at contact within the cell, J; infinite where there is
+            none.
+        blocked: (nx, ny) cells wholly in contact, which no path crosses.
+
+    Returns:
+        (nx, ny) J; infinite where no path leads to contact.
     """
     nx, ny = lower.shape
     level = np.full((nx, ny), np.inf)
@@ -89,7 +108,15 @@ def climb(
 def flood(
     sources: NDArray[np.bool_], walls: NDArray[np.bool_]
 ) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
-    """Cells that can be reached from the sources without crossing walls."""
+    """Cells that can be reached from the sources without crossing walls.
+
+    Args:
+        sources: (nx, ny) cells to begin in.
+        walls: (nx, ny) cells that no path enters.
+
+    Returns:
+        (nx, ny) whether each cell is reached; paths go to all eight neighbours.
+    """
     nx, ny = sources.shape
     reached = np.zeros((nx, ny), dtype=np.bool_)
     stack = [(-1, -1)]

@@ -70,7 +70,15 @@ class Polynomial:
 def gram_polynomial(
     basis: Sequence[Monomial], gram: Sequence[Sequence[Fraction]]
 ) -> Polynomial:
-    """z' G z of monomials z."""
+    """z' G z of monomials z.
+
+    Args:
+        basis: The k monomials z, as exponents of the variables.
+        gram: k rows of k rational numbers, G.
+
+    Returns:
+        The sum of all products, as a polynomial with rational coefficients.
+    """
     out: dict[Monomial, Fraction | float | int] = {}
     for i, m in enumerate(basis):
         for j, n in enumerate(basis):
@@ -86,6 +94,11 @@ def match_gram(
 
     What is missing in a coefficient is spread evenly over the entries that make
     it.
+
+    Args:
+        target: The polynomial to be made.
+        basis: The k monomials z, as exponents of the variables.
+        gram: k rows of k floats; only their symmetric part counts.
 
     Returns:
         Symmetric rows, or None where the basis cannot make the target.

@@ -134,7 +134,15 @@ def _falling(model: LagModel, P: NDArray[Any], y: NDArray[Any], sign: float) -> 
 
 
 def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
-    """The program that looks for multipliers of the region of P."""
+    """The program that looks for multipliers of the region of P.
+
+    Args:
+        model: Polynomial rates of the state.
+        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+
+    Returns:
+        The program, and its Gram matrices, one for either sign of the error of h.
+    """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
     z, s = _monomials(_SUM_BASIS, y), _monomials(_MULTIPLIER_BASIS, y)
@@ -156,7 +164,15 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
 def solve(
     solver: SolverInterface, program: MathematicalProgram
 ) -> MathematicalProgramResult | None:
-    """What the solver finds; none: it says that there is no solution."""
+    """What the solver finds; none: it says that there is no solution.
+
+    Args:
+        solver: What solves semidefinite programs.
+        program: What is to be solved.
+
+    Returns:
+        The solution, or None.
+    """
     result = solver.Solve(program)
     return result if result.is_success() else None
 
@@ -164,7 +180,15 @@ def solve(
 def find_multipliers(
     model: LagModel, P: NDArray[np.float64]
 ) -> list[NDArray[np.float64]] | None:
-    """Multipliers for the region as it is; none: V does not fall all over it."""
+    """Multipliers for the region as it is; none: V does not fall all over it.
+
+    Args:
+        model: Polynomial rates of the state.
+        P: (3, 3) symmetric; the region is y' P y <= 1, y the scaled state.
+
+    Returns:
+        Their Gram matrices, one for either sign of the error of h, or None.
+    """
     problem = feasibility(model, P)
     result = solve(ClarabelSolver(), problem.program)
     if result is None:
@@ -175,7 +199,16 @@ def find_multipliers(
 def larger_region(
     model: LagModel, P: NDArray[np.float64], multipliers: list[NDArray[np.float64]]
 ) -> NDArray[np.float64]:
-    """P of a larger region inside the box, the multipliers held."""
+    """P of a larger region inside the box, the multipliers held.
+
+    Args:
+        model: Polynomial rates, and the box of the domain.
+        P: (3, 3) of the region that is to grow.
+        multipliers: Gram matrices, from ``find_multipliers``.
+
+    Returns:
+        (3, 3) symmetric; P itself where the solver finds none.
+    """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
     new: Any = program.NewSymmetricContinuousVariables(3, "P")
@@ -216,6 +249,15 @@ def is_proved(
     The multipliers are what the solver found, as rationals; the sum's Gram
     matrix is moved until it makes -V' - sigma (1 - V) exactly, and then must be
     positive definite. So must P and its blocks with the faces of the box.
+
+    Args:
+        model: Polynomial rates, and the box of the domain.
+        P: (3, 3) of the region.
+        problem: What was solved for P.
+        result: What the solver found; None: nothing.
+
+    Returns:
+        True only where every step holds exactly.
     """
     if result is None:
         return False

@@ -117,6 +117,9 @@ def sos_region(
         to_go_m: See ``head_on``.
         starts: Simulated starts, inside the region and in the domain.
 
+    Returns:
+        P of the region, whether it is proved, and how its starts fared.
+
     Raises:
         InputError: The law is not known.
         ValueError: There is no contact equilibrium, or it is unstable with the

@@ -92,6 +92,9 @@ def make_cell(
         fields: Values of the grid.
         rows: Its runs, in the order of the layouts.
         seed: Of the bootstraps.
+
+    Returns:
+        Rates, medians with intervals, causes and examples.
     """
     others = {key: value for key, value in fields.items() if key != "law"}
     success, collision = successes(rows), collisions(rows)

@@ -127,7 +127,16 @@ def collision_free(scenario: str) -> Judge:
 
 
 def avoids_more(scenario: str, law: str, baseline: str = "conventional") -> Judge:
-    """A law collides on fewer layouts than the one that its paper compares it with."""
+    """A law collides on fewer layouts than the one that its paper compares it with.
+
+    Args:
+        scenario: Of the comparison.
+        law: That collides less, as the paper says.
+        baseline: The law that it is compared with.
+
+    Returns:
+        From a comparison's summary to our figure and a verdict, both as text.
+    """
 
     def judge(summary: dict[str, Any]) -> tuple[str, str]:
         pair = _pair(summary, scenario, baseline, law)["collision"]

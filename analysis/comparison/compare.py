@@ -123,6 +123,9 @@ def comparison_plan(
         settings: Further fields of the scenario, by dotted path.
         grid: Further fields to compare, with their values.
 
+    Returns:
+        The sweep: ``law`` is the first axis of its grid, and ``pair`` is set.
+
     Raises:
         InputError: Something of that is unknown or no good; names the field.
     """
@@ -156,6 +159,9 @@ def prepare_comparison(
         out: The directory; none: the next number under results/.
         workers: Number of processes; none: one a core.
         resume: Whether ``out`` may hold runs of the same comparison.
+
+    Returns:
+        The comparison, to be run once; its directories are locked until then.
 
     Raises:
         InputError: Something of that is no good; says what, and the remedy.

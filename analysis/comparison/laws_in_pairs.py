@@ -72,6 +72,9 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
         plan: Its grid has ``law``, and perhaps more fields.
         table: Its results; see ``analysis.sweeps.store.load_results``.
         scenario: Name of the experiment.
+
+    Returns:
+        A cell a law, and every two laws on the same layouts.
     """
     cells = [
         make_cell(scenario, fields, rows, plan.seed)

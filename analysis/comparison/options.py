@@ -38,6 +38,9 @@ def comparison_plans(
         settings: ``key=value``.
         grid: ``key=[value, ...]``.
 
+    Returns:
+        In the order of ``scenarios``; names without folder and ending.
+
     Raises:
         InputError: A word is no good; names the option or the field.
     """

@@ -59,6 +59,9 @@ def paired_rate(
         first: (n,) whether the first method did it, n >= 1.
         second: (n,) the same of the second, on the same layouts.
         confidence: Of the interval.
+
+    Returns:
+        Difference of the rates, -1 to 1, with its interval and McNemar's exact test.
     """
     from scipy.stats import binomtest, norm
 
@@ -91,6 +94,9 @@ def paired_median(
         second: (n,) the same of the second, on the same layouts.
         seed: Of the bootstrap.
         confidence: Of the interval.
+
+    Returns:
+        In the figure's unit; None where no layout has both figures.
     """
     from scipy.stats import wilcoxon
 

@@ -36,7 +36,16 @@ def compare_summary(
     comparisons: dict[str, Comparison],
     pooled: Sequence[Pair],
 ) -> dict[str, Any]:
-    """The JSON document of a comparison."""
+    """The JSON document of a comparison.
+
+    Args:
+        prepared: Plans and directory.
+        comparisons: Cells and pairs by scenario.
+        pooled: Pairs of laws over all scenarios together.
+
+    Returns:
+        Plain values, to be written as JSON.
+    """
     plan = next(iter(prepared.sweeps.values())).plan
     cells, pairs = [], []
     for name, comparison in comparisons.items():
@@ -73,6 +82,12 @@ def write_comparison(
 
     ``summary.json``, ``rates.png``, a picture of examples an experiment, and
     under ``examples/`` a scenario for each of them that can be run again.
+
+    Args:
+        prepared: Its directory exists.
+        comparisons: Cells and pairs by scenario.
+        summary: From ``compare_summary``.
+        progress: Called with the number of example runs done.
     """
     from analysis.comparison.plots import plot_examples, plot_rates
 
@@ -124,7 +139,16 @@ def compare_text(
     comparisons: dict[str, Comparison],
     pooled: Sequence[Pair],
 ) -> str:
-    """Tables for a terminal."""
+    """Tables for a terminal.
+
+    Args:
+        summary: From ``compare_summary``.
+        comparisons: Cells and pairs by scenario.
+        pooled: Pairs of laws over all scenarios together.
+
+    Returns:
+        Lines without an end of line after the last one.
+    """
     lines = [
         f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
         "In brackets: 95 % intervals.",

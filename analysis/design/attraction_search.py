@@ -49,6 +49,13 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
     D_r/K_r follows from the lag behind a moving source, K_r from the damping
     ratio, the follow distance from the overshoot and from the offsets.
 
+    Args:
+        scenario: Robot, plant, source, sensors and laws.
+        requirements: What is to be met.
+
+    Returns:
+        A copy with K_r, D_r, follow distance and repulsion changed.
+
     Raises:
         InputError: Nothing meets the requirements.
     """
@@ -140,7 +147,16 @@ def braking_overshoot(scenario: Scenario) -> float:
 def follow_distance(
     scenario: Scenario, requirements: DesignRequirements, overshoot_m: float
 ) -> float:
-    """Least follow distance with room for an overshoot, m, rounded up to 5 cm."""
+    """Least follow distance with room for an overshoot, m, rounded up to 5 cm.
+
+    Args:
+        scenario: Length of the master robot.
+        requirements: The clearance that is to be left.
+        overshoot_m: Of P beyond the follow point, m.
+
+    Returns:
+        Distance from P to the source, m.
+    """
     room = scenario.source.length_m / 2.0 + requirements.clearance_m
     least = overshoot_m + room
     return round(math.ceil(least / _STEP_M - 1e-9) * _STEP_M, 2)

@@ -127,6 +127,9 @@ def study_design(
         requirements: Bounds.
         progress: Called with the number of simulated runs, of ``STUDY_RUNS``.
 
+    Returns:
+        Gains for today's attraction and for the recommended one, and what they achieve.
+
     Raises:
         InputError: There are several robots, or nothing meets a requirement that has
             to be met.

@@ -65,7 +65,15 @@ def _check_text(check: Check) -> str:
 
 
 def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
-    """The JSON document of the study."""
+    """The JSON document of the study.
+
+    Args:
+        study: What was found.
+        out: The result directory, to be named.
+
+    Returns:
+        Plain values, to be written as JSON.
+    """
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": study.today.scenario.name,
@@ -76,7 +84,13 @@ def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
 
 
 def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -> None:
-    """``summary.json``, both scenarios, ``design.png`` and ``law_curves.png``."""
+    """``summary.json``, both scenarios, ``design.png`` and ``law_curves.png``.
+
+    Args:
+        study: What was found.
+        summary: From ``design_summary``.
+        directory: Exists.
+    """
     from analysis.design.design_plots import plot_design
     from analysis.laws.law_curves import law_curves
     from analysis.laws.law_curves_plots import plot_law_curves

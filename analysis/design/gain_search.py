@@ -79,6 +79,9 @@ def gain_for_barrier(
         requirements: See ``DesignRequirements``.
         also: Further gains as multiples of this one.
 
+    Returns:
+        In the unit of the field.
+
     Raises:
         InputError: No gain in a sensible range meets it.
     """

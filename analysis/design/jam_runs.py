@@ -42,6 +42,9 @@ def jam_runs(
         laws: As ``Scenario.law``.
         starts_m: Where the robot starts, across the line to the source, m.
         progress: Called with the number of runs done.
+
+    Returns:
+        One a law, in their order.
     """
     layout = load_scenario("two_static_obstacles", ["hearing=ideal"])
     static = layout.repulsion.active.speed_limit_m_s

@@ -113,7 +113,16 @@ class LawDesign:
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
-    """The same scenario with some gains of a law changed, unchecked."""
+    """The same scenario with some gains of a law changed, unchecked.
+
+    Args:
+        scenario: Whose gains are changed; it stays as it is.
+        law: As ``Scenario.law``.
+        **gains: New values by field of the law's parameters, in the field's unit.
+
+    Returns:
+        A copy.
+    """
     parameters = getattr(scenario.repulsion, law).model_copy(update=gains)
     repulsion = scenario.repulsion.model_copy(update={law: parameters})
     return scenario.model_copy(update={"repulsion": repulsion})
@@ -121,6 +130,13 @@ def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
 
 def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
     """From an obstacle at rho_0 to where the attraction rests, m, at most.
+
+    Args:
+        scenario: Follow distance and rho_0.
+        requirements: The source's largest range.
+
+    Returns:
+        m, above 0.
 
     Raises:
         InputError: Nothing is left of the source's range.
@@ -138,7 +154,15 @@ def metres_to_go(scenario: Scenario, requirements: DesignRequirements) -> float:
 
 
 def allowed_stiffness(scenario: Scenario, requirements: DesignRequirements) -> float:
-    """Stiffest push with which the motion before an obstacle is stable, N/m."""
+    """Stiffest push with which the motion before an obstacle is stable, N/m.
+
+    Args:
+        scenario: Robot, plant and attraction.
+        requirements: The latency that is to be spared, in ticks.
+
+    Returns:
+        N/m; negative where the attraction alone is too stiff.
+    """
     total = largest_contact_stiffness(
         scenario, latency_ticks=requirements.spare_latency_ticks
     )
@@ -149,6 +173,14 @@ def check_law(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> LawDesign:
     """Holds a law's gains, as they stand in the scenario, against requirements.
+
+    Args:
+        scenario: Gains, robot, plant and sensors.
+        law: As ``Scenario.law``.
+        requirements: Bounds.
+
+    Returns:
+        The law's gains, and five figures beside their bounds.
 
     Raises:
         InputError: The law has no gains to choose, or see ``metres_to_go``.

@@ -53,10 +53,18 @@ class SlopeEnergy:
     def of(
         cls, samples: ArrayLike, sample_rate_hz: float, start_time: float = 0.0
     ) -> SlopeEnergy:
-        """From (n,) samples of the sound pressure at 1 m, Pa.
+        """Of samples of the sound pressure at 1 m.
 
         The slope is that of the band-limited signal through the samples, which
         should begin and end near zero or fit together as a period.
+
+        Args:
+            samples: (n,) Pa.
+            sample_rate_hz: Their rate, Hz.
+            start_time: Time at which the first one left the source, s.
+
+        Returns:
+            Integral of the squared slope up to each sample, Pa^2/s.
         """
         x = np.asarray(samples, dtype=float)
         omega = 2.0 * math.pi * sample_rate_hz * fft.rfftfreq(len(x))
@@ -162,6 +170,9 @@ def position_bound(
             channel or one for all, Pa.
         sample_rate_hz: Of the microphones, Hz.
         c: Speed of sound, m/s.
+
+    Returns:
+        Least covariances and standard deviations; infinite where nothing is known.
     """
     p_AS, p_AM = np.asarray(p_AS, dtype=float), np.asarray(p_AM, dtype=float)
     rays = p_AS - p_AM

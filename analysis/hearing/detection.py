@@ -63,6 +63,9 @@ def false_alarms(
         shape: The microphones, in the plane.
         c: Speed of sound, m/s.
         seed: Of the noise.
+
+    Returns:
+        How many of the frames were taken for a sound, one a rate.
     """
     localisers = [
         Localiser(TDOAParameters(false_alarm_rate=rate), shape, c) for rate in rates
@@ -106,6 +109,9 @@ def detection_curve(
         seed: Of stretches, bearings and noise.
         range_m: Of the source, m.
         parameters: Of the estimator.
+
+    Returns:
+        Frames located, ranged and wrong, one a level.
     """
     localiser = Localiser(parameters or TDOAParameters(), shape, c)
     points = []

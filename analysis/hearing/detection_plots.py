@@ -35,6 +35,9 @@ def plot_detection(
         curves: Points by the name of the sound.
         alarms: In frames of noise, by the rate that is set.
         default_rate: The rate that is set unless another one is, to mark it.
+
+    Returns:
+        The picture, 11 by 4.6 inches.
     """
     figure = Figure(figsize=(11.0, 4.6), layout="constrained")
     left, right = figure.subplots(1, 2)

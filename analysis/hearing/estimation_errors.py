@@ -56,6 +56,9 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
     Args:
         errors: (k,) in any unit.
         stds: (k,) in the same one, or one for all.
+
+    Returns:
+        The ratio, with a 95 % interval.
     """
     from scipy.stats import chi2
 
@@ -70,7 +73,15 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
 
 
 def stated_ratio(stds: ArrayLike, errors: ArrayLike) -> float:
-    """RMS of stated standard deviations over that of the errors; 1 is honest."""
+    """RMS of stated standard deviations over that of the errors; 1 is honest.
+
+    Args:
+        stds: (k,) in any unit.
+        errors: (k,) in the same one.
+
+    Returns:
+        The ratio; infinite where there is no error.
+    """
     rmse = float(np.sqrt(np.mean(np.square(errors))))
     return float(np.sqrt(np.mean(np.square(stds)))) / rmse if rmse else math.inf
 
@@ -78,11 +89,14 @@ def stated_ratio(stds: ArrayLike, errors: ArrayLike) -> float:
 def consistency(
     errors: NDArray[np.float64], covariances: NDArray[np.float64]
 ) -> Consistency:
-    """Of errors with the covariances that were stated of them.
+    """Normalised errors squared, with the covariances that were stated of them.
 
     Args:
-        errors: (k, d).
-        covariances: (k, d, d).
+        errors: (k, d) in any unit.
+        covariances: (k, d, d) in that unit squared.
+
+    Returns:
+        Their mean, d where the covariances are right, and the 95 % interval of that.
     """
     from scipy.stats import chi2
 

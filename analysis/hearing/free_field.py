@@ -55,7 +55,16 @@ Estimator = Callable[[NDArray[np.float32]], SourceFix | None]
 def frame_estimator(
     parameters: TDOAParameters, shape: ArrayShape, c: float
 ) -> Estimator:
-    """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears."""
+    """What ``TDOAEstimator`` does to a (n, samples) frame, the first that it hears.
+
+    Args:
+        parameters: Of the estimator.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        From a frame to a fix, or None where nothing is heard.
+    """
     localiser = Localiser(parameters, shape, c)
     return lambda frame: localiser.localise(frame, localiser.blank())[0]
 
@@ -72,7 +81,16 @@ class Loudspeaker:
 
     @classmethod
     def of(cls, kind: str, seed: int, seconds: float = 2.0) -> Loudspeaker:
-        """Chirp or band noise of 0.5-8 kHz."""
+        """Chirp or band noise of 0.5-8 kHz.
+
+        Args:
+            kind: ``chirp`` or ``band_noise``.
+            seed: Of the noise.
+            seconds: Length of the sound, s.
+
+        Returns:
+            The sound at 100 kHz, its slope energy and its level.
+        """
         sound = SoundParameters.model_validate(
             {"kind": kind, "on_s": seconds, "period_s": seconds}
         )
@@ -93,14 +111,17 @@ class Loudspeaker:
         p_AM: NDArray[np.float64],
         c: float,
     ) -> NDArray[np.float32]:
-        """(n, samples) of a frame, source and microphones at rest, Pa.
+        """A frame, source and microphones at rest.
 
         Args:
-            begin: Time of the frame's first sample, of every channel or one for
-                all, s.
+            begin: Time of the frame's first sample, (n,) of every channel or one
+                for all, s.
             p_AS: (2,) source, m.
             p_AM: (n, 2) microphones, m.
             c: Speed of sound, m/s.
+
+        Returns:
+            (n, samples) Pa.
         """
         emission = Emission(
             samples=self.samples,

@@ -84,6 +84,10 @@ class Listener:
             sound_speed_tolerance: Largest error of the speed of sound.
             session: Sessions are at different times, and so have noises and
                 errors of their own.
+
+        Returns:
+            Bearings, rad, ranges, m, and places, m, of the frames in which something
+            was heard.
         """
         p_AS = distance * np.array([math.cos(bearing), math.sin(bearing)])
         start = session * (trials + 4 * _LEAD)

@@ -219,6 +219,9 @@ def prepare_localization(
         trials: Measurements a cell.
         tolerances: Whether the array has errors within REALISTIC_TOLERANCES.
 
+    Returns:
+        Scenario, places and estimators, to be measured.
+
     Raises:
         InputError: An override, or the number of trials, is wrong.
     """

@@ -29,7 +29,16 @@ def localization_summary(
     cells: Sequence[LocalizationCell],
     out: Path | None,
 ) -> dict[str, Any]:
-    """The JSON document of the experiment."""
+    """The JSON document of the experiment.
+
+    Args:
+        experiment: What was measured.
+        cells: What came out, one a place and estimator.
+        out: The result directory, to be named; None: there is none.
+
+    Returns:
+        Plain values, to be written as JSON.
+    """
     scenario, shape = experiment.scenario, experiment.shape
     microphones, c = scenario.microphones, scenario.acoustics.c
     # Whatever the errors of the array do to a range is to be seen.
@@ -66,7 +75,14 @@ def write_localization(
     summary: dict[str, Any],
     directory: Path,
 ) -> None:
-    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``."""
+    """Writes ``scenario.yaml``, ``summary.json`` and ``localization.png``.
+
+    Args:
+        experiment: What was measured.
+        cells: What came out, one a place and estimator.
+        summary: From ``localization_summary``.
+        directory: Exists.
+    """
     from analysis.hearing.localization_plots import plot_localization
 
     (directory / "scenario.yaml").write_text(

@@ -98,6 +98,9 @@ def draw_layouts(
         largest_range_m: Farthest source, m; ranges are uniform up to it.
         count: How many.
         seed: Decides them.
+
+    Yields:
+        ``count`` layouts; source and microphones are at least WALL_M from the walls.
     """
     generator = tick_generator(seed, 0)
     robot = RobotParameters()
@@ -146,6 +149,9 @@ def locate_bursts(
         tracking: Of the tracker; here every source counts as in front.
         snr_db_at_1m: As of ``MicArrayParameters``.
         seed: Of sound and noise.
+
+    Returns:
+        Errors of bearing, deg, and of range, as shares of it; NaN: nothing heard.
     """
     robot = RobotParameters()
     microphones = MicArrayParameters(snr_db_at_1m=snr_db_at_1m)

@@ -77,6 +77,9 @@ def predicted_std(
         p_AS: (2,) source from the microphones' centroid, m.
         shape: The microphones as stated, in the plane.
         c: Speed of sound as stated, m/s.
+
+    Returns:
+        Standard deviations of bearing, rad, and of range, m.
     """
     rays = p_AS - shape.p_AM
     ranges = np.linalg.norm(rays, axis=1)
@@ -123,6 +126,9 @@ def measured_std(
         estimate: From a frame to a fix.
         trials: Number of frames.
         seed: Of the errors.
+
+    Returns:
+        Of bearing, rad, and of range, m, infinite where too many frames have none.
 
     Raises:
         ValueError: In some frame nothing was heard.
@@ -172,6 +178,9 @@ def sensitivity_table(
         estimate: From a frame to a fix.
         trials: Frames a row.
         seed: Of all random numbers.
+
+    Returns:
+        Ranges in m, bearings in deg; None where a range is infinite.
     """
     loudspeaker = Loudspeaker.of("chirp", seed)
     rows = []

@@ -65,7 +65,15 @@ class HeadOn:
         return slope - self.scenario.attraction.stiffness_n_m
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """f(c, s) - K_r (L + c), N: what moves P away from the face."""
+        """f(c, s) - K_r (L + c), N: what moves P away from the face.
+
+        Args:
+            c: Distance of P from the face, m.
+            s: Speed of the obstacle as the law takes it, m/s.
+
+        Returns:
+            N, positive away from the face.
+        """
         pull = self.scenario.attraction.stiffness_n_m * (self.to_go_m + c)
         return self.law.force(c, s) - pull
 
@@ -77,6 +85,9 @@ def head_on(scenario: Scenario, *, to_go_m: float | None = None) -> HeadOn:
         scenario: Law, attraction and mass.
         to_go_m: L; none: that of the obstacle nearest to the way from the start
             to the source, or half the way where there is none.
+
+    Returns:
+        The approach, with the distances at which P rests, m.
 
     Raises:
         InputError: The law is not known.
@@ -97,7 +108,10 @@ def radial_equilibria(law: RadialLaw, pull_n: NDArray[np.float64]) -> tuple[floa
 
     Args:
         law: Tabulated law.
-        pull_n: Pull towards the obstacle at ``law.distances_m``, N.
+        pull_n: (n,) pull towards the obstacle at ``law.distances_m``, N.
+
+    Returns:
+        m; empty where push and pull are never equal.
     """
     balance = law.forces_n - pull_n
     crossings = np.flatnonzero(np.diff(np.sign(balance)))

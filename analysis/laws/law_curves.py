@@ -68,6 +68,9 @@ def law_curves(
         speed_m_s: (k,) where to sample the force against speed, m/s.
         at_distance_m: Distance of the latter, m; half of rho_0.
 
+    Returns:
+        One a law, forces in N.
+
     Raises:
         InputError: There is no such law, or it tells no forces.
     """
@@ -95,12 +98,15 @@ def law_curves(
 def radial_forces(
     controller: Any, c: ArrayLike, approach: ArrayLike
 ) -> NDArray[np.float64]:
-    """Force away from an obstacle that one control period brought nearer, N.
+    """Force away from an obstacle that one control period brought nearer.
 
     Args:
         controller: A block with the ports of ``RadialLawController``.
-        c: Distances now, m, above 0; broadcast with ``approach``.
-        approach: How fast they have shrunk over the last period, m/s.
+        c: (...) distances now, m, above 0; broadcast with ``approach``.
+        approach: (...) how fast they have shrunk over the last period, m/s.
+
+    Returns:
+        (...) N, of the shape that both broadcast to.
     """
     context = controller.CreateDefaultContext()
     for name, size in (("p_WS_estimated", 2), ("pose_WB_estimated", 3), ("v_WP", 2)):

@@ -105,6 +105,9 @@ def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
         scenario: K_r and the sensors' least range are used.
         metres_to_go: From the obstacle's surface to where the attraction
             rests, m.
+
+    Returns:
+        J; 0 where the push never prevails.
     """
     c, forces = sampled_push(push, scenario)
     return largest_rise(forces - scenario.attraction.stiffness_n_m * (c + metres_to_go))
@@ -113,7 +116,15 @@ def net_barrier(push: Push, scenario: Scenario, metres_to_go: float) -> float:
 def sampled_push(
     push: Push, scenario: Scenario
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(n,) distances from the sensors' least range on, m, and (n,) forces, N."""
+    """A push at many distances, from the sensors' least range on.
+
+    Args:
+        push: Force at a distance, N; see ``spring``.
+        scenario: The sensors' least range is used.
+
+    Returns:
+        (n,) distances, m, and (n,) forces, N.
+    """
     c = np.arange(scenario.ultrasonic.minimum_range_m, _FARTHEST_M, _STEP_M)
     return c, np.array([push(distance) for distance in c.tolist()])
 
@@ -133,6 +144,13 @@ def barrier_from_reach_n_m(scenario: Scenario, metres_to_go: float) -> float:
 
     Its spring K_0 rho_0^2/2 holds the kinetic energy at rho_0 and the work of
     the attraction over all of rho_0.
+
+    Args:
+        scenario: Attraction, reach rho_0, mass and top speed.
+        metres_to_go: From the obstacle's surface to where the attraction rests, m.
+
+    Returns:
+        N/m.
     """
     K_r = scenario.attraction.stiffness_n_m
     reach = scenario.repulsion.conventional.reach_m
@@ -159,6 +177,13 @@ def rest_offset(law: str, scenario: Scenario) -> float:
     """How far the master robot's body pushes P off the follow point at rest, m.
 
     P stands behind the master robot, on its axis.
+
+    Args:
+        law: As ``Scenario.law``.
+        scenario: Gains, follow distance and the master robot's length.
+
+    Returns:
+        m, 0 or more.
     """
     force = law_force(law, scenario)
     K_r, follow = (
@@ -178,7 +203,15 @@ def rest_offset(law: str, scenario: Scenario) -> float:
 
 
 def far_offset(law: str, scenario: Scenario) -> float:
-    """How far an echo at the sensors' limit pushes a resting P, m."""
+    """How far an echo at the sensors' limit pushes a resting P, m.
+
+    Args:
+        law: As ``Scenario.law``.
+        scenario: Gains, and the sensors' largest range.
+
+    Returns:
+        m, 0 where the law ends before.
+    """
     force = law_force(law, scenario)
     farthest = scenario.ultrasonic.maximum_range_m
     return force(farthest, 0.0) / scenario.attraction.stiffness_n_m
@@ -190,6 +223,13 @@ def injected_share(law: str, scenario: Scenario) -> float:
     Before a resting obstacle the printed velocity term h(s) = f(c, s) - f(c, 0)
     does work h(s) ds at most while P recedes at s, and D_r takes D_r s ds; the
     rest, f(c, 0), has a potential. Below 1 the motion cannot gain energy.
+
+    Args:
+        law: As ``Scenario.law``.
+        scenario: Gains, D_r and top speed.
+
+    Returns:
+        A ratio, 0 or more, at half the reach rho_0.
     """
     force = law_force(law, scenario)
     within = 0.5 * scenario.repulsion.conventional.reach_m

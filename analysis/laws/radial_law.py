@@ -51,7 +51,15 @@ class RadialLaw:
         return DISTANCE_STEP_M * np.arange(len(self.forces_n), dtype=float)
 
     def force(self, c: float, s: float = 0.0) -> float:
-        """f(c, s) in N; 0 beyond the range."""
+        """f(c, s); 0 beyond the range.
+
+        Args:
+            c: Distance, m.
+            s: Speed of the obstacle as the law takes it, m/s.
+
+        Returns:
+            N, positive away from the obstacle.
+        """
         return float(self.function(c, s)) if c <= self.range_m else 0.0
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
@@ -63,7 +71,15 @@ class RadialLaw:
         return _interpolate(self.energies_j, c)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
-        """(df/dc, df/ds) in N/m and N s/m; at s = 0 the slope towards s > 0."""
+        """Slopes of f(c, s); at s = 0 the one towards s > 0.
+
+        Args:
+            c: Distance, m.
+            s: Speed of the obstacle as the law takes it, m/s.
+
+        Returns:
+            df/dc, N/m, and df/ds, N s/m.
+        """
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
         return (float(slopes[0]), float(slopes[1])) if len(slopes) else (0.0, 0.0)

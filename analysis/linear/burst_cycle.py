@@ -118,6 +118,9 @@ def burst_cycle(
         gap_s: Silence in each cycle, s, in place of the scenario's.
         point: The equilibrium, where it is known already.
 
+    Returns:
+        Multipliers over one cycle, along and across the line to the source.
+
     Raises:
         InputError: The cycle is no whole number of ticks, or has no sound; or
             there is no stable equilibrium.
@@ -213,6 +216,9 @@ def simulate_burst_cycle(
         cycle: The analysed cycle.
         cycles: To simulate; the first quarter does not count.
         direction: Of the kick: along the line to the source, or across it.
+
+    Returns:
+        Growth over a cycle, and the way of P, m, at every tick.
     """
     loop, point = cycle.loop, cycle.point
     axis = _axes(point)[DIRECTIONS.index(direction)]

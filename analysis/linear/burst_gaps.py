@@ -62,9 +62,12 @@ def gap_chart(
 
     Args:
         scenario: Any, see ``analysis.linear.burst_cycle.burst_cycle``.
-        gaps_s: Multiples of the control period, s; by default 0 to 4 s.
+        gaps_s: (n,) multiples of the control period, s; by default 0 to 4 s.
         holds: To compare.
         point: The equilibrium, where it is known already.
+
+    Returns:
+        Largest |multiplier| of a cycle for each hold and gap.
     """
     point = point or follow_equilibrium(scenario)
     gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)

@@ -67,6 +67,9 @@ def motion_chain(
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
         period_s: In place of the 25 ms tick, s.
 
+    Returns:
+        The model of one period, of as few states as the motion along the axis has.
+
     Raises:
         ValueError: The wheels can slip.
     """
@@ -118,7 +121,16 @@ def _chain(
 
 
 def delayed_output(model: LinearModel, output: str, ticks: int) -> LinearModel:
-    """The same model with one of its outputs some ticks older."""
+    """The same model with one of its outputs some ticks older.
+
+    Args:
+        model: Sampled.
+        output: One of its output names.
+        ticks: How much older, 0 or more periods.
+
+    Returns:
+        A model with as many more states, ``<output>_1`` and so on.
+    """
     if ticks == 0:
         return model
     row, count = model.output_names.index(output), len(model.A)
@@ -160,6 +172,10 @@ def contact_matrix(
             the change of that position over a tick, N s/m. For the half of an
             oscillation in which the obstacle comes nearer.
         period_s: In place of the 25 ms tick, s.
+
+    Returns:
+        (n, n) x+ = A x; states are those of ``motion_chain``, then the aged positions,
+        m.
     """
     damping = damping_n_s_m
     if damping is None:
@@ -187,7 +203,19 @@ def contact_spectral_radius(
     latency_ticks: int = 0,
     period_s: float = FRAME_PERIOD_S,
 ) -> float:
-    """Largest |z| of the radial motion; stable below 1. See ``contact_matrix``."""
+    """Largest |z| of the radial motion; stable below 1. See ``contact_matrix``.
+
+    Args:
+        scenario: Mass, robot, plant and damping are used.
+        stiffness_n_m: All springs together, N/m.
+        damping_n_s_m: In place of D_r, N s/m.
+        motor_lag_s: In place of ``plant.motor_lag_s``, s.
+        latency_ticks: Age of the position that the springs act on, periods.
+        period_s: In place of the 25 ms tick, s.
+
+    Returns:
+        |z| over one period, 0 or more.
+    """
     matrix = contact_matrix(
         scenario,
         stiffness_n_m,
@@ -210,6 +238,16 @@ def largest_contact_stiffness(
     """Sum of springs, K_r + K_0, at which the radial motion stops decaying, N/m.
 
     Zero where no spring is stable, as without damping.
+
+    Args:
+        scenario: Mass, robot, plant and damping are used.
+        damping_n_s_m: In place of D_r, N s/m.
+        motor_lag_s: In place of ``plant.motor_lag_s``, s.
+        latency_ticks: Age of the position that the springs act on, periods.
+        period_s: In place of the 25 ms tick, s.
+
+    Returns:
+        N/m; infinite where every spring that is tried is stable.
     """
 
     def excess(stiffness: float) -> float:
@@ -261,7 +299,16 @@ def contact_limits(
     motor_lags_s: Sequence[float] = MOTOR_LAGS_S,
     latency_ticks: Sequence[int] = LATENCY_TICKS,
 ) -> ContactLimits:
-    """The table of limits; the scenario's own motor lag is one of its rows."""
+    """The table of limits; the scenario's own motor lag is one of its rows.
+
+    Args:
+        scenario: Mass, robot, plant and attraction are used.
+        motor_lags_s: Rows of the table, s.
+        latency_ticks: Columns of the table: ages of the position, periods.
+
+    Returns:
+        Gains of both laws, N/m, with K_r taken off.
+    """
     lags = sorted({*motor_lags_s, scenario.plant.motor_lag_s})
     total = np.array(
         [

@@ -189,6 +189,15 @@ def delay_margin(
 ) -> DelayMargin:
     """The smallest delay at which the loop stops decaying.
 
+    Args:
+        point: Operating point, at which the loop decays.
+        at: Where the delay comes in.
+        direction: Of the motion that is delayed.
+
+    Returns:
+        Delay beyond that of the build, s, infinite where none destabilises, and the
+        frequency of the oscillation, rad/s.
+
     Raises:
         InputError: The loop oscillates without any delay already.
     """

@@ -72,6 +72,15 @@ def check_delay_margin(
 ) -> DelayCheck:
     """Simulates 0.95 and 1.05 of the computed delay margin.
 
+    Args:
+        point: Equilibrium, at rest.
+        at: Where the delay comes in.
+        direction: Of the motion, and of the kick.
+        duration_s: To simulate, s.
+
+    Returns:
+        The margin, and the runs on both sides of it.
+
     Raises:
         InputError: The loop has no finite delay margin.
     """
@@ -113,6 +122,9 @@ def simulate_delayed(
         delay_s: Any, s.
         direction: Of the kick.
         duration_s: To simulate, s.
+
+    Returns:
+        Fitted growth, 1/s, and frequency, rad/s, and the way of P, m.
 
     Raises:
         InputError: The operating point moves, or the delay is negative.
@@ -195,10 +207,18 @@ def _hearing_late(
 def fitted_oscillation(
     time_s: NDArray[np.float64], offset_m: NDArray[np.float64]
 ) -> tuple[float, float]:
-    """Exponent, 1/s, and frequency, rad/s, of a growing or decaying oscillation.
+    """Growth and frequency of an oscillation.
 
     Peaks between the zeros give the envelope, their spacing the frequency; the
     first fifth, where faster modes die out, does not count.
+
+    Args:
+        time_s: (n,) ascending and evenly spaced, s.
+        offset_m: (n,) from rest, m.
+
+    Returns:
+        Exponent of the envelope, 1/s, and frequency, rad/s; 0 rad/s with fewer than
+        three peaks.
     """
     later = time_s >= time_s[0] + 0.2 * (time_s[-1] - time_s[0])
     t, x = time_s[later], offset_m[later]

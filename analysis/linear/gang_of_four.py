@@ -50,6 +50,9 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     Args:
         point: The operating point.
         direction: Of both.
+
+    Returns:
+        S, T and both others over frequency, up to the Nyquist frequency.
     """
     cut = cut_model(point, "sensor", "actuator")
     whole = closed(cut, cut.input_names)

@@ -125,6 +125,13 @@ def with_values(scenario: Scenario, values: Mapping[str, float]) -> Scenario:
     Names with a dot are fields. ``wheel_radius_share`` acts as negative slip,
     which the encoders do not see; ``sound_speed_m_s`` on the slope of the range
     and so on the attraction's spring. Others are not the scenario's.
+
+    Args:
+        scenario: The nominal one; it stays as it is.
+        values: By name of the parameter, in its SI unit.
+
+    Returns:
+        A copy, validated.
     """
     data = scenario.model_dump()
     for name, value in values.items():
@@ -152,6 +159,9 @@ def range_slope(scenario: Scenario, true_speed: float) -> float:
     Args:
         scenario: Its speed of sound is the believed one.
         true_speed: Of the air, m/s.
+
+    Returns:
+        A ratio; 1 where the believed speed is the true one.
     """
     k = (scenario.tdoa.sound_speed_m_s or scenario.acoustics.c) / true_speed
     half = max(abs(y) for _, y in scenario.robot.microphones_m)

@@ -125,12 +125,28 @@ def slowest_pole(poles: NDArray[np.complex128]) -> complex:
 
 
 def continuous(pole: complex, period: float) -> complex:
-    """ln(z)/T, 1/s."""
+    """A pole in the z plane as one in the s plane.
+
+    Args:
+        pole: z, not 0.
+        period: T, s.
+
+    Returns:
+        ln(z)/T, 1/s.
+    """
     return complex(np.log(pole) / period)
 
 
 def damping_ratio(pole: complex, period: float) -> float:
-    """Of a pole in the z plane; negative where it grows."""
+    """Of a pole in the z plane; negative where it grows.
+
+    Args:
+        pole: z, neither 0 nor 1.
+        period: Sampling period, s.
+
+    Returns:
+        -1 to 1.
+    """
     s = continuous(pole, period)
     return -s.real / abs(s)
 
@@ -158,6 +174,9 @@ def pole_cloud(
         samples: Number of random points.
         seed: Of these.
         progress: Called after each point.
+
+    Returns:
+        Poles in the z plane: nominal, of every point, and the worst.
     """
     from scipy.stats import qmc
 
@@ -220,6 +239,14 @@ def pole_sensitivities(
     At an end of its interval a parameter is varied to the inside only, and a
     whole number over its whole interval. The pole is followed as the nearest
     one, which holds for simple poles.
+
+    Args:
+        poles: The loop.
+        parameters: The box.
+        period: Sampling period, s.
+
+    Returns:
+        One a parameter, in their order; poles in 1/s.
     """
     nominal = {p.name: p.nominal for p in parameters}
     pole = slowest_pole(poles(nominal))

@@ -70,6 +70,9 @@ def check_conditions(pairs: int = 10_000, seed: int = 1) -> tuple[ConditionCheck
     Args:
         pairs: For each scheme.
         seed: Of the pairs.
+
+    Returns:
+        One a scheme, with the number of pairs on which both disagree.
     """
     rng, T = np.random.default_rng(seed), FRAME_PERIOD_S
     K = 10.0 ** rng.uniform(-1.0, math.log10(8.0 / T**2), pairs)
@@ -141,7 +144,10 @@ def poles_against_period(
     Args:
         scenario: Attraction, robot and plant are used.
         stiffness_n_m: In place of K_r, as with an obstacle's spring, N/m.
-        periods_s: Sample periods, s, ascending.
+        periods_s: (n,) sample periods, s, ascending.
+
+    Returns:
+        Up to three poles a period, z plane, and the longest stable period, s.
     """
     periods = np.asarray(periods_s, dtype=float)
     stiffness = stiffness_n_m
@@ -205,7 +211,16 @@ def gain_chart(
     stiffnesses_n_m: ArrayLike | None = None,
     dampings_n_s_m: ArrayLike | None = None,
 ) -> StabilityChart:
-    """Over K_r and D_r: sampled, with the motors' lag, away from obstacles."""
+    """Over K_r and D_r: sampled, with the motors' lag, away from obstacles.
+
+    Args:
+        scenario: Robot and plant are used; its gains are marked.
+        stiffnesses_n_m: (nx,) K_r, N/m; by default 0.1 to 400.
+        dampings_n_s_m: (ny,) D_r, N s/m; by default 0.05 to 400.
+
+    Returns:
+        Growth of the slowest mode, (ny, nx) 1/s.
+    """
     K, D = scenario.attraction.stiffness_n_m, scenario.attraction.damping_n_s_m
     x = _values(stiffnesses_n_m, np.geomspace(0.1, 400.0, 60))
     y = _values(dampings_n_s_m, np.geomspace(0.05, 400.0, 60))
@@ -231,6 +246,14 @@ def gain_delay_chart(
     """Over the age of the position that the springs act on, and their stiffness.
 
     Delays are taken in whole ticks.
+
+    Args:
+        scenario: Robot, plant and damping are used; its spring is marked.
+        delays_s: (nx,) ages, s; by default 0 to 1 s.
+        stiffnesses_n_m: (ny,) all springs together, N/m; by default 0.2 to 100.
+
+    Returns:
+        Growth of the slowest mode, (ny, nx) 1/s.
     """
     longest = np.arange(0.0, 1.0, 2 * FRAME_PERIOD_S)
     x = _values(delays_s, longest)

@@ -76,6 +76,9 @@ def check_step(
         duration_s: To simulate, s.
         full: Whether to run the scenario's own sensors too.
 
+    Returns:
+        Frequency and damping ratio: predicted, and fitted to the runs.
+
     Raises:
         InputError: There is no stable equilibrium, or nothing oscillates there.
     """
@@ -149,6 +152,9 @@ def fitted_step(
         time_s: (n,) s; the first two seconds do not count.
         distance_m: (n,) m.
         guess_rad_s: Frequency to start from, rad/s.
+
+    Returns:
+        Natural frequency, rad/s, and damping ratio.
     """
     later = time_s >= 2.0
     t, x = time_s[later] - 2.0, distance_m[later]

@@ -20,7 +20,15 @@ def seed(values: Any) -> Any:
 def value_and_gradient(
     values: Any, count: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Values (k,) and their derivatives by ``count`` variables (k, count)."""
+    """Values and gradients of AutoDiffXd.
+
+    Args:
+        values: (k,) floats or AutoDiffXd.
+        count: Number n of variables; a value without derivatives has zeros.
+
+    Returns:
+        (k,) values and (k, n) derivatives, in the units of the values.
+    """
     if len(values) == 0:
         return np.empty(0), np.empty((0, count))
     column = np.asarray(values).reshape(-1, 1)

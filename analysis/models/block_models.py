@@ -40,6 +40,9 @@ def sampled_blocks(
         loop: The all-ideal build.
         state: (n,) operating point, just before the updates of a tick.
         time_s: Its time, s.
+
+    Returns:
+        A model of one period for each, in the order of the build's blocks.
     """
     after = loop.period_map(state, time_s)
     continuous = [role for role in loop.follower.blocks if _is_continuous(loop, role)]
@@ -102,12 +105,15 @@ def block_model(
 
     Args:
         twin: The block as LeafSystem_[AutoDiffXd].
-        state: Its state, just before its update.
+        state: (n,) its state, just before its update.
         values: Of its input ports, in order.
         ports: The block whose ports have the names to use, if not ``twin``.
         time_s: The time, s.
         held: Output ports that continuous blocks read, after the update.
         read_after: Whether it reads such signals itself.
+
+    Returns:
+        Its states, inputs and outputs are elements of vectors, named by port.
     """
     ports = ports or twin
     count = len(state)
@@ -155,7 +161,15 @@ def _context(block: Any, time_s: float, state: Any) -> Any:
 
 
 def sampled_twin(loop: IdealLoop, role: str) -> Any:
-    """A continuous block's AutoDiff twin as a map of one period, made once."""
+    """A continuous block's AutoDiff twin as a map of one period, made once.
+
+    Args:
+        loop: The all-ideal build; it keeps the twin.
+        role: A key of ``SoundFollower.blocks``.
+
+    Returns:
+        The block as a discrete one, for AutoDiffXd.
+    """
     if role not in loop.sampled_twins:
         integrator = loop.scenario.integrator
         config = SimulatorConfig(
@@ -190,6 +204,9 @@ def join_blocks(
         cut: Signals whose wires are left open, to be fed from outside.
         inputs: Signals to feed from outside.
         outputs: Signals to return.
+
+    Returns:
+        One model with the states of all of them.
     """
     import control
 

@@ -49,7 +49,12 @@ class Runner:
         begin(simulator, state, time_s)
 
     def fix(self, port: Port, value: NDArray[np.float64]) -> None:
-        """What a cut input reads from now on."""
+        """What a cut input reads from now on.
+
+        Args:
+            port: Role of the block, and name of its input port.
+            value: (size of the port,), in its unit.
+        """
         self._fix(self._context, port, value)
 
     def advance(self, time_s: float) -> None:
@@ -62,21 +67,39 @@ class Runner:
         return np.asarray(get_state(self._context), dtype=float)
 
     def set_state(self, indices: Sequence[int], values: NDArray[np.float64]) -> None:
-        """Replaces elements of the state."""
+        """Replaces elements of the state.
+
+        Args:
+            indices: k places in the state.
+            values: (k,) their new values.
+        """
         state = self.state()
         state[list(indices)] = values
         set_state(self._context, state)
 
 
 def run_periods(simulator: Any, state: Any, time_s: float, periods: int) -> None:
-    """Simulates whole periods from a state, to just before the next tick."""
+    """Simulates whole periods from a state, to just before the next tick.
+
+    Args:
+        simulator: Its context is changed.
+        state: (n,) just before the updates of the tick at ``time_s``.
+        time_s: A multiple of the period, s.
+        periods: How many, 0 or more.
+    """
     begin(simulator, state, time_s)
     # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
     simulator.AdvanceTo((round(time_s / FRAME_PERIOD_S) + periods) * FRAME_PERIOD_S)
 
 
 def begin(simulator: Any, state: Any, time_s: float) -> None:
-    """Puts a simulator just before the updates of the tick at ``time_s``."""
+    """Puts a simulator just before the updates of the tick at ``time_s``.
+
+    Args:
+        simulator: Its context is changed.
+        state: (n,) just before the updates of the tick.
+        time_s: Of the tick; rounded to a multiple of the period, s.
+    """
     context = simulator.get_mutable_context()
     context.SetTime(round(time_s / FRAME_PERIOD_S) * FRAME_PERIOD_S)
     set_state(context, state)
@@ -86,14 +109,24 @@ def begin(simulator: Any, state: Any, time_s: float) -> None:
 
 
 def set_state(context: Any, state: Any) -> None:
-    """Sets the whole state: continuous first, then the discrete groups."""
+    """Sets the whole state: continuous first, then the discrete groups.
+
+    Args:
+        context: Of a diagram, changed.
+        state: (n,) floats, or AutoDiffXd where the context is of these.
+    """
     start = context.num_continuous_states()
     context.SetContinuousState(state[:start])
     set_discrete_state(context, state[start:])
 
 
 def set_discrete_state(context: Any, state: Any) -> None:
-    """Sets the discrete groups from one vector."""
+    """Sets the discrete groups from one vector.
+
+    Args:
+        context: Of a diagram, changed.
+        state: (m,) one group after the other.
+    """
     start = 0
     for group in range(context.num_discrete_state_groups()):
         size = context.get_discrete_state(group).size()

@@ -113,6 +113,9 @@ def find_equilibria(
         area_m: Of P; by default all bodies and the start with 2 m around.
         smallest_m: Edge below which cells are not quartered, m.
 
+    Returns:
+        All points of rest that were found, and what is left unresolved.
+
     Raises:
         InputError: The area is empty, or the law has no derivative.
     """
@@ -195,7 +198,15 @@ def _roots(
 def nearest_equilibrium(
     field_: ForceField, begin: NDArray[np.float64]
 ) -> NDArray[np.float64] | None:
-    """(2,) where no force acts on P, by Newton's method; none: not found, m."""
+    """Where no force acts on P, by Newton's method.
+
+    Args:
+        field_: The force on P at rest.
+        begin: (2,) where to begin, in W, m.
+
+    Returns:
+        (2,) in W, m, or None where none was found.
+    """
     p = begin.copy()
     for _ in range(30):
         force, slope = field_.gradient(p)

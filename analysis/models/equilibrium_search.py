@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import label, maximum_filter1d
 
 from analysis.models.force_field import ForceField
-from systems.world.geometry import rotate
+from systems.world.geometry import nearest_point_on_rectangle, rotate
 
 __all__ = ["CONTACT_CELLS", "CellSearch", "Leftover", "SearchArea"]
 
@@ -157,13 +157,8 @@ class CellSearch:
         self, points: NDArray[np.float64]
     ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """To the nearest points of the bodies: (k, n, 2) and lengths (k, n), m."""
-        vectors = []
-        for x, y, theta, length, width in self._bodies:
-            u, v = rotate(-theta, points[:, 0] - x, points[:, 1] - y)
-            du = u - np.clip(u, -length / 2.0, length / 2.0)
-            dv = v - np.clip(v, -width / 2.0, width / 2.0)
-            vectors.append(np.stack(rotate(theta, -du, -dv), axis=-1))
-        stacked = np.array(vectors)
+        vectors = (nearest_point_on_rectangle(points.T, body) for body in self._bodies)
+        stacked = np.array([np.stack(vector, axis=-1) for vector in vectors])
         return stacked, np.linalg.norm(stacked, axis=-1)
 
     def _pushes(

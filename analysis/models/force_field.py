@@ -100,6 +100,9 @@ class ForceField:
         Args:
             distance: Of the obstacle, m.
             speed: Its speed for the difference, m/s.
+
+        Returns:
+            N s/m; positive: the push grows with the speed.
         """
         block, context = self._controller(twin=False)
         self._see(block, context, np.zeros(3), [1.0, 0.0, 0.0])

@@ -158,7 +158,15 @@ class IdealLoop:
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
-        """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd."""
+        """A block by its role in ``SoundFollower.blocks``, float or AutoDiffXd.
+
+        Args:
+            role: A key of ``SoundFollower.blocks``.
+            twin: Whether the one for AutoDiffXd is meant.
+
+        Returns:
+            The block.
+        """
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
     def _names(self) -> tuple[str, ...]:
@@ -184,7 +192,15 @@ class IdealLoop:
         return [k for k, n in enumerate(self.state_names) if n.startswith(prefix)]
 
     def context(self, state: NDArray[np.float64], time_s: float = 0.0) -> Any:
-        """The float diagram's context at a state; valid until the next call."""
+        """The float diagram's context at a state; valid until the next call.
+
+        Args:
+            state: (n,) of the diagram.
+            time_s: Its time, s.
+
+        Returns:
+            The root context.
+        """
         simulator = self._simulator(frozenset(), twin=False)
         context = simulator.get_mutable_context()
         context.SetTime(time_s)
@@ -206,6 +222,9 @@ class IdealLoop:
             time_s: A multiple of the period, s.
             fixed: Values of input ports that are cut off from their source.
             periods: Number of periods.
+
+        Returns:
+            (n,) just before the updates of the tick that many periods later.
         """
         fixed = fixed or {}
         simulator = self._simulator(frozenset(fixed), twin=False)
@@ -231,6 +250,9 @@ class IdealLoop:
             inputs: Input ports that are cut off from their source and held over
                 the period; those of one key share a value and its derivative.
             outputs: Output ports to differentiate at the first tick.
+
+        Returns:
+            The next state, the outputs, and the derivatives of both.
         """
         inputs = inputs or {}
         ports = frozenset(port for group in inputs for port in group)
@@ -270,6 +292,9 @@ class IdealLoop:
             state: (n,) just before the updates of the tick at ``time_s``.
             time_s: A multiple of the period, s.
             fixed: Input ports that are cut off, and fed by ``Runner.fix``.
+
+        Returns:
+            The run, before its first tick.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
         return Runner(simulator, self.fix, state, time_s)
@@ -332,7 +357,14 @@ class IdealLoop:
         return self._simulators[key]
 
     def fix(self, context: Any, port: Port, value: Any, *, twin: bool = False) -> None:
-        """Cuts an input port off from its source and sets what it reads."""
+        """Cuts an input port off from its source and sets what it reads.
+
+        Args:
+            context: Root context of the diagram, changed.
+            port: Role of the block, and name of its input port.
+            value: (size of the port,), in its unit; AutoDiffXd for the twin.
+            twin: Whether the context is that of the AutoDiff diagram.
+        """
         role, name = port
         block = self.block(role, twin=twin)
         own = block.GetMyMutableContextFromRoot(context)

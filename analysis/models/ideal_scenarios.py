@@ -45,6 +45,9 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
     Args:
         scenario: Any scenario.
         time_s: The moment, s.
+
+    Returns:
+        A copy.
     """
     x, y, theta = scenario.source.path().pose(time_s)
     source = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}

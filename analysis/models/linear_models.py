@@ -134,7 +134,15 @@ class LinearModel:
         return np.moveaxis(np.concatenate(rows), 0, -1) + self.D[:, :, None]
 
     def part(self, inputs: Sequence[str], outputs: Sequence[str]) -> LinearModel:
-        """The same with some of its inputs and outputs."""
+        """The same with some of its inputs and outputs.
+
+        Args:
+            inputs: Names of inputs, in the order that is wanted.
+            outputs: Names of outputs, in the order that is wanted.
+
+        Returns:
+            With all of its states.
+        """
         columns = [self.input_names.index(name) for name in inputs]
         rows = [self.output_names.index(name) for name in outputs]
         return LinearModel(
@@ -157,6 +165,13 @@ def simple_poles(
 
     Others move by the root of a perturbation of the matrix: two computations
     that agree to rounding need not agree in them.
+
+    Args:
+        poles: (n,) in the z plane.
+        apart: Least distance from another pole.
+
+    Returns:
+        (k,) of them, in their order.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)

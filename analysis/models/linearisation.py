@@ -159,6 +159,13 @@ def check_gradient(point: OperatingPoint, step: float = 1e-6) -> GradientCheck:
 
     The tracker's covariances are left out: they are zero where hearing is
     exact, and a step would make them negative on one side.
+
+    Args:
+        point: Where to compare.
+        step: Of each state, in its SI unit.
+
+    Returns:
+        Largest differences, with the names of their states.
     """
     loop, state, time_s = point.loop, point.state, point.time_s
     A = loop.period_derivatives(state, time_s).A

@@ -60,6 +60,9 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
     Args:
         point: The operating point.
         *places: Wires to cut; none gives the closed loop.
+
+    Returns:
+        Two inputs and two outputs a place, along and across, in SI units.
     """
     loop = point.loop
     now = loop.context(point.state, point.time_s)
@@ -118,6 +121,9 @@ def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
     Args:
         model: Cut at ``signals`` at least.
         signals: Names of inputs, and of outputs that feed them again.
+
+    Returns:
+        The model with the same inputs and outputs.
     """
     into = [model.input_names.index(name) for name in signals]
     out = [model.output_names.index(name) for name in signals]
@@ -146,6 +152,9 @@ def open_loop(
         point: The operating point.
         at: Where the loop is cut.
         direction: Which of the two signals.
+
+    Returns:
+        One input and one output in the same unit; feedback is negative.
     """
     whole = cut_model(point, at)
     own = f"{at}_{direction}"
@@ -161,6 +170,13 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
     A point mass with the attraction's spring and damper along the line to a
     source at rest; both slopes are the controller's own. Cut at the sensor the
     damper stays closed; at the actuator both are cut.
+
+    Args:
+        scenario: Attraction, mass and controller are used.
+        at: ``sensor`` or ``actuator``.
+
+    Returns:
+        In continuous time; states are position, m, and velocity, m/s.
 
     Raises:
         InputError: There is no spring, hence no target loop.

@@ -198,6 +198,13 @@ def motion_model(
 def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> OperatingPoint:
     """The state of rest with P at a place where no force acts.
 
+    Args:
+        loop: The all-ideal build, bodies at rest.
+        p_WP: (2,) place of P in W, m.
+
+    Returns:
+        The equilibrium in which the robot heads towards the source.
+
     Raises:
         InputError: A force acts there, or a body moves.
     """
@@ -237,6 +244,9 @@ def moving_equilibrium(
     Args:
         scenario: Its sensors are taken to be ideal.
         velocity_W: Of the source, m/s; by default ``source.speed_m_s`` along x.
+
+    Returns:
+        The equilibrium, with its state at a tick.
 
     Raises:
         InputError: The source is too fast or at rest, or no distance balances.

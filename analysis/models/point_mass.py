@@ -116,7 +116,15 @@ class PointMass:
         return kinetic + self.potential(states[:, :2])
 
     def force(self, states: ArrayLike, term: VelocityTermModel) -> NDArray[np.float64]:
-        """(n, 2) sum of all forces at states (n, 4), N."""
+        """Sum of all forces on P.
+
+        Args:
+            states: (n, 4) x, y, vx, vy, m and m/s.
+            term: The velocity term: none (s = 0), or as the laws offer it.
+
+        Returns:
+            (n, 2) in W, N.
+        """
         states = np.ascontiguousarray(states, dtype=float)
         return kernels.forces(states, *self._numbers(term))
 
@@ -138,6 +146,9 @@ class PointMass:
             contact_m: P touches a body that is nearer, m.
             duration_s: Simulated time, s.
             term: The velocity term: none (s = 0), or as the laws offer it.
+
+        Returns:
+            Contact times, s, least distances, m, rises of V, J, and ends.
         """
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
@@ -149,7 +160,16 @@ class PointMass:
     def trajectory(
         self, start: ArrayLike, *, duration_s: float, term: VelocityTermModel
     ) -> NDArray[np.float64]:
-        """(steps + 1, 4) states of one start, STEP_S apart; contact is ignored."""
+        """States of one start; contact is ignored.
+
+        Args:
+            start: (4,) x, y, vx, vy, m and m/s.
+            duration_s: Simulated time, s.
+            term: The velocity term: none (s = 0), or as the laws offer it.
+
+        Returns:
+            (steps + 1, 4) x, y, vx, vy, STEP_S apart.
+        """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
         return kernels.trajectory(start, steps, STEP_S, *self._numbers(term))

@@ -14,6 +14,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
+from systems.world.geometry import beyond
 
 __all__ = ["distances", "forces", "run", "trajectory"]
 
@@ -34,20 +35,23 @@ def _nearest(
     """Vector to the nearest point, its length, and whether that is a corner."""
     dx, dy = x - body[0], y - body[1]
     u, v = body[2] * dx + body[3] * dy, -body[3] * dx + body[2] * dy
-    du = max(0.0, abs(u) - body[4])
-    dv = max(0.0, abs(v) - body[5])
-    corner = du > 0.0 and dv > 0.0
-    if u > 0.0:
-        du = -du
-    if v > 0.0:
-        dv = -dv
+    du, dv = -beyond(u, body[4]), -beyond(v, body[5])
+    corner = du != 0.0 and dv != 0.0
     cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
     return cx, cy, math.sqrt(cx * cx + cy * cy), corner
 
 
 @njit(cache=True)
 def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (compiled)
-    """(n, bodies) distances of points (n, 2), m; 0 inside a body."""
+    """Distances of points from bodies; 0 inside a body.
+
+    Args:
+        points: (n, 2) in W, m.
+        bodies: (k, 6), see above.
+
+    Returns:
+        (n, k) m.
+    """
     out = np.empty((points.shape[0], bodies.shape[0]))
     for i in range(points.shape[0]):
         for k in range(bodies.shape[0]):
@@ -134,7 +138,18 @@ def _force(
 def forces(
     states: _Array, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
 ) -> _Array:  # pragma: no cover  (compiled)
-    """(n, 2) sum of all forces at states (n, 4), N."""
+    """Sum of all forces at some states.
+
+    Args:
+        states: (n, 4) x, y, vx, vy, m and m/s.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        (n, 2) in W, N.
+    """
     out = np.empty((states.shape[0], 2))
     for i in range(states.shape[0]):
         state = (states[i, 0], states[i, 1], states[i, 2], states[i, 3])
@@ -212,7 +227,22 @@ def run(
     gains: _Gains,
     tables: _Tables,
 ) -> tuple[_Array, _Array, _Array, _Array]:  # pragma: no cover
-    """Contact times, closest distances, rises of V and ends of starts (n, 4)."""
+    """Integrates starts until contact or the end.
+
+    Args:
+        starts: (n, 4) x, y, vx, vy, m and m/s.
+        steps: Most steps.
+        h: Step, s.
+        contact: P nearer to a body is contact, m.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        Times of contact (n,), s, infinite without; least distances (n,), m; largest
+        rises of V above its least value so far (n,), J; and ends (n, 4).
+    """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
     rises, ends = np.zeros(count), np.empty((count, 4))
@@ -241,7 +271,20 @@ def trajectory(
     gains: _Gains,
     tables: _Tables,
 ) -> _Array:  # pragma: no cover
-    """(steps + 1, 4) states from one start (4,), h apart."""
+    """States from one start; contact is ignored.
+
+    Args:
+        start: (4,) x, y, vx, vy, m and m/s.
+        steps: Number of steps.
+        h: Step, s.
+        bodies: (k, 6), see above.
+        p_WS: (2,) the source, m.
+        gains: See above.
+        tables: See above.
+
+    Returns:
+        (steps + 1, 4), h apart.
+    """
     out = np.empty((steps + 1, 4))
     out[0] = start
     state = (start[0], start[1], start[2], start[3])

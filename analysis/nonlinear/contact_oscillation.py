@@ -114,6 +114,9 @@ def contact_oscillation(
             beyond the equilibrium.
         duration_s: Simulated time, s.
 
+    Returns:
+        Both by velocity term.
+
     Raises:
         InputError: The law is not known.
         ValueError: There is no contact equilibrium.
@@ -134,6 +137,16 @@ def simulate_oscillation(
     contact: HeadOn, term: Variant, start_m: float, duration_s: float
 ) -> OscillationRun:
     """Runs the all-ideal build head-on from rest, and takes its cycles apart.
+
+    Args:
+        contact: Law, gains and distance to go.
+        term: Velocity term.
+        start_m: Clearance from which the run starts, m.
+        duration_s: Simulated time, s.
+
+    Returns:
+        Clearance at each tick, m; amplitude, m, growth, 1/s, and frequency, rad/s, of
+        each cycle.
 
     Raises:
         InputError: The law is not known.

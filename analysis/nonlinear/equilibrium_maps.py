@@ -100,11 +100,18 @@ class EquilibriumMap:
 
 
 def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
-    """(n, 2) cells whose potential is no higher than that of any neighbour, m.
+    """Cells whose potential is no higher than that of any neighbour.
 
     Complete up to the grid: a minimum whose basin is narrower than two cells
     may be missed. The ring of follow points, where nothing else pushes, is one
     flat minimum; its cells are all found.
+
+    Args:
+        model: Bodies, source and gains.
+        cell_m: Side of the square cells, m.
+
+    Returns:
+        (n, 2) their places in W, m.
     """
     points = np.concatenate([model.rectangles[:, :2], [model.p_WP]])
     margin = model.follow_distance_m + 0.5
@@ -162,6 +169,9 @@ def gap_map(
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
         progress: Called with the share that is done.
 
+    Returns:
+        Places of rest in W, m, by gap.
+
     Raises:
         InputError: The law is not known.
         InputError: The law has no radial force, or ``sensing`` is unknown.
@@ -188,6 +198,9 @@ def offset_map(
         offsets_m: Distances of its centre from the line, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
         progress: Called with the share that is done.
+
+    Returns:
+        Places of rest in W, m, by offset.
 
     Raises:
         InputError: The law is not known.
@@ -268,6 +281,9 @@ def boxes_scenario(
         places: Centres of the boxes, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
         size_m: Extents of each box along and across, m.
+
+    Returns:
+        Scenario of 60 s with exact hearing.
     """
     data = ideal_scenario(scenario).model_dump() | {
         "duration_s": 60.0,

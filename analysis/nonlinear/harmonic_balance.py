@@ -93,6 +93,9 @@ def predict_oscillation(
         term: Velocity term.
         largest_m: Largest amplitude, m.
         points: Number of amplitudes.
+
+    Returns:
+        Centre, m, growth, 1/s, and frequency, rad/s, by amplitude, m.
     """
     chain = motion_chain(contact.scenario)
     mass = contact.scenario.robot.mass_kg

@@ -106,6 +106,9 @@ def phase_portrait(
         velocity_term: Another one than the scenario's.
         points: Starts along either axis.
 
+    Returns:
+        Accelerations, m/s^2, contact and certified speeds, m/s, over the grid.
+
     Raises:
         InputError: The law is not known.
         ValueError: The law has no radial force.
@@ -138,11 +141,19 @@ def phase_portrait(
 def certified_speeds(
     model: PointMass, clearances: NDArray[np.float64], least: float
 ) -> NDArray[np.float64]:
-    """Speed whose energy does not reach contact from each clearance, m/s.
+    """Speed whose energy does not reach contact from each clearance.
 
     NaN where not even rest is certified. On the line the highest level on the
     way to contact is the greatest of the potential between; beyond a place that
     even the top speed cannot pass every speed is certified.
+
+    Args:
+        model: Head-on approach along x: P at -c before a face at 0.
+        clearances: (n,) ascending, m.
+        least: P nearer than this is contact, m.
+
+    Returns:
+        (n,) m/s.
     """
     fine = np.arange(least, clearances[-1] + 1e-3, 1e-3)
     points = np.column_stack([-fine, np.zeros_like(fine)])

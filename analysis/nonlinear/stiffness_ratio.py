@@ -58,6 +58,9 @@ def stiffness_ratio_map(
         scenario: Its active law's K_0, reach and velocity term.
         ratios: k_ref/K_0, above 1.
         to_go_m: See ``head_on``.
+
+    Returns:
+        Distances at which P is held, m, by ratio; NaN: nowhere.
     """
     contact = head_on(scenario.model_copy(update={"law": "active"}), to_go_m=to_go_m)
     gains = scenario.repulsion.active

@@ -68,6 +68,9 @@ def trap_stiffness(
         sensing: ``exact`` or ``cones``.
         body: ``point`` or ``face``.
 
+    Returns:
+        Along the line and across it, N/m; positive: P returns.
+
     Raises:
         InputError: The law is not known.
         InputError: The law does not hold P before the body, or a word is

@@ -108,6 +108,13 @@ def velocity_term_passivity(
 ) -> VelocityTermPassivity:
     """The sector of the scenario's velocity term, or of another one.
 
+    Args:
+        scenario: Law, gains and bodies.
+        velocity_term: ``printed`` or ``closing``; None: the scenario's.
+
+    Returns:
+        Largest slopes of the push in the obstacle's speed beside D_r, N s/m.
+
     Raises:
         InputError: The law is not known.
         ValueError: The law has no radial force.
@@ -129,6 +136,14 @@ def energy_balance(
     scenario: Scenario, *, duration_s: float = 30.0, velocity_term: str | None = None
 ) -> EnergyBalance:
     """Energies along a run of the point mass from the scenario's start.
+
+    Args:
+        scenario: Law, gains, bodies and start.
+        duration_s: Simulated time, s.
+        velocity_term: ``printed`` or ``closing``; None: the scenario's.
+
+    Returns:
+        At every step V, what was fed in and what D_r took, J.
 
     Raises:
         InputError: The law is not known.

@@ -182,6 +182,9 @@ def velocity_term_analysis(
         scenario: Law, attraction and mass.
         to_go_m: See ``head_on``.
 
+    Returns:
+        By velocity term: stiffness, N/m, and damping, N s/m, of both sides.
+
     Raises:
         InputError: The law is not known.
         ValueError: There is no contact equilibrium.
@@ -217,6 +220,9 @@ def describe_velocity_term(
         contact: Law and equilibrium distance.
         term: Which s.
         points: Amplitudes up to the top speed.
+
+    Returns:
+        Bias, N, and damping, N s/m, by amplitude of the speed, m/s.
     """
     top = contact.scenario.robot.top_speed_m_s
     amplitudes = top * (np.arange(points) + 1.0) / points

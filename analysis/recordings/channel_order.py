@@ -95,6 +95,9 @@ def misfit(
         levels: As there.
         shape: The n microphones.
         metres_per_sample: Speed of sound over the sample rate.
+
+    Returns:
+        0 to 1, or None where too few frames agree or enough of them fit.
     """
     d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
     if len(d) < 2 * _LEAST_FRAMES:
@@ -120,15 +123,19 @@ def agreeing_differences(
     metres_per_sample: float,
     tolerance_m: float = np.inf,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(f, n - 1) differences of range, m, and levels where all pairs agree.
+    """Differences of range, and levels, of the frames in which all pairs agree.
 
     Args:
         lags: As for ``exchanged_channels``.
         levels: As there, or any numbers of the frames.
         shape: The n microphones.
         metres_per_sample: Speed of sound over the sample rate.
-        tolerance_m: How well they agree, where that is less than what serves to
+        tolerance_m: How well they agree, m, where that is less than what serves to
             find a place.
+
+    Returns:
+        (k, n - 1) range from each microphone less that from microphone 0, m, and
+        levels (k, ...); k frames of f.
     """
     to_pairs = np.zeros((len(shape.pairs), shape.count))
     rows = np.arange(len(shape.pairs))

@@ -55,6 +55,10 @@ def delay_scale(
         lags: (f, p) delays of ``shape.pairs`` in f frames, samples.
         shape: The n microphones.
         metres_per_sample: Speed of sound over the sample rate.
+
+    Returns:
+        Delays over the longest ones possible, or None where they are of the array's
+        size or too few agree.
     """
     error = _SAMPLES * metres_per_sample
     d, _ = agreeing_differences(lags, lags, shape, metres_per_sample, error)

@@ -22,7 +22,13 @@ _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
 def write_locate(
     result: LocateResult, document: dict[str, Any], directory: Path
 ) -> None:
-    """Writes ``locate.json`` and ``locate.png`` into a directory that exists."""
+    """Writes ``locate.json`` and ``locate.png`` into a directory that exists.
+
+    Args:
+        result: Estimates over time.
+        document: Plain values.
+        directory: Exists.
+    """
     text = json.dumps(document, indent=2, allow_nan=False)
     (directory / "locate.json").write_text(text + "\n")
     plot_locate(result).savefig(directory / "locate.png", dpi=150)

@@ -49,7 +49,15 @@ class SourceEstimate:
 
     @classmethod
     def of(cls, t_s: float, fix: SourceFix) -> SourceEstimate:
-        """From a fix; what the array cannot tell becomes None."""
+        """From a fix; what the array cannot tell becomes None.
+
+        Args:
+            t_s: Middle of the stretch, s from the start of the recording.
+            fix: Place in the array's frame, m, with its errors.
+
+        Returns:
+            Angles in deg, range in m.
+        """
         bearing = math.isfinite(fix.bearing_std)
         elevation = fix.elevation_std is not None and math.isfinite(fix.elevation_std)
         return cls(

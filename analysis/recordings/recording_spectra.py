@@ -82,11 +82,14 @@ class RecordingSpectra:
     def spectra(
         self, snapshots: slice, lags: NDArray[np.int64] | None = None
     ) -> NDArray[np.complex64]:
-        """(n, k, f) of some snapshots.
+        """Spectra of some snapshots within the band.
 
         Args:
             snapshots: Which ones.
             lags: (n,) samples by which each channel is read later.
+
+        Returns:
+            (n, k, f) channels, snapshots and bins, in the unit of the samples.
         """
         size = self.window.size
         if lags is None:

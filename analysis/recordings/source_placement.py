@@ -88,7 +88,15 @@ def place_source(sighting: Sighting, shape: ArrayShape, c: float) -> SourceFix |
 
 
 def tolerance(sighting: Sighting, c: float) -> NDArray[np.float64]:
-    """(n - 1, n - 1) of delays, by what is not known of the air and the array, s^2."""
+    """Covariance of delays by what is not known of the air and of the array.
+
+    Args:
+        sighting: Its n - 1 delays and its coherence.
+        c: Speed of sound, m/s.
+
+    Returns:
+        (n - 1, n - 1) s^2, to be added to that from noise.
+    """
     tau = sighting.tau
     shrink = _SPEED_TOLERANCE**2
     shrink += (_REFLECTION_SHARE * (1.0 - min(sighting.coherence, 1.0))) ** 2

@@ -103,6 +103,9 @@ def late_channel(
         sightings: Delays and their errors.
         shape: The microphones.
         c: Speed of sound, m/s.
+
+    Returns:
+        Which one, and by how much; None: none is beyond doubt.
     """
     found = channel_lateness(sightings, shape, c)
     if found is None:

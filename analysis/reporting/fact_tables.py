@@ -52,6 +52,9 @@ def fact_table(
             lists of mappings are left out.
         skip: Keys, or dotted paths, to leave out.
         caption: Stands above.
+
+    Returns:
+        HTML.
     """
     rows = list(_facts(facts, "", "", frozenset(skip)))
     return table(["", ""], rows, caption=caption)
@@ -89,7 +92,15 @@ def _cell(value: Any) -> Any:
 
 
 def row_table(rows: Sequence[Mapping[str, Any]], *, caption: str = "") -> str:
-    """A table with a row for each mapping; columns are the first one's keys."""
+    """A table with a row for each mapping; columns are the first one's keys.
+
+    Args:
+        rows: Plain values by name; values that a cell cannot hold are left out.
+        caption: Stands above.
+
+    Returns:
+        HTML; empty where there are no rows.
+    """
     if not rows:
         return ""
     keys = [k for k, value in rows[0].items() if _cell(value) is not _LEFT_OUT]

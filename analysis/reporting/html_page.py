@@ -65,7 +65,16 @@ _VERDICT_CLASSES = {
 
 
 def heading(level: int, text: str, anchor: str = "") -> str:
-    """A heading of level 1 to 4."""
+    """A heading of level 1 to 4.
+
+    Args:
+        level: 1 to 4.
+        text: Plain text.
+        anchor: What links lead to; empty: none do.
+
+    Returns:
+        HTML.
+    """
     identity = f' id="{html.escape(anchor)}"' if anchor else ""
     return f"<h{level}{identity}>{html.escape(text)}</h{level}>"
 
@@ -117,6 +126,9 @@ def table(
             of a single cell spans the table and heads the rows that follow.
         caption: Stands above.
         dense: In small type, for matrices.
+
+    Returns:
+        HTML; a wide table scrolls by itself.
     """
     kind = ' class="dense"' if dense else ""
     top = f"<caption>{_inline(caption)}</caption>" if caption else ""
@@ -153,6 +165,13 @@ def number(value: complex | None, digits: int = 4) -> str:
     """A number for readers: so many significant digits, a true minus sign.
 
     Nothing is a dash, a complex number is written as a sum with j.
+
+    Args:
+        value: Any; None and NaN are nothing.
+        digits: Significant digits of a float; whole numbers keep all of theirs.
+
+    Returns:
+        Plain text.
     """
     if value is None or cmath.isnan(value):
         return "\u2013"
@@ -177,6 +196,9 @@ def figure_html(figure: Figure, name: str, caption: str) -> str:
         figure: Drawn with matplotlib.
         name: Unlike that of any other figure on the page; letters, digits, _.
         caption: Stands below.
+
+    Returns:
+        HTML, the same at every run.
     """
     stream = io.StringIO()
     with mpl.rc_context({"svg.hashsalt": name, "svg.fonttype": "path"}):
@@ -196,6 +218,9 @@ def equation(tex: str, name: str, text: str) -> str:
         tex: Without the dollar signs.
         name: As for ``figure_html``.
         text: The formula in words or plain signs, for those who hear the page.
+
+    Returns:
+        HTML.
     """
     stream = io.BytesIO()
     with mpl.rc_context({"svg.hashsalt": name, "mathtext.fontset": "cm"}):
@@ -243,6 +268,9 @@ def section(
         parts: HTML.
         level: Of the heading.
         fresh: Whether it begins a sheet of paper.
+
+    Returns:
+        HTML.
     """
     kind = ' class="fresh"' if fresh else ""
     inner = "\n".join(parts)
@@ -256,6 +284,9 @@ def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) 
         title: Of the window and at the top.
         contents: Anchor and title of each section.
         parts: HTML.
+
+    Returns:
+        HTML with its style sheet inside; nothing is loaded from elsewhere.
     """
     links = "".join(
         f'<li><a href="#{html.escape(anchor)}">{html.escape(text)}</a></li>'

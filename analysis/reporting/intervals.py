@@ -25,6 +25,9 @@ def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> I
         successes: Runs in which it happened.
         runs: All runs, at least one.
         confidence: Share of such intervals that hold the true value.
+
+    Returns:
+        Both ends, 0 to 1.
     """
     from scipy.stats import binomtest
 
@@ -48,6 +51,9 @@ def bootstrap_interval(
         seed: Seed of the resampling.
         confidence: As of ``wilson_interval``.
         resamples: Number of resampled sets.
+
+    Returns:
+        Both ends, in the unit of the statistic.
     """
     samples = np.asarray(values, dtype=float)
     generator = np.random.default_rng(seed)
@@ -67,6 +73,9 @@ def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
     Args:
         values: (n,) independent samples, at least one.
         confidence: As of ``wilson_interval``, at least.
+
+    Returns:
+        Two of the samples.
     """
     from scipy.stats import binom
 

@@ -81,6 +81,9 @@ def take_directory(
             number under ``base``.
         base: Parent of numbered directories.
 
+    Returns:
+        The directory, which exists, is empty, and belongs to this process.
+
     Raises:
         InputError: It is in use, or cannot be made or written.
     """
@@ -94,11 +97,18 @@ def take_directory(
 def whole_directory(
     out: str | Path | None, base: str | Path = "results"
 ) -> Iterator[tuple[Path, Path]]:
-    """Yields the directory of ``take_directory``, and a hidden one to write to.
+    """The directory of ``take_directory``, with a hidden one to write to.
 
     The hidden one takes the other's place at the end. If the block raises,
     KeyboardInterrupt included, nothing stays behind: not even parents that were
     made for it.
+
+    Args:
+        out: As of ``take_directory``.
+        base: Parent of numbered directories.
+
+    Yields:
+        The directory as it will be called, and the hidden one.
 
     Raises:
         InputError: As ``take_directory``.
@@ -128,6 +138,9 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
     Args:
         out: What the user named.
         parent: Whether it may hold something: the directory goes below it.
+
+    Returns:
+        An absolute path.
 
     Raises:
         InputError: It is in use, or cannot be made or written.

@@ -102,6 +102,9 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
         diagram: What to draw.
         flat: Whether to draw what is in the diagrams that it is made of, in place of
             them.
+
+    Returns:
+        One svg element, with an end of line.
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)

@@ -10,7 +10,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.simulation import RunResult
-from systems.world.geometry import contact_time, rectangle_clearance
+from systems.world.geometry import beyond_rectangle, contact_time, rectangle_clearance
 
 __all__ = ["Proximity"]
 
@@ -92,12 +92,8 @@ class Proximity:
     def distances_from_P(self) -> NDArray[np.float64]:
         """(m, n) distance from P to each body's rectangle at the ticks, m."""
         columns = self.result.columns
-        x, y = columns["p_WP_x"], columns["p_WP_y"]
-        cx, cy, theta, length, width = np.moveaxis(self.bodies, 2, 0)
-        cos, sin = np.cos(theta), np.sin(theta)
-        u = np.abs(cos * (x - cx) + sin * (y - cy)) - length / 2.0
-        v = np.abs(-sin * (x - cx) + cos * (y - cy)) - width / 2.0
-        return np.hypot(np.maximum(u, 0.0), np.maximum(v, 0.0))
+        p_WP = columns["p_WP_x"], columns["p_WP_y"]
+        return np.hypot(*beyond_rectangle(p_WP, np.moveaxis(self.bodies, 2, 0)))
 
 
 def _rectangles(result: RunResult, poses: NDArray[np.float64]) -> NDArray[np.float64]:

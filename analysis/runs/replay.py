@@ -88,12 +88,28 @@ def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
 
 
 def source_path(scenario: Scenario, name: str) -> str:
-    """Where a source is in Meshcat's tree: the only one is ``source``."""
+    """Where a source is in Meshcat's tree: the only one is ``source``.
+
+    Args:
+        scenario: Says whether there are several sources.
+        name: Of the source.
+
+    Returns:
+        Path without a slash in front.
+    """
     return f"sources/{name}" if scenario.sources else "source"
 
 
 def robot_path(own: RunResult, result: RunResult) -> str:
-    """Where one robot of a run is in Meshcat's tree: the only one is ``robot``."""
+    """Where one robot of a run is in Meshcat's tree: the only one is ``robot``.
+
+    Args:
+        own: The run of that robot.
+        result: The run of all of them.
+
+    Returns:
+        Path without a slash in front.
+    """
     return f"robots/{own.name}" if result.several else "robot"
 
 
@@ -103,7 +119,12 @@ def estimate_path(robot: str) -> str:
 
 
 def record_run(meshcat: Meshcat, result: RunResult) -> None:
-    """Records all motion of a run; the bodies must have been made before."""
+    """Records all motion of a run; the bodies must have been made before.
+
+    Args:
+        meshcat: Records already.
+        result: The run.
+    """
     frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
     scenario = result.full_scenario
     sounds = scenario.sounds()
@@ -219,7 +240,15 @@ def _record_rings(
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
-    """Which ring is seen at a time, s: each in turn while the source sounds."""
+    """Which ring is seen at a time, s: each in turn while the source sounds.
+
+    Args:
+        time: s.
+        bursts: Begin and end of each, s, that do not overlap.
+
+    Returns:
+        Index into ``RINGS``, or None in silence.
+    """
     for start, end in bursts:
         if start <= time < end:
             return math.floor((time - start) / RING_S) % len(replay_scene.RINGS)

@@ -51,7 +51,17 @@ def _colour(role: str, alpha: float = 1.0) -> Rgba:
 
 
 def upright(x: float, y: float, z: float, yaw: float = 0.0) -> RigidTransform:
-    """A body at a height above the floor, turned about the vertical."""
+    """A body at a height above the floor, turned about the vertical.
+
+    Args:
+        x: In the frame that it is put into, m.
+        y: In the same one, m.
+        z: Height, m.
+        yaw: Angle about the vertical, counterclockwise, rad.
+
+    Returns:
+        The body's pose.
+    """
     return _placed(0.0, 0.0, yaw, [x, y, z])
 
 
@@ -84,7 +94,13 @@ def _ribbon(
 
 
 def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
-    """A floor that holds the whole run, a line a metre, and a title."""
+    """A floor that holds the whole run, a line a metre, and a title.
+
+    Args:
+        meshcat: The scene.
+        result: The run.
+        title: Stands in the far left corner.
+    """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
     middle = upright((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
     slab = Box(x_high - x_low, y_high - y_low, 0.02)
@@ -213,7 +229,13 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
 
 
 def add_source(meshcat: Meshcat, source: SourceParameters, path: str) -> None:
-    """The master robot about the origin of S, its loudspeaker and its rings."""
+    """The master robot about the origin of S, its loudspeaker and its rings.
+
+    Args:
+        meshcat: The scene.
+        source: Size, and whether there is a body.
+        path: Where it is in Meshcat's tree.
+    """
     if source.body:
         body = Box(source.length_m, source.width_m, SOURCE_HEIGHT_M)
         meshcat.SetObject(f"{path}/body", body, _colour("source"))
@@ -235,7 +257,12 @@ def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) ->
 
 
 def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
-    """The boxes where they are at the start."""
+    """The boxes where they are at the start.
+
+    Args:
+        meshcat: The scene.
+        scenario: Has the obstacles.
+    """
     for obstacle in scenario.obstacles:
         path = f"obstacles/{obstacle.name}"
         box = Box(*obstacle.size_m, OBSTACLE_HEIGHT_M)
@@ -247,12 +274,24 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
 def add_trail(
     meshcat: Meshcat, path: str, points: NDArray[np.float64], colour: str
 ) -> None:
-    """One piece of a trail on the floor, through (n, 2) points in W, m."""
+    """One piece of a trail on the floor, through (n, 2) points in W, m.
+
+    Args:
+        meshcat: The scene.
+        path: Where it is in Meshcat's tree.
+        points: (n, 2) in W, m.
+        colour: As matplotlib takes it, or a key of ``COLOURS``.
+    """
     _ribbon(meshcat, path, points, _colour(colour), 0.008, 0.03)
 
 
 def set_stage(meshcat: Meshcat, result: RunResult) -> None:
-    """Even light, a plain background, and the whole run in view."""
+    """Even light, a plain background, and the whole run in view.
+
+    Args:
+        meshcat: The scene.
+        result: The run.
+    """
     for path in ("/Grid", "/Axes", "/Lights/SpotLight"):
         meshcat.SetProperty(path, "visible", value=False)
     for side in ("Negative", "Positive"):

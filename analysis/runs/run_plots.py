@@ -101,8 +101,11 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
         clearance: (n,) distance from the robot to the nearest body at each
             tick, m (``analysis.runs.proximity``); none leaves its panel out.
 
+    Returns:
+        The picture, a panel for each quantity.
+
     Raises:
-        ValueError: ``clearance`` has not one value a tick.
+        InputError: ``clearance`` has not one value a tick.
     """
     panels = [_range, _bearing, _forces, _speeds, _turning]
     distance = None if clearance is None else np.asarray(clearance, dtype=float)

@@ -17,7 +17,15 @@ __all__ = ["run_summary", "summary_text", "write_run"]
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
-    """The JSON document of a run."""
+    """The JSON document of a run.
+
+    Args:
+        result: The run.
+        out: The result directory, to be named; None: there is none.
+
+    Returns:
+        Plain values, to be written as JSON.
+    """
     document = {
         "schema_version": SCHEMA_VERSION,
         "scenario": result.full_scenario.name,
@@ -56,6 +64,11 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     ``diagram.svg`` and ``replay.html``. Of several robots each has its own
     ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows
     how they are joined.
+
+    Args:
+        result: The run.
+        summary: From ``run_summary``.
+        directory: Exists.
     """
     from analysis.runs.block_diagram import write_block_diagram
     from analysis.runs.replay import write_replay
@@ -84,7 +97,15 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
-    """The run on one screen."""
+    """The run on one screen.
+
+    Args:
+        result: The run.
+        summary: From ``run_summary``.
+
+    Returns:
+        Lines without an end of line after the last one.
+    """
     timing = summary["timing"]
     scenario = result.full_scenario
     alone = not result.several or result.cause in SUCCESSFUL

@@ -62,12 +62,28 @@ def collisions(rows: pd.DataFrame) -> NDArray[np.bool_]:
 
 
 def column(rows: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    """A figure of each run; NaN where it has none."""
+    """A figure of each run; NaN where it has none.
+
+    Args:
+        rows: n runs.
+        name: Of the column; there may be none of that name.
+
+    Returns:
+        (n,) in the figure's unit.
+    """
     if name not in rows:
         return np.full(len(rows), np.nan)
     return rows[name].to_numpy(dtype=float)
 
 
 def bootstrap_seed(seed: int, name: str) -> int:
-    """Seed of the bootstrap of a figure."""
+    """Seed of the bootstrap of a figure.
+
+    Args:
+        seed: Of the sweep.
+        name: Of the figure.
+
+    Returns:
+        32 bits: figures are resampled independently of each other.
+    """
     return crc32(json.dumps([seed, name]).encode())

@@ -38,12 +38,28 @@ _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
 
 
 def tick_at(result: RunResult, time: float) -> int:
-    """Index of the tick nearest to a time in s."""
+    """Index of the tick nearest to a time in s.
+
+    Args:
+        result: The run.
+        time: s; before the start or after the end, the first or last tick is meant.
+
+    Returns:
+        Row of ``trajectory``, from 0.
+    """
     return int(np.argmin(np.abs(result.time - time)))
 
 
 def picture_times(result: RunResult, most: int = 10) -> NDArray[np.float64]:
-    """Evenly spaced instants from the start, at most so many, s."""
+    """Evenly spaced instants from the start, at most so many, s.
+
+    Args:
+        result: The run.
+        most: At least 2.
+
+    Returns:
+        (n,) ascending from 0, s.
+    """
     end = result.simulated_s
     period = next((p for p in _NICE_PERIODS_S if end / p < most), end / (most - 1))
     return np.arange(0.0, end + 1e-9, period)
@@ -92,13 +108,29 @@ def run_title(result: RunResult) -> str:
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
-    """(from, to) of every burst that begins before ``end``, s."""
+    """Every burst that begins before an end.
+
+    Args:
+        sound: Has the schedule.
+        end: s; a burst that is under way is cut off there.
+
+    Returns:
+        From and to, s, of each.
+    """
     starts = np.arange(sound.start_s, end, sound.period_s)
     return [(float(t), min(float(t) + sound.on_s, end)) for t in starts]
 
 
 def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
-    """(x, y, theta) of an ultrasonic sensor in B, m and rad; from 0."""
+    """(x, y, theta) of an ultrasonic sensor in B, m and rad.
+
+    Args:
+        scenario: Places and axes of the sensors.
+        sensor: Its number, from 0.
+
+    Returns:
+        x, y, theta of the sensor's frame U in B, m and rad.
+    """
     x, y = scenario.ultrasonic.places[sensor]
     axis = math.radians(scenario.ultrasonic.axes_deg[sensor])
     return scenario.robot.control_point_m + x, y, axis
@@ -107,7 +139,15 @@ def sensor_pose(scenario: Scenario, sensor: int) -> tuple[float, float, float]:
 def compose(
     pose_WB: NDArray[np.float64], pose_BU: tuple[float, float, float]
 ) -> tuple[float, float, float]:
-    """pose_WU from pose_WB and pose_BU: (x, y, theta), m and rad."""
+    """A pose in B as one in W.
+
+    Args:
+        pose_WB: (3,) x, y, theta, m and rad.
+        pose_BU: x, y, theta, m and rad.
+
+    Returns:
+        x, y, theta of pose_WU, m and rad; the angle is not wrapped.
+    """
     dx, dy = rotate(pose_WB[2], pose_BU[0], pose_BU[1])
     return pose_WB[0] + dx, pose_WB[1] + dy, pose_WB[2] + pose_BU[2]
 
@@ -124,6 +164,13 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
     """Smallest x, largest x, smallest y, largest y of all bodies ever, m.
 
     Estimates do not count: a wild one would shrink all else.
+
+    Args:
+        result: The run.
+        margin: To be left about the bodies' middles, m.
+
+    Returns:
+        In W, m.
     """
     scenario, times = result.full_scenario, picture_times(result, most=60)
     centres = [
@@ -160,10 +207,17 @@ def contact_point(result: RunResult) -> NDArray[np.float64]:
 def touching_point(
     a: NDArray[np.float64], b: NDArray[np.float64]
 ) -> NDArray[np.float64]:
-    """Where two rectangles touch, (2,) in their frame, m.
+    """Where two rectangles touch.
 
     The mean of the corners of either that lie in the other, or of the nearest
     ones if none does.
+
+    Args:
+        a: (5,) x, y, theta, length, width, m and rad.
+        b: (5,) of the other one, in the same frame.
+
+    Returns:
+        (2,) in that frame, m.
     """
     corners = np.concatenate([rectangle_corners(a), rectangle_corners(b)])
     others = [b] * 4 + [a] * 4

@@ -8,6 +8,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.world.geometry import beyond_each
+
 __all__ = ["shortest_path_length"]
 
 #: Tangents that a quarter circle round a corner is made of: 0.6 % too long.
@@ -87,8 +89,7 @@ def _search(
 
 
 def _distance(point: NDArray[np.float64], box: NDArray[np.float64]) -> float:
-    u, v = _local(point[None], box)[0]
-    outside = np.maximum(np.abs([u, v]) - box[3:] / 2.0, 0.0)
+    outside = beyond_each(_local(point[None], box)[0], box[3:] / 2.0)
     return float(np.hypot(*outside))
 
 
@@ -133,8 +134,7 @@ def _distances(
 ) -> NDArray[np.float64]:
     """(n,) distance of segments from a box centred on the origin; 0 if they meet."""
     along = b - a
-    ends = [np.maximum(np.abs(point) - half, 0.0) for point in (a, b)]
-    distance = np.minimum(*(np.hypot(*end.T) for end in ends))
+    distance = np.minimum(*(np.hypot(*beyond_each(end, half).T) for end in (a, b)))
     squared = np.maximum(np.sum(along**2, axis=1), 1e-18)
     for corner in half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]):
         t = np.clip(np.sum((corner - a) * along, axis=1) / squared, 0.0, 1.0)

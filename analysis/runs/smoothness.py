@@ -59,7 +59,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
 
     Args:
         speed: (..., n) m/s; a window at rest throughout has no arc length.
-        rate_hz: Samples a second.
+        rate_hz: Rate of the samples, Hz.
 
     Returns:
         (...) dimensionless.
@@ -88,7 +88,7 @@ def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float
 
     Args:
         speed: (..., n) m/s; neither at rest throughout nor of constant slope.
-        rate_hz: Samples a second.
+        rate_hz: Rate of the samples, Hz.
 
     Returns:
         (...) dimensionless.
@@ -101,7 +101,15 @@ def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float
 
 
 def windows(values: ArrayLike, length: int) -> NDArray[np.float64]:
-    """(w, length) consecutive windows; an incomplete last one is left out."""
+    """Consecutive windows; an incomplete last one is left out.
+
+    Args:
+        values: (n,) in any unit.
+        length: Values in a window.
+
+    Returns:
+        (n // length, length).
+    """
     values = np.asarray(values, dtype=float)
     count = len(values) // length
     return values[: count * length].reshape(count, length)
@@ -113,6 +121,9 @@ def turn_reversals(turn_rate: ArrayLike, least: float) -> int:
     Args:
         turn_rate: (n,) rad/s.
         least: Rates below this are no turn, rad/s.
+
+    Returns:
+        A count; pauses between two turns do not matter.
     """
     rate = np.asarray(turn_rate, dtype=float)
     sides = np.sign(rate[np.abs(rate) >= least])

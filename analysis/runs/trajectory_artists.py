@@ -69,7 +69,13 @@ def _seconds(time: float) -> str:
 
 
 def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
-    """The path of P, and footprints with their microphones at some times, s."""
+    """The path of P, and footprints with their microphones at some times, s.
+
+    Args:
+        axes: Where to draw, in W, m.
+        look: The robot's run, colours and labels.
+        times: Of the footprints, s.
+    """
     result, colour, scenario = look.result, look.colour, look.result.scenario
     axes.plot(
         result.columns["p_WP_x"],
@@ -121,7 +127,13 @@ def _write_time(
 
 
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """The path of each source, its body at both ends, dots at some times, s."""
+    """The path of each source, its body at both ends, dots at some times, s.
+
+    Args:
+        axes: Where to draw, in W, m.
+        result: The run.
+        times: Of the dots, s.
+    """
     sources = result.full_scenario.all_sources
     for name, source in sources.items():
         path = source.path().poses(result.time)
@@ -164,7 +176,12 @@ def _draw_source(
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:
-    """A cross a heard frame, where the robot then took the source to be."""
+    """A cross a heard frame, where the robot then took the source to be.
+
+    Args:
+        axes: Where to draw, in W, m.
+        look: The robot's run, colours and labels.
+    """
     result, columns = look.result, look.result.columns
     heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
     if not heard.any():
@@ -186,7 +203,12 @@ def draw_estimates(axes: Axes, look: Look) -> None:
 
 
 def draw_obstacles(axes: Axes, result: RunResult) -> None:
-    """Resting boxes filled; moving ones in outline, with the time beside."""
+    """Resting boxes filled; moving ones in outline, with the time beside.
+
+    Args:
+        axes: Where to draw, in W, m.
+        result: The run.
+    """
     colour = COLOURS["obstacle"]
     moving, static = moving_and_static(result.full_scenario)
     for index, obstacle in enumerate(static):
@@ -217,7 +239,13 @@ def draw_obstacles(axes: Axes, result: RunResult) -> None:
 
 
 def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
-    """The sensor cones at a few of the times, s, up to the range that they read."""
+    """The sensor cones at a few of the times, s, up to the range that they read.
+
+    Args:
+        axes: Where to draw, in W, m.
+        result: The run of one robot.
+        times: s; of many only some are used.
+    """
     if "range_1" not in result.columns:
         return
     step = max(1, math.ceil(len(times) / CONE_INSTANTS))
@@ -252,7 +280,12 @@ _CONE_LABELS = {True: "ultrasonic cone with an echo", False: "cone without an ec
 
 
 def draw_collision(axes: Axes, result: RunResult) -> None:
-    """A star where the robot touched something."""
+    """A star where the robot touched something.
+
+    Args:
+        axes: Where to draw, in W, m.
+        result: The run.
+    """
     if result.collision is None:
         return
     axes.plot(

@@ -28,6 +28,9 @@ def blocks(diagram: Diagram, *, flat: bool = True) -> list[Any]:
     Args:
         diagram: What they are in.
         flat: Whether to give what diagrams in it are made of, in place of them.
+
+    Returns:
+        Systems in the order of the diagram.
     """
     systems = list(_systems(diagram, flat=flat))
     logs = {s.get_name() for s in systems if isinstance(s, VectorLogSink)}
@@ -45,6 +48,9 @@ def wires(diagram: Diagram, *, flat: bool = True) -> list[Wire]:
     Args:
         diagram: What they are in.
         flat: See ``blocks``.
+
+    Returns:
+        Sorted by target, input and source.
     """
     names = [block.get_name() for block in blocks(diagram, flat=flat)]
     found = [wire for wire in _all_wires(diagram, flat=flat) if wire.target in names]

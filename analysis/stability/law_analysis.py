@@ -126,6 +126,9 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
         names: Laws; ``all`` stands for those that avoid obstacles; none at all:
             the scenario's own.
 
+    Returns:
+        One a law; a law that is named twice comes once.
+
     Raises:
         InputError: There is no such law.
     """
@@ -152,6 +155,9 @@ def analyse_law(
         scenario: With any fidelity; parts choose theirs.
         parts: In order.
         step: Called with the title of each part before it runs.
+
+    Returns:
+        Findings by key of the part; one that has no result says why.
 
     Raises:
         InputError: The very first part, without which the others are nothing,

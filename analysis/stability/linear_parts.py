@@ -266,7 +266,15 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
 
 
 def matrix_table(model: LinearModel, matrix: str) -> str:
-    """A matrix with the names of its rows and columns; a dot is a zero."""
+    """A matrix with the names of its rows and columns; a dot is a zero.
+
+    Args:
+        model: Has the names.
+        matrix: ``A``, ``B``, ``C`` or ``D``.
+
+    Returns:
+        HTML.
+    """
     x, u, y = model.state_names, model.input_names, model.output_names
     rows, columns = {"A": (x, x), "B": (x, u), "C": (y, x), "D": (y, u)}[matrix]
     body: list[list[Cell]] = [
@@ -306,5 +314,13 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
 
 
 def top(shares: dict[str, float], count: int = 3) -> list[tuple[str, float]]:
-    """The largest shares."""
+    """The largest shares.
+
+    Args:
+        shares: By name.
+        count: How many.
+
+    Returns:
+        Name and share, largest first.
+    """
     return sorted(shares.items(), key=lambda item: -item[1])[:count]

@@ -61,7 +61,15 @@ class Margins:
     at: OperatingPoint
 
     def implemented_at(self, at: str, direction: str) -> LoopMargins | None:
-        """One of the implemented loop's margins; none: there is no such loop."""
+        """One of the implemented loop's margins.
+
+        Args:
+            at: Where the loop is cut.
+            direction: ``along`` or ``across``.
+
+        Returns:
+            The margins; None: there is no such loop.
+        """
         for found in self.implemented:
             if (found.at, found.direction) == (at, direction):
                 return found.margins

@@ -181,6 +181,9 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
     Args:
         scenario: Gains, robot and plant are used.
         at: ``sensor``: the damper stays closed; ``actuator``: both are cut.
+
+    Returns:
+        One input and one output, both accelerations, m/s^2.
     """
     chain = motion_chain(scenario)
     mass = scenario.robot.mass_kg
@@ -198,7 +201,15 @@ def attraction_loop(scenario: Scenario, at: BreakPoint) -> LinearModel:
 
 
 def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
-    """What the scenario's K_r and D_r achieve."""
+    """What the scenario's K_r and D_r achieve.
+
+    Args:
+        scenario: Gains, robot and plant.
+        thresholds: The latency that the contact mode is to spare, in ticks.
+
+    Returns:
+        Margins, lag, m, and settling, s.
+    """
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
     K_r = scenario.attraction.stiffness_n_m
     z = np.linalg.eigvals(contact_matrix(scenario, K_r))
@@ -235,6 +246,9 @@ def recommend_gains(
         scenario: Today's gains, law, robot and plant.
         thresholds: What is to be met.
         springs: K_r that are tried, as multiples of today's.
+
+    Returns:
+        Today's gains, each choice with its figures, and the one recommended.
 
     Raises:
         InputError: There is no spring today.

@@ -26,6 +26,13 @@ def stability_document(
 
     One law: its keys at the top. Several: ``laws`` holds a document each, and
     ``comparison`` the verdicts side by side.
+
+    Args:
+        analyses: One a law, of one scenario.
+        out: The result directory, to be named; None: there is none.
+
+    Returns:
+        Plain values, to be written as JSON.
     """
     first = analyses[0].scenario
     common = {
@@ -112,6 +119,11 @@ def write_stability(
     """Writes ``report.html``, ``summary.json``, ``scenario.yaml`` and models.
 
     Linear models go to ``models.mat`` and to ``models/*.csv``.
+
+    Args:
+        analyses: One a law, of one scenario.
+        document: From ``stability_document``.
+        directory: Exists.
     """
     several = len(analyses) > 1
     models = [

@@ -72,7 +72,17 @@ def loop_robustness(
     *,
     samples: int,
 ) -> LoopRobustness:
-    """Pole cloud, worst case and sensitivities of a loop of 25 ms periods."""
+    """Pole cloud, worst case and sensitivities of a loop of 25 ms periods.
+
+    Args:
+        scenario: Gives the seed.
+        poles: The loop, from parameters to poles in the z plane.
+        parameters: The box.
+        samples: Random points of the box.
+
+    Returns:
+        Poles in the z plane; sensitivities in 1/s.
+    """
     return LoopRobustness(
         pole_cloud(
             poles,

@@ -53,7 +53,15 @@ def read_damping(study: Study) -> Reading:
 
 
 def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]:
-    """Of all cuts and directions."""
+    """The worst of a margin over all cuts and directions.
+
+    Args:
+        name: Field of ``LoopMargins``, or ``disk``.
+        largest: Whether the largest is the worst.
+
+    Returns:
+        Reads it from a study, in the unit of the field; a text says why there is none.
+    """
 
     def read(study: Study) -> Reading:
         margins: Margins | None = study.found.get("margins")
@@ -99,7 +107,15 @@ def read_offset(study: Study) -> Reading:
 
 
 def read_contact(study: Study, ticks: int) -> Reading:
-    """Growth of the contact mode at the law's largest slope, 1/s."""
+    """Growth of the contact mode at the law's largest slope, 1/s.
+
+    Args:
+        study: Has the scenario.
+        ticks: Age of the position that the springs act on, periods of 25 ms.
+
+    Returns:
+        1/s, negative where it decays; a text says why there is none.
+    """
     scenario = study.scenario
     stiffness = law_stiffness(scenario)
     if stiffness <= 0.0:

@@ -78,6 +78,9 @@ def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdic
         criterion: What is asked.
         value: The number; none where there is none.
         reason: Why there is none; a clause.
+
+    Returns:
+        Pass, fail or not applicable, with a text.
     """
     if value is None:
         verdict: Judgement = "not applicable"

@@ -93,8 +93,8 @@ def run_on_cluster(
 
     Args:
         tasks: What to run.
-        client: See ``connect``; closed at the end.
         pulse: Called a few times a second; what it raises ends the work.
+        client: See ``connect``; closed at the end.
 
     Yields:
         Outcomes as they come. The runs of a Dask worker that is lost go to the

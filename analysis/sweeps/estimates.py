@@ -168,7 +168,15 @@ def marginal(
 
 
 def shown(quantity: Quantity, estimate: Estimate) -> str:
-    """An estimate with its interval, for readers; a dash where there is none."""
+    """An estimate with its interval, for readers; a dash where there is none.
+
+    Args:
+        quantity: Says whether it is a rate.
+        estimate: Value and both ends of its interval, in the quantity's unit.
+
+    Returns:
+        Rates in %, others with three significant digits.
+    """
     if math.isnan(estimate.value):
         return "-"
     scale, form = (100.0, ".0f") if quantity.rate else (1.0, ".3f")
@@ -178,13 +186,29 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
 
 
 def cell_label(fields: dict[str, Any], names: Sequence[str] | None = None) -> str:
-    """Fields of a cell in words: last part of each path, and value."""
+    """Fields of a cell in words: last part of each path, and value.
+
+    Args:
+        fields: Values of the grid by path.
+        names: Paths to show; None: all.
+
+    Returns:
+        ``all runs`` where there is nothing to show.
+    """
     chosen = fields if names is None else {name: fields[name] for name in names}
     pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in chosen.items()]
     return ", ".join(pairs) or "all runs"
 
 
 def short(value: Any, most: int = 24) -> str:
-    """A value in few letters."""
+    """A value in few letters.
+
+    Args:
+        value: Plain value; what is not text is written as JSON.
+        most: Letters, at least 4.
+
+    Returns:
+        At most so many letters; of longer ones the end is left out.
+    """
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= most else f"{text[: most - 3]}..."

@@ -63,6 +63,10 @@ def run_task(task: Task) -> Outcome:
 def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
     """Refuses results that hold no run but failed ones.
 
+    Args:
+        tables: Results, one a sweep; see ``load_results``.
+        out: The directory, for the message.
+
     Raises:
         RunError: All failed; says how the first one did.
     """
@@ -75,7 +79,15 @@ def require_runs(tables: Sequence[pd.DataFrame], out: Path) -> None:
 
 
 def lost_outcome(task: Task, reason: str) -> Outcome:
-    """The outcome of a run whose worker ended each time."""
+    """The outcome of a run whose worker ended each time.
+
+    Args:
+        task: What was to be run.
+        reason: What became of the worker.
+
+    Returns:
+        A failed run, with the reason as its error.
+    """
     return Outcome(_row(task.point, FAILED, perf_counter(), error=reason))
 
 

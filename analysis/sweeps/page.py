@@ -45,7 +45,14 @@ def write_sweep(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> None:
-    """Writes ``summary.json`` and ``report.html`` into the sweep's directory."""
+    """Writes ``summary.json`` and ``report.html`` into the sweep's directory.
+
+    Args:
+        plan: What was run.
+        points: All its runs.
+        results: See ``load_results``.
+        summary: From ``sweep_summary``; names the directory, which exists.
+    """
     out = Path(summary["out"])
     document = json.dumps(summary, indent=2, allow_nan=False)
     (out / "summary.json").write_text(document + "\n", "utf-8")
@@ -60,7 +67,17 @@ def sweep_page(
     results: pd.DataFrame,
     summary: dict[str, Any],
 ) -> str:
-    """The whole page; arguments as of ``sweep_summary``."""
+    """The whole page.
+
+    Args:
+        plan: What was run.
+        points: All its runs.
+        results: See ``load_results``.
+        summary: From ``sweep_summary``.
+
+    Returns:
+        HTML.
+    """
     cells = {"How the runs ended": [_causes(plan, results), _figures(plan, results)]}
     few = len(plan.cells()) <= MOST_CELLS
     parts = {

@@ -45,6 +45,9 @@ def plot_heat_maps(
         x: Path of the field along the first axis.
         y: Path of the field along the second one.
         rest: Values of the grid's other fields.
+
+    Returns:
+        The picture, a panel for each quantity.
     """
     cells = plan.cells()
     figure, panels = _panels(results, 3.5)
@@ -109,7 +112,16 @@ def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
-    """Every quantity over the one field of the grid, with 95 % intervals."""
+    """Every quantity over the one field of the grid, with 95 % intervals.
+
+    Args:
+        plan: The sweep; its grid has one field.
+        results: See ``load_results``.
+        x: Path of that field.
+
+    Returns:
+        The picture, a panel for each quantity.
+    """
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
         estimates = [
@@ -128,6 +140,14 @@ def plot_marginal(plan: SweepPlan, results: pd.DataFrame, key: str) -> Figure:
 
     The first axis of the grid with few enough values has the curves; over the
     others, as over all other draws, the runs are taken together.
+
+    Args:
+        plan: The sweep.
+        results: See ``load_results``.
+        key: Of ``plan.draw``.
+
+    Returns:
+        The picture, a panel for each quantity.
     """
     runs = ended(results)
     split = next(

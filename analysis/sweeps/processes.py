@@ -108,8 +108,8 @@ def run_locally(
 
     Args:
         tasks: What to run.
-        workers: Number of processes.
         pulse: Called a few times a second; what it raises ends the work.
+        workers: Number of processes.
 
     Yields:
         Outcomes as they come. A run whose worker ends, as when the system is

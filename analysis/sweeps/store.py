@@ -163,7 +163,15 @@ def load_results(out: str | Path) -> pd.DataFrame:
 
 
 def trajectory_path(out: Path, index: int) -> Path:
-    """The file of a run's trajectory."""
+    """The file of a run's trajectory.
+
+    Args:
+        out: Directory of the sweep.
+        index: Number of the run, from 0.
+
+    Returns:
+        A Parquet file below ``trajectories/``.
+    """
     return out / "trajectories" / f"{index:06d}.parquet"
 
 

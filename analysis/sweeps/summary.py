@@ -40,6 +40,9 @@ def sweep_summary(
         points: All its runs.
         results: See ``load_results``.
         out: The directory, for commands.
+
+    Returns:
+        Plain values, to be written as JSON.
     """
     failed = results[results["cause"] == FAILED]
     return {
@@ -94,7 +97,15 @@ def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
 
 
 def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
-    """A line a cell, with 95 % intervals."""
+    """A line a cell, with 95 % intervals.
+
+    Args:
+        plan: What was run.
+        results: See ``load_results``.
+
+    Returns:
+        Lines without an end of line after the last one.
+    """
     figured = quantities(results)
     headings = ["cell", "runs", *(quantity.title for quantity in figured)]
     rows = [headings]

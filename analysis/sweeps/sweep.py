@@ -99,6 +99,9 @@ def prepare_sweep(
         scheduler: Address of a Dask scheduler to use instead.
         resume: Whether ``out`` may hold runs of the same plan, which are kept.
 
+    Returns:
+        The sweep, to be run once; its directory is locked until then.
+
     Raises:
         InputError: Something of that is no good; says what, and the remedy.
     """
@@ -133,7 +136,22 @@ def run_sweep(
     resume: bool = False,
     progress: Callable[[int], None] | None = None,
 ) -> pd.DataFrame:
-    """Prepares and runs a sweep; see ``prepare_sweep`` and ``PreparedSweep.run``."""
+    """Prepares and runs a sweep; see ``prepare_sweep`` and ``PreparedSweep.run``.
+
+    Args:
+        plan: What to run.
+        out: The directory.
+        workers: Number of local processes; None: one a core.
+        scheduler: Address of a Dask scheduler to use instead.
+        resume: Whether ``out`` may hold runs of the same plan, which are kept.
+        progress: Called with the number of runs done.
+
+    Returns:
+        A row a run; see ``load_results``.
+
+    Raises:
+        InputError: As ``prepare_sweep``.
+    """
     prepared = prepare_sweep(
         plan, out, workers=workers, scheduler=scheduler, resume=resume
     )
@@ -141,7 +159,15 @@ def run_sweep(
 
 
 def reproducing_command(out: Path, point: SweepPoint) -> str:
-    """The shell command that does one run of a sweep again."""
+    """The shell command that does one run of a sweep again.
+
+    Args:
+        out: Directory of the sweep; has the scenario's file.
+        point: The run.
+
+    Returns:
+        One line, quoted for a shell.
+    """
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
         words += ["--set", f"{path}={json.dumps(value, ensure_ascii=False)}"]

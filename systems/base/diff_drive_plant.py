@@ -46,7 +46,16 @@ class PlantParameters(Parameters):
 
 
 def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
-    """Forward speed, m/s, and yaw rate, rad/s, from wheel speeds in rad/s."""
+    """Motion of the body from the speeds of its wheels.
+
+    Args:
+        wheel_speeds: Left and right wheel, rad/s; floats or AutoDiffXd.
+        robot: Radius and separation of the wheels.
+        slip: Part of the left and right rim speed that is lost, below 1.
+
+    Returns:
+        Forward speed, m/s, and yaw rate, rad/s, counterclockwise.
+    """
     left = robot.wheel_radius_m * (1.0 - slip[0]) * wheel_speeds[0]
     right = robot.wheel_radius_m * (1.0 - slip[1]) * wheel_speeds[1]
     return _rim_twist(left, right, robot.wheel_separation_m)
@@ -73,7 +82,15 @@ class PlantNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, plant: PlantParameters) -> PlantNumbers:
-        """From the parameters."""
+        """From the parameters.
+
+        Args:
+            robot: Wheels and top speed.
+            plant: Lag of the motors, and the part of the rim speeds that slip takes.
+
+        Returns:
+            The numbers; the radii are those that slip leaves of the wheels.
+        """
         left, right = plant.slip
         return cls(
             robot.wheel_radius_m * (1.0 - left),
@@ -101,7 +118,7 @@ def plant_derivatives(
             speed; m, rad, rad/s.
         commanded: (2,) left and right wheel speed, rad/s.
         left_rim_m: See ``PlantNumbers``, also for the others.
-        right_rim_m: m/rad.
+        right_rim_m: The same of the right end, m/rad.
         wheel_separation_m: m.
         top_wheel_speed: rad/s.
         motor_lag_s: s.
@@ -135,7 +152,7 @@ def slipping_derivatives(
             leftward speed, m/s, and yaw rate, rad/s.
         commanded: (2,) left and right wheel speed, rad/s.
         left_rim_m: See ``PlantNumbers``, also for the others.
-        right_rim_m: m/rad.
+        right_rim_m: The same of the right end, m/rad.
         wheel_separation_m: m.
         top_wheel_speed: rad/s.
         motor_lag_s: s.

@@ -30,7 +30,15 @@ class GripNumbers(NamedTuple):
 
     @classmethod
     def of(cls, robot: RobotParameters, friction: float) -> GripNumbers:
-        """A uniform rectangle whose weight the two driven wheels share."""
+        """A uniform rectangle whose weight the two driven wheels share.
+
+        Args:
+            robot: Length and width of the rectangle.
+            friction: Coefficient between tyres and floor.
+
+        Returns:
+            Half of friction times gravity, m/s^2, and (length^2 + width^2) / 12, m^2.
+        """
         return cls(
             friction * GRAVITY_M_S2 / 2.0,
             (robot.length_m**2 + robot.width_m**2) / 12.0,

@@ -37,7 +37,15 @@ class OdometryParameters(Parameters):
 
 
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
-    """Wheel angle in whole pulses, rad."""
+    """Wheel angle in whole pulses, rad.
+
+    Args:
+        angle: Of the wheel since the start, rad, of either sign.
+        pulses_per_revolution: Of the encoder.
+
+    Returns:
+        The greatest whole number of pulses that is not above the angle, rad.
+    """
     pulse = math.tau / pulses_per_revolution
     return math.floor(angle / pulse) * pulse
 

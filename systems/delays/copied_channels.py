@@ -52,6 +52,9 @@ def repeats(
         second: (n,) samples.
         lag: By how many samples the second is later.
         step: Between two values that samples can have, in their unit.
+
+    Returns:
+        True where the residue after the best gain is no more than rounding leaves.
     """
     left, power, other = _difference(first, second, lag)
     return bool(_is_copy(left, power, other, _ROUNDING * step**2))
@@ -75,6 +78,9 @@ def frame_repeats(
             microphones may hear the same at the same time.
         noisy: Whether there is noise to tell a later sound from a copy. Without any,
             what is later by whole samples is no copy yet.
+
+    Returns:
+        True where one of the pairs does.
     """
     step = 1.0 if frame.dtype == np.int16 else 0.0
     rounding = _ROUNDING * step**2
@@ -127,6 +133,9 @@ def copied_pairs(
     Args:
         samples: (n, samples) channels that hold something, without NaN.
         sample_rate_hz: Rate of the samples, Hz.
+
+    Returns:
+        (i, j) of each such pair, i < j, channels from 0.
     """
     loud, most = _block(samples, _LOUD_S, sample_rate_hz, np.argmax)
     pause, least = _block(samples, _PAUSE_S, sample_rate_hz, np.argmin)

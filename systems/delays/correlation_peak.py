@@ -219,14 +219,18 @@ def measure_peaks(
     """Fields of ``Peaks``; a correlation of 0 where there is no peak.
 
     Args:
-        cross: From ``_pair_spectra``.
+        cross: (p, bins) of the pairs, units of the frame squared.
         weights: (p, bins).
-        energy: From ``_pair_spectra``.
-        arrivals: See ``find_peaks``.
+        energy: (n,) of the channels, units of the frame squared.
+        arrivals: (n,) see ``find_peaks``, samples.
         tables: ``PairTables``.
         sizes: First bin, length of the transform, and of the cut channels
             less what their edges cost, samples.
         newton: See ``find_peaks``.
+
+    Returns:
+        Arrivals (n,), samples, their covariance (n - 1, n - 1), samples^2, and the
+        floats ``correlation`` to ``closure``, in the order of ``Peaks``.
     """
     pairs, to_delays, to_shares = tables
     first, length, cut_samples = sizes

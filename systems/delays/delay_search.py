@@ -298,6 +298,9 @@ def search_delays(
         phat: Whether to whiten.
         by_amdf: Whether the delays are those of the papers' function.
             Detection rests on the correlation all the same.
+
+    Returns:
+        First arrivals, samples, and how far they are to be believed.
     """
     size = plan.grid // 2 + 1
     cross, moments, energy = _cross_spectra(spectra, plan.edges, band.start, size)

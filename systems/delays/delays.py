@@ -77,6 +77,12 @@ def look(
 ) -> tuple[DelaySearch, slice] | None:
     """First look at a frame; see ``estimate_delays``.
 
+    Args:
+        frame: (n, frame_samples), any unit.
+        plan: Rates, band and array.
+        method: A key of METHODS.
+        find_band: Whether to use the occupied part of the band alone.
+
     Returns:
         The search and the bins that it used, or None where a channel is silent.
     """

@@ -20,12 +20,16 @@ EDGE_SAMPLES = 16
 def cut_to_overlap(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64]
 ) -> NDArray[np.float32]:
-    """(n, m) the stretch that all channels share, with soft edges.
+    """The stretch that all channels share, with soft edges.
 
     Args:
         frame: (n, samples) channels.
         arrivals: (n,) arrival at each channel after channel 0, samples. Channels
             are cut at whole samples; their edges follow what is left of it.
+
+    Returns:
+        (n, m) in the frame's unit; m is the frame's length less the largest difference
+        of the arrivals, in whole samples.
     """
     cut, length = cut_rows(frame, arrivals, *frame.shape)
     return np.ascontiguousarray(cut[:, :length])
@@ -36,6 +40,12 @@ def cut_rows(
     frame: NDArray[np.float32], arrivals: NDArray[np.float64], rows: int, columns: int
 ) -> tuple[NDArray[np.float32], int]:  # pragma: no cover  (compiled)
     """``cut_to_overlap``, with zeros after and below.
+
+    Args:
+        frame: (n, samples) channels.
+        arrivals: (n,) arrival at each channel after channel 0, samples.
+        rows: Of the output, at least n.
+        columns: Of the output, at least m.
 
     Returns:
         (rows, columns), of which the first m columns hold the stretch, and m.

@@ -50,7 +50,16 @@ class EchoMemory:
         self.taper = (np.sin(np.pi * phase) * math.sqrt(0.5)).astype(np.float32)
 
     def faded(self, memory: NDArray[np.float32], samples: int) -> NDArray[np.float32]:
-        """The memory after so many samples of silence."""
+        """The memory after so many samples of silence.
+
+        Args:
+            memory: (n, bins) power that echoes may still have, units of the frame
+                squared.
+            samples: Length of the silence.
+
+        Returns:
+            (n, bins), smaller by the decay of so many samples.
+        """
         return memory * np.float32(self.decay_a_hop ** (samples / self.hop))
 
     def least(self, noise_density: float) -> float:

@@ -19,7 +19,15 @@ def filled_rows(channels: int) -> int:
 
 
 def transform_rows(frame: NDArray[np.float32], length: int) -> NDArray[np.complex64]:
-    """(n, length // 2 + 1) spectra of (n, samples) channels, padded with zeros."""
+    """Spectra of channels that are padded with zeros.
+
+    Args:
+        frame: (n, samples) channels, any unit.
+        length: Of the transform, samples; at least that of the channels.
+
+    Returns:
+        (n, length // 2 + 1), in the unit of the frame.
+    """
     channels, samples = frame.shape
     rows = np.zeros((filled_rows(channels), length), dtype=np.float32)
     rows[:channels, :samples] = frame

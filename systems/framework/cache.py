@@ -21,6 +21,15 @@ def declare_cache(
 
     Ports that share it take ``{entry.ticket()}`` as their prerequisite and
     read ``entry.Eval(context)``; they must not change the object.
+
+    Args:
+        system: The block.
+        description: Name of the entry.
+        compute: Takes a context; returns any object.
+        prerequisites: Tickets of what ``compute`` reads: ports, states, time.
+
+    Returns:
+        The entry, to be evaluated in a context.
     """
 
     def calc(context: Any, value: Any) -> None:

@@ -36,6 +36,13 @@ _SCALAR = "_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}"
 def read_list(context: Any, port: Any) -> list[Any]:
     """Values of a vector input port, floats or AutoDiffXd.
 
+    Args:
+        context: Of the block.
+        port: Vector input port of n elements, connected.
+
+    Returns:
+        The n elements, in the port's unit.
+
     Raises:
         ValueError: An element is not finite; names block, port, element and time.
     """
@@ -47,7 +54,18 @@ def read_list(context: Any, port: Any) -> list[Any]:
 
 
 def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
-    """``read_list`` of several ports, in half the time."""
+    """``read_list`` of several ports, in half the time.
+
+    Args:
+        context: Of the block.
+        ports: Vector input ports, connected.
+
+    Returns:
+        A list of elements for each port.
+
+    Raises:
+        ValueError: As ``read_list``.
+    """
     values = [port.Eval(context).tolist() for port in ports]
     added = sum(chain.from_iterable(values))
     if added - added != 0.0:
@@ -56,7 +74,18 @@ def read_lists(context: Any, ports: Sequence[Any]) -> list[list[Any]]:
 
 
 def read_arrays(context: Any, ports: Sequence[Any]) -> list[Any]:
-    """``read_lists`` where arrays are wanted."""
+    """``read_lists`` where arrays are wanted.
+
+    Args:
+        context: Of the block.
+        ports: Vector input ports, connected.
+
+    Returns:
+        (n,) array of each port: of floats, or of AutoDiffXd as objects.
+
+    Raises:
+        ValueError: As ``read_list``.
+    """
     arrays = [port.Eval(context) for port in ports]
     added = sum(chain.from_iterable(map(np.ndarray.tolist, arrays)))
     if added - added != 0.0:
@@ -71,6 +100,11 @@ def _check_ports(context: Any, ports: Sequence[Any], values: Sequence[Any]) -> N
 
 def check_record(context: Any, port: Any, record: Any) -> None:
     """Refuses a named tuple on an abstract port that holds what is not finite.
+
+    Args:
+        context: Of the block, for the time in the message.
+        port: Abstract input port that carries the record.
+        record: Named tuple of numbers and arrays; integers are finite.
 
     Raises:
         ValueError: As ``read_list``.
@@ -94,7 +128,17 @@ def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
 
 
 def check_port(context: Any, port: Any, values: Any, field: str = "") -> None:
-    """Says which element of what a port carries is not finite, if one is."""
+    """Says which element of what a port carries is not finite, if one is.
+
+    Args:
+        context: Of the block, for the time in the message.
+        port: Input port.
+        values: What it carries, or one field of that: a number or an array.
+        field: Name of the field, with a dot before it; empty: the whole.
+
+    Raises:
+        ValueError: An element is not finite; names block, port, element and time.
+    """
     block = type(port.get_system()).__name__.partition(_SCALAR)[0]
     time = float_of(context.get_time())
     remedy = "look for the block upstream that made it so"

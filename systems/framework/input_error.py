@@ -32,7 +32,16 @@ class InputError(ValueError):
 
 
 def shortened(text: str, length: int) -> str:
-    """A text on one line without its middle, so that it has at most ``length``."""
+    """A text on one line without its middle, so that it has at most ``length``.
+
+    Args:
+        text: Any text; white space becomes single blanks, what cannot be printed an
+            escape.
+        length: Most characters, more than 10.
+
+    Returns:
+        The text itself where it is short enough, else its ends about `` ... ``.
+    """
     # What is far too long is cut first: escaping all of it would take memory.
     if len(text) > 8 * length:
         text = f"{text[: 4 * length]}{text[-4 * length :]}"

@@ -63,6 +63,13 @@ def tick_generator(seed: int, tick: int) -> Generator:
     Blocks keep no generator: a context that is run again, or a block that is
     read twice, must see the same noise. SFC64 is numpy's fastest; its start
     from hashed words makes the streams of different ticks independent.
+
+    Args:
+        seed: Of the block.
+        tick: Number of the tick; 0 is at 0 s.
+
+    Returns:
+        A generator whose numbers only these two decide.
     """
     # numpy's stub forgets ISeedSequence, which its documentation names.
     return Generator(SFC64(_TickSeed(seed, tick)))  # type: ignore[arg-type]
@@ -104,6 +111,14 @@ def standard_normals(
     Sums of two numbers from a table of 65 536 quantiles, normal up to 5.9 standard
     deviations, where they end. Their words are those of splitmix64 from a place
     hashed from seed and tick.
+
+    Args:
+        shape: Rows and columns.
+        seed: Of the block.
+        tick: Number of the tick.
+
+    Returns:
+        (rows, columns) of unit variance.
     """
     out = np.empty(shape, dtype=np.float32)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)
@@ -204,6 +219,14 @@ def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.floa
 
     Nine times as fast as numpy's numbers; they end at 5.8 standard deviations. Their
     words are those of splitmix64 from a place hashed from seed and tick.
+
+    Args:
+        shape: Rows and columns: channels and samples.
+        seed: Of the block.
+        tick: Number of the tick.
+
+    Returns:
+        (rows, columns) of unit variance.
     """
     out = np.empty(shape, dtype=np.float32)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)

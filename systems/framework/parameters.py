@@ -86,7 +86,15 @@ class Parameters(BaseModel):
     def model_copy(
         self, *, update: Mapping[str, Any] | None = None, deep: bool = False
     ) -> Self:
-        """A copy with some fields changed; cached properties are worked out anew."""
+        """A copy with some fields changed; cached properties are worked out anew.
+
+        Args:
+            update: New values by field; they are not validated.
+            deep: Whether values are copied as well.
+
+        Returns:
+            A parameter set of the same class.
+        """
         copied = super().model_copy(update=update, deep=deep)
         for name in copied.__dict__.keys() - type(self).model_fields.keys():
             del copied.__dict__[name]

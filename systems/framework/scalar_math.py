@@ -1,7 +1,8 @@
 """Elementary functions of floats, and of AutoDiffXd where there are derivatives.
 
-They are those of ``pydrake.math``; for floats ``math`` has the same ones in a third
-of the time, but raises where they are infinite or not a number.
+They are those of ``pydrake.math``, and sine and cosine of arrays those of numpy; for
+floats ``math`` has the same ones in a third of the time, but raises where they are
+infinite or not a number.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pydrake.math
 
 __all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
@@ -26,6 +28,8 @@ def cos(x: Any) -> Any:
     """Cosine of x in rad."""
     if type(x) is float and math.isfinite(x):
         return math.cos(x)
+    if isinstance(x, np.ndarray):
+        return np.cos(x)
     return pydrake.math.cos(x)
 
 
@@ -33,6 +37,8 @@ def sin(x: Any) -> Any:
     """Sine of x in rad."""
     if type(x) is float and math.isfinite(x):
         return math.sin(x)
+    if isinstance(x, np.ndarray):
+        return np.sin(x)
     return pydrake.math.sin(x)
 
 

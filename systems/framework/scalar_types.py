@@ -45,5 +45,8 @@ def define_for_scalars(name: str, module: str) -> Any:
         name: Of the template, with an underscore at its end.
         module: ``__name__`` of the module. Drake would find it by itself, by
             searching all that is loaded for 0.1 s a block.
+
+    Returns:
+        The decorator; it gives back the template, ``template[T]`` of which is a class.
     """
     return _Template.define(name, T_list=[float, AutoDiffXd], scope=sys.modules[module])

@@ -41,7 +41,16 @@ _LEAST_OVERLAP = 0.25
 
 
 def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
-    """(n - 1,) delays t_k - t_0 of the sound from a fix, s."""
+    """Delays of the sound from a fix at the microphones.
+
+    Args:
+        fix: Place in A; where its range is not known, a direction to a plane wave.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        (n - 1,) t_k - t_0, s.
+    """
     if fix.range_valid:
         ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
     else:

@@ -41,7 +41,16 @@ class IdealHearingParameters(Parameters):
 
 
 def relative_position(pose_WB, pose_WS, control_point_m):
-    """p_PS_B: the source from P in B axes, m; floats or AutoDiffXd."""
+    """The source as seen from the robot; floats or AutoDiffXd.
+
+    Args:
+        pose_WB: x, y, theta of the robot, m and rad.
+        pose_WS: x, y, theta of the source; its heading does not count.
+        control_point_m: Distance of P ahead of the origin of B, m.
+
+    Returns:
+        x and y of p_PS_B, the source from P in B axes, m.
+    """
     x_P, y_P = control_point(pose_WB, control_point_m)
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
 

@@ -86,6 +86,9 @@ class SearchGrid:
             high_hz: Highest frequency of the correlations, Hz.
             lag_rate_hz: Columns of a correlation in a second, about
                 ``LAG_DENSITY`` times as many.
+
+        Returns:
+            The g places, and the column of each pair's correlation for each of them.
         """
         path = _PATH_SHARE * c / high_hz
         coarseness = 1.0
@@ -116,7 +119,17 @@ def centroid_delays(
     shape: ArrayShape,
     c: float,
 ) -> NDArray[np.float64]:
-    """(g, n) times by which microphones hear later than the centroid, s."""
+    """How much later than their centroid the microphones hear each place.
+
+    Args:
+        places: (g, d) places in A, m; unit vectors where they are infinitely far.
+        inverse_range: (g,) 1/m; 0 where they are infinitely far.
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        (g, n) s; negative: earlier.
+    """
     far = -places @ shape.p_AM.T
     ranges = np.linalg.norm(places, axis=1, keepdims=True)
     to_microphones = np.linalg.norm(places[:, np.newaxis] - shape.p_AM, axis=2)
@@ -232,12 +245,15 @@ def _lattice(dimension: int, steps: _Steps, *, ahead: bool) -> NDArray[np.float6
 def steered_response(
     correlations: NDArray[np.float32], grid: SearchGrid
 ) -> NDArray[np.float32]:
-    """(g,) mean over the pairs of the correlations at each place's delays.
+    """Mean over the pairs of the correlations at each place's delays.
 
     Args:
         correlations: (p, 2 max_lag + 1) at the rate of the grid; no delay
             stands in the middle.
         grid: The places.
+
+    Returns:
+        (g,) in the unit of the correlations.
     """
     if grid.coarseness > 1.0:
         correlations = np.stack(

@@ -411,8 +411,9 @@ def fold(
     """Folds a sighting into the memory.
 
     Args:
-        memory: Changed; its ages are those of the moment the sighting arrives.
-        sighting: The sighting.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,), changed; its ages are those
+            of the moment the sighting arrives.
+        sighting: (10,) see the module's docstring.
         settings: ``FilterSettings``.
 
     Returns:
@@ -442,9 +443,13 @@ def expected(
     """A copy of the chosen track as it is expected to be now.
 
     Args:
-        memory: Its ages are those of now.
-        velocity_fade: See ``FilterSettings``.
-        speed_std: The same.
+        memory: (1 + HYPOTHESIS,) or (1 + 2 HYPOTHESIS,); its ages are those of now.
+        velocity_fade: See ``FilterSettings``, s.
+        speed_std: The same, m/s.
+
+    Returns:
+        (TRACK,) elements as in TRACK_NAMES; of a track that never heard anything a
+        mere copy.
     """
     track = chosen_track(memory).copy()
     if track[0] < NEVER_HEARD_S:

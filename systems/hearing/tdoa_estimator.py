@@ -36,6 +36,11 @@ def robot_localiser(
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """The localiser of the robot's own microphones.
 
+    Args:
+        parameters: Of the estimator.
+        robot: Places of the microphones.
+        acoustics: Speed of sound.
+
     Returns:
         The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
@@ -51,6 +56,9 @@ def may_sound(sound: SoundParameters, time: float, longest_way: float) -> bool:
         sound: Its gate.
         time: End of the frame, s.
         longest_way: Longest that sound can take to the microphones, s.
+
+    Returns:
+        False where the frame can only hold noise and reverberation.
     """
     phase = time - sound.start_s
     # A frame that ends as a burst begins holds none of it.
@@ -207,6 +215,11 @@ def port_values(
     Args:
         fix: What was heard.
         p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+
+    Returns:
+        Bearing (1,), rad, range (1,), m, p_PS_B (2,), m, or a unit vector where the
+        range is not known, its covariance (4,), m^2, and (1,) flags 0 or 1: heard, and
+        range known.
     """
     if fix is None:
         return _NOTHING

@@ -128,7 +128,17 @@ class Track(NamedTuple):
 def past_pose(
     pose_now: NDArray[Any], pose_1: NDArray[Any], pose_2: NDArray[Any], age: Any
 ) -> NDArray[Any]:
-    """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line."""
+    """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line.
+
+    Args:
+        pose_now: (3,) x, y, theta in W, m and rad.
+        pose_1: (3,) a tick ago.
+        pose_2: (3,) two ticks ago.
+        age: s; a number or AutoDiffXd.
+
+    Returns:
+        (3,) x, y, theta in W, m and rad.
+    """
     ticks = age / FRAME_PERIOD_S
     if ticks <= 1.0:
         return pose_now + ticks * (pose_1 - pose_now)
@@ -241,7 +251,16 @@ class TrackerModel:
         return Track(pose, pose, pose, blank_memory(self._hypotheses))
 
     def hear(self, track: Track, estimate: Measurement, pose: Any) -> Track:
-        """The track with an estimate folded in that arrives at ``pose``."""
+        """The track with an estimate folded in that arrives at ``pose``.
+
+        Args:
+            track: Before.
+            estimate: Of the source, as it was a measurement's age ago.
+            pose: (3,) odometry pose of the robot now, m and rad.
+
+        Returns:
+            A new track; an outlier leaves the pose of the last believed one.
+        """
         poses = np.asarray(pose), track.pose_1, track.pose_2
         p_PS_B, covariance, ranged = estimate
         memory = track.memory.copy()
@@ -255,12 +274,28 @@ class TrackerModel:
         return track._replace(pose_heard=heard, memory=memory)
 
     def older(self, track: Track, pose: Any) -> Track:
-        """The track a tick later, when ``pose`` has become the last one."""
+        """The track a tick later, when ``pose`` has become the last one.
+
+        Args:
+            track: At this tick.
+            pose: (3,) odometry pose of the robot at this tick, m and rad.
+
+        Returns:
+            A new track, older by 25 ms.
+        """
         memory = track.memory + self._tick
         return Track(np.asarray(pose), track.pose_1, track.pose_heard, memory)
 
     def position(self, track: Track, pose: Any) -> Any:
-        """The target in W for a robot at ``pose``, (2,) m."""
+        """The target in W for a robot at ``pose``, (2,) m.
+
+        Args:
+            track: What is known of it.
+            pose: (3,) odometry pose of the robot now, m and rad.
+
+        Returns:
+            x and y in W, m, by the rule of ``hold``.
+        """
         if self._hold == "motion":
             return self._expected(track)[1:3]
         held = chosen_track(track.memory)[1:3]
@@ -279,6 +314,13 @@ class TrackerModel:
 
         A target that is held elsewhere than the source is expected is off by
         that distance.
+
+        Args:
+            track: What is known of it.
+            pose: (3,) odometry pose of the robot now, m and rad.
+
+        Returns:
+            xx, xy, yx, yy in W, m^2.
         """
         held = self.position(track, pose)
         _, x, y, _, _, xx, xy, yy = self._expected(track)[:8]

@@ -100,6 +100,9 @@ def obstacle_speed(C_now, C_before, velocity_term: VelocityTerm, period):
         C_before: The same feature a period ago, or None: 0 then.
         velocity_term: ``printed`` |dC/dt|, or ``closing`` max(0, -d|C|/dt).
         period: s.
+
+    Returns:
+        s, m/s, not negative; its type is that of ``C_now``.
     """
     if C_before is None:
         return 0.0 * C_now[0]

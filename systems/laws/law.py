@@ -81,6 +81,10 @@ class Law:
         Args:
             repulsion: ``RepulsionParameters``; none: the law's default gains.
             least_range_m: Least range of the sensors, m.
+
+        Returns:
+            The gains, or None where the law has none; then the least range, m, where it
+            counts.
         """
         gains: Any = None
         if self.gains is not None:

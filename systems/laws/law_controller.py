@@ -53,6 +53,9 @@ def define_law_controller(
         law: Its record, with a force.
         about: What it does to obstacles, for the docstring.
         reference: Where that comes from.
+
+    Returns:
+        The template; ``template[float]`` is the block's class.
     """
 
     @define_for_scalars(f"{name}_", module)

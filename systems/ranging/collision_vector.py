@@ -69,7 +69,16 @@ def echo_point(range_, axis, position):
 
 
 def echo_points(ranges, echo, sensors: UltrasonicParameters):
-    """The points that the sensors see, None where there is no echo."""
+    """The points that the sensors see, None where there is no echo.
+
+    Args:
+        ranges: (n,) ranges r_i, m; floats or AutoDiffXd.
+        echo: (n,) 1 where there is an echo, else 0.
+        sensors: Axes and places of the sensors.
+
+    Returns:
+        For each sensor (x, y) from P in B, m, or None.
+    """
     return [
         echo_point(range_, axis, position) if heard > 0.5 else None
         for range_, heard, axis, position in zip(
@@ -194,7 +203,15 @@ def _all_vectors(points, heard, pairs):
 
 
 def fill_slots(vectors, scalar):
-    """(vectors, mask, features) for the ports: 6, 3 and 3 elements."""
+    """(vectors, mask, features) for the ports: 6, 3 and 3 elements.
+
+    Args:
+        vectors: At most three (feature, x, y), from P, m.
+        scalar: Makes a number of the ports' type.
+
+    Returns:
+        Vectors, m, mask, 1 or 0, and features; zeros where there is nothing.
+    """
     zero, one, empty = scalar(0.0), scalar(1.0), SLOTS - len(vectors)
     out = [component for _, x, y in vectors for component in (x, y)]
     mask = [one] * len(vectors)
@@ -219,7 +236,12 @@ COLLISION_FACTS = BlockFacts(
 
 
 def declare_collision_ports(system, slots):
-    """Declares the three output ports that every obstacle sensing ends in."""
+    """Declares the three output ports that every obstacle sensing ends in.
+
+    Args:
+        system: The block.
+        slots: Cache entry of what ``fill_slots`` returns.
+    """
     for index, (name, size) in enumerate(
         (("collision_vectors_B", 2 * SLOTS), ("mask", SLOTS), ("features", SLOTS))
     ):

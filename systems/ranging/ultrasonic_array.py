@@ -162,7 +162,17 @@ def world_rectangles(
     pose_WS: NDArray[np.float64] | tuple[float, float, float],
     source_size: tuple[float, float],
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """All bodies that can be seen or hit, (n + 1, 5); the master robot is last."""
+    """All bodies that can be seen or hit, (n + 1, 5); the master robot is last.
+
+    Args:
+        poses_WO: (3 n,) x, y, theta of each obstacle, m and rad.
+        sizes: (2 n,) length and width of each, m.
+        pose_WS: (3,) x, y, theta of the master robot, m and rad.
+        source_size: Its length and width, m.
+
+    Returns:
+        (n + 1, 5) x, y, theta, length, width in W, m and rad.
+    """
     count = len(sizes) // 2
     rectangles = np.empty((count + 1, 5))
     for k in range(count):

@@ -86,6 +86,13 @@ class MicArrayParameters(Parameters):
 def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
     """(count,) s by which each channel is sampled later.
 
+    Args:
+        parameters: Have the skew; empty: none.
+        count: Number of microphones.
+
+    Returns:
+        (count,) s.
+
     Raises:
         InputError: The skew is given for another number of channels.
     """

@@ -62,6 +62,9 @@ class ArrayShape:
             flat_m: How far microphones may stand off a line or a plane that
                 counts as one, m. None: 1 % of the aperture.
 
+        Returns:
+            The microphones about their centroid, and what they span.
+
         Raises:
             InputError: Too few, coincident or unreadable positions.
         """

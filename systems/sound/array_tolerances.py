@@ -40,6 +40,9 @@ def draw_tolerances(
         parameters: The tolerances.
         count: Number of microphones n.
         generator: Where the errors come from.
+
+    Returns:
+        Errors of places (n, 2), m, and of delays (n,), s, and factors (n,) of the gain.
     """
     places = generator.uniform(-1.0, 1.0, (count, 2))
     delays = generator.uniform(-1.0, 1.0, count)
@@ -77,6 +80,10 @@ def real_array(
         parameters: Stated skew of the channels.
         tolerances: The errors of both, and of the gains.
         c: Speed of sound, m/s.
+
+    Returns:
+        Places in B, m, instants in a frame at which each channel is sampled, s, and
+        gains.
 
     Raises:
         ValueError: The skew is given for another number of channels.

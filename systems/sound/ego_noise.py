@@ -28,6 +28,9 @@ def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
     Args:
         velocity: (3,) vx, vy in W and omega, m/s and rad/s.
         robot: Wheels and top speed.
+
+    Returns:
+        0 to 1.
     """
     vx, vy, omega = np.abs(velocity)
     rim = np.hypot(vx, vy) + omega * robot.wheel_separation_m / 2.0
@@ -70,7 +73,7 @@ class EgoNoise:
             share: From ``driving_share``.
 
         Returns:
-            Pressure over the RMS pressure of the source at 1 m.
+            (n, FRAME_SAMPLES) pressure over the RMS pressure of the source at 1 m.
         """
         first = self._starts + (tick - 1) * FRAME_SAMPLES
         places = (first[:, None] + np.arange(FRAME_SAMPLES)) % self._loops.shape[1]

@@ -63,6 +63,9 @@ def microphone_reach(
     Args:
         room: Its reflections are heard, too; none: the free field.
         acoustics: Speed of sound.
+
+    Returns:
+        m, at least MAXIMUM_RANGE_M.
     """
     if room is None:
         return MAXIMUM_RANGE_M
@@ -96,6 +99,9 @@ def record_frame(
         rise: Height of the microphones above the sources, m.
         reflections: (n, FRAME_SAMPLES) Pa each, of the sources' reflections.
         ego_noise: (n, FRAME_SAMPLES) over the level of the first source at 1 m.
+
+    Returns:
+        (n, FRAME_SAMPLES) counts, with their full scale, rate and time.
 
     Raises:
         ValueError: A source is out of the emission's reach.

@@ -163,6 +163,10 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
         room: The room.
         c: Speed of sound that absorption and length are worked out for, m/s.
 
+    Returns:
+        Signs and offsets of k images, m, their gains, and the length of the response,
+        samples.
+
     Raises:
         InputError: See ``RoomParameters.walls``.
     """

@@ -89,6 +89,10 @@ def make_emission(
         sound: The gate.
         p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
         v_WS: (k, 2) its velocity, m/s.
+
+    Returns:
+        Samples of sound pressure at 1 m, Pa, and where they left; its arrays cannot be
+        written to.
     """
     ages, count = _history(len(p_WS))
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
@@ -121,7 +125,15 @@ def _silence(count: int) -> NDArray[np.float32]:
 
 
 def history_ticks(maximum_range_m: float, c: float) -> int:
-    """Ticks back to when sound left that arrives now from the maximum range."""
+    """Ticks back to when sound left that arrives now from the maximum range.
+
+    Args:
+        maximum_range_m: Longest way of sound, m.
+        c: Speed of sound, m/s.
+
+    Returns:
+        Number of ticks, the one now among them.
+    """
     return math.ceil((FRAME_PERIOD_S + maximum_range_m / c) / FRAME_PERIOD_S) + 1
 
 

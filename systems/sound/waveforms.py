@@ -192,7 +192,16 @@ def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 def band_limited(
     samples: NDArray[np.float64], low_hz: float, high_hz: float
 ) -> NDArray[np.float64]:
-    """Zero-phase Butterworth band-pass."""
+    """Zero-phase Butterworth band-pass.
+
+    Args:
+        samples: (n,) at 100 kHz, any unit.
+        low_hz: Lower edge, Hz.
+        high_hz: Upper edge, Hz.
+
+    Returns:
+        (n,) in the unit of the samples.
+    """
     import scipy.signal
 
     sections = scipy.signal.butter(

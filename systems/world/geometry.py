@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.scalar_math import cos, sin, sqrt
 
 __all__ = [
+    "beyond",
+    "beyond_each",
+    "beyond_rectangle",
     "cone_range",
     "contact_time",
     "control_point",
@@ -37,6 +41,13 @@ def safe_norm(x: Any, y: Any) -> Any:
 
     Accepts floats and AutoDiffXd. Differs from the exact norm by at most
     1e-12.
+
+    Args:
+        x: First component, in any unit.
+        y: Second component, in the same one.
+
+    Returns:
+        In that unit, above 0; AutoDiffXd where a component is.
     """
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
@@ -46,6 +57,14 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
 
     Accepts floats and AutoDiffXd. This is R = [[cos, -sin], [sin, cos]], the
     transpose of what Han 2019, eq. 15 prints.
+
+    Args:
+        theta: Angle of the inner frame in the outer one, rad.
+        x: First component in the inner frame.
+        y: Second component in it.
+
+    Returns:
+        (x, y) in the outer frame, in the unit of the components.
     """
     c, s = cos(theta), sin(theta)
     return c * x - s * y, s * x + c * y
@@ -57,6 +76,9 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
     Args:
         pose: (x, y, theta) of the body frame in W; floats or AutoDiffXd.
         offset: Distance epsilon of P ahead of the origin, m.
+
+    Returns:
+        (x, y) in W, m.
     """
     x, y, theta = pose
     return x + offset * cos(theta), y + offset * sin(theta)
@@ -69,6 +91,9 @@ def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[An
         theta: Heading of the body frame in W, rad; a number or an array.
         velocity: (vx, vy, omega) of the body frame in W, m/s and rad/s, each as theta.
         offset: Distance epsilon of P ahead of the origin, m.
+
+    Returns:
+        (vx, vy) in W, m/s, of the shape of theta.
     """
     vx, vy, omega = velocity
     turning = omega * offset
@@ -79,26 +104,61 @@ def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     """Vector from a point to the nearest point of a filled rectangle.
 
     Args:
-        point: (x, y), m; floats or AutoDiffXd.
-        rectangle: (x, y, theta, length, width).
+        point: (x, y), m; floats, AutoDiffXd or arrays.
+        rectangle: (x, y, theta, length, width); each may be an array, too.
 
     Returns:
         (dx, dy) in the frame of the arguments, m; (0, 0) inside.
     """
+    du, dv = beyond_rectangle(point, rectangle)
+    return rotate(rectangle[2], -du, -dv)
+
+
+def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
+    """Vector to a point from the nearest point of a filled rectangle.
+
+    Args:
+        point: (x, y), m; floats, AutoDiffXd or arrays.
+        rectangle: (x, y, theta, length, width); each may be an array, too.
+
+    Returns:
+        (du, dv) along the rectangle's own axes, m; (0, 0) inside.
+    """
     x, y, theta, length, width = rectangle
     u, v = rotate(-theta, point[0] - x, point[1] - y)
-    du = _outside(u, length / 2.0)
-    dv = _outside(v, width / 2.0)
-    return rotate(theta, -du, -dv)
+    outside = beyond_each if isinstance(u, np.ndarray) else beyond
+    return outside(u, length / 2.0), outside(v, width / 2.0)
 
 
-def _outside(u: Any, half: Any) -> Any:
-    """How far u lies beyond the interval [-half, half], with its sign."""
+@register_jitable
+def beyond(u: Any, half: Any) -> Any:
+    """How far u lies beyond the interval [-half, half].
+
+    Args:
+        u: Float or AutoDiffXd; compiled code may call it.
+        half: Half the length of the interval, in the unit of u.
+
+    Returns:
+        In that unit, with the sign of u; 0 inside.
+    """
     if u > half:
         return u - half
     if u < -half:
         return u + half
     return 0.0 * u
+
+
+def beyond_each(u: NDArray[np.float64], half: ArrayLike) -> NDArray[np.float64]:
+    """``beyond`` of the elements of an array.
+
+    Args:
+        u: (...) any unit.
+        half: (...) in the same unit; broadcast with u.
+
+    Returns:
+        (...) in that unit.
+    """
+    return u - np.clip(u, -np.asarray(half), half)
 
 
 def rectangle_corners(rectangle: ArrayLike) -> NDArray[np.float64]:
@@ -200,7 +260,7 @@ def fan_ranges(
     half_angle: float,
     control_point_m: float,
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """``cone_range`` of each sensor of a body, (n,) m.
+    """``cone_range`` of each sensor of a body.
 
     Args:
         pose_WB: (3,) x, y, theta of the body, m and rad.
@@ -209,6 +269,9 @@ def fan_ranges(
         places: (n, 2) sensors from P in B axes, m.
         half_angle: Half of the opening angle, rad.
         control_point_m: Distance of P ahead of the origin of B, m.
+
+    Returns:
+        (n,) m; infinite where a cone is empty.
     """
     x, y, theta = pose_WB
     c, s = math.cos(theta), math.sin(theta)
@@ -223,6 +286,18 @@ def fan_ranges(
             rectangles,
         )
     return ranges
+
+
+@njit(cache=True)
+def _shadow(
+    corners: NDArray[np.float64], nx: float, ny: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Where the corners' extent along (nx, ny) begins and ends."""
+    low, high = np.inf, -np.inf
+    for k in range(4):
+        u = corners[k, 0] * nx + corners[k, 1] * ny
+        low, high = min(low, u), max(high, u)
+    return low, high
 
 
 @njit(cache=True)
@@ -245,12 +320,8 @@ def rectangle_clearance(
     separation = -np.inf
     for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
         nx, ny = math.cos(theta), math.sin(theta)
-        a_low, a_high, b_low, b_high = np.inf, -np.inf, np.inf, -np.inf
-        for k in range(4):
-            u = ca[k, 0] * nx + ca[k, 1] * ny
-            v = cb[k, 0] * nx + cb[k, 1] * ny
-            a_low, a_high = min(a_low, u), max(a_high, u)
-            b_low, b_high = min(b_low, v), max(b_high, v)
+        a_low, a_high = _shadow(ca, nx, ny)
+        b_low, b_high = _shadow(cb, nx, ny)
         separation = max(separation, b_low - a_high, a_low - b_high)
     if separation <= 0.0:
         return separation
@@ -299,12 +370,8 @@ def contact_time(
     enter, leave = 0.0, np.inf
     for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
         nx, ny = math.cos(theta), math.sin(theta)
-        a_low, a_high, b_low, b_high = np.inf, -np.inf, np.inf, -np.inf
-        for k in range(4):
-            u = ca[k, 0] * nx + ca[k, 1] * ny
-            v = cb[k, 0] * nx + cb[k, 1] * ny
-            a_low, a_high = min(a_low, u), max(a_high, u)
-            b_low, b_high = min(b_low, v), max(b_high, v)
+        a_low, a_high = _shadow(ca, nx, ny)
+        b_low, b_high = _shadow(cb, nx, ny)
         speed = vx * nx + vy * ny
         if abs(speed) < 1e-12:
             if a_high < b_low or b_high < a_low:
