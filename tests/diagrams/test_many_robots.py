@@ -74,6 +74,25 @@ def test_robots_that_are_far_apart_do_as_if_alone():
                 np.testing.assert_array_equal(both.columns[f"{name}.{key}"], values)
 
 
+def test_each_robot_has_noise_of_its_own():
+    """Two of a kind in two places of a kind: the same but for the noise of 1 mm."""
+    box = {"size_m": [0.2, 2.0]}
+    result = run(
+        **WAITING,
+        ultrasonic={},
+        robots={"a": {}, "b": {"start": {"position_m": [0.0, 50.0]}}},
+        obstacles=[
+            box | {"name": "one", "waypoints_m": [[1.2, 0.0]]},
+            box | {"name": "two", "waypoints_m": [[1.2, 50.0]]},
+        ],
+        source={"waypoints_m": [[0.0, 9.0]]},
+        stop={"diverged_range_m": 90.0},
+        duration_s=1.0,
+    )
+    a, b = (own.columns["range_2"] for own in result.robots.values())
+    assert np.std(a - b) == pytest.approx(1e-3 * np.sqrt(2.0), rel=0.5)
+
+
 def test_a_robot_is_seen_by_another():
     """By the middle cone, at 3 m less half a robot: P is on the front face."""
     result = run(
