@@ -114,7 +114,7 @@ def block_model(
         read_after: Whether it reads such signals itself.
 
     Returns:
-        Its states, inputs and outputs are elements of vectors, named by port.
+        A model of one period; inputs and outputs are named by port and element.
     """
     ports = ports or twin
     count = len(state)

@@ -161,7 +161,7 @@ class IdealLoop:
             twin: Whether the one for AutoDiffXd is meant.
 
         Returns:
-            The block.
+            A LeafSystem of float, or of AutoDiffXd.
         """
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
