@@ -20,6 +20,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
+from analysis.reporting.markdown import markdown_head, markdown_row
 from analysis.runs.metrics import run_metrics
 from benchmarks.figures import Figure, print_figures
 from diagrams import RunResult, load_scenario, simulate
@@ -39,6 +40,24 @@ NOISE_S = 4.0
 BESIDE_M = 0.3
 #: When the first bursts have been heard to their ends, s.
 BURST_ENDS_S = (0.6, 2.6, 4.6)
+#: Headings of both tables.
+FOLLOWING = (
+    "where",
+    "seed",
+    "ends",
+    "following",
+    "error rms",
+    "target p95",
+    "frames believed",
+)
+BEHIND = (
+    "where",
+    "starts with the source behind",
+    "right side after one burst",
+    "after two",
+    "after three",
+    "error after two, median",
+)
 
 
 def write_ego_noise(folder: Path) -> str:
@@ -103,10 +122,7 @@ def on_the_right_side(result: RunResult) -> NDArray[np.bool_]:
 
 def print_following(settings: dict[str, list[str]], runs: int) -> dict[str, float]:
     """A row a setting and seed; returns the mean share of following."""
-    print(
-        "| where | seed | ends | following | error rms | target p95 | frames believed |"
-        "\n" + "|---" * 7 + "|"
-    )
+    print(markdown_head(FOLLOWING))
     shares: dict[str, list[float]] = {name: [] for name in settings}
     for seed in range(1, runs + 1):
         for name, overrides in settings.items():
@@ -118,21 +134,22 @@ def print_following(settings: dict[str, list[str]], runs: int) -> dict[str, floa
                 following = 0.0
             shares[name].append(following)
             late = target_errors(result)[result.time > BURST_ENDS_S[1]]
-            print(
-                f"| {name} | {seed} | {result.cause} | {following:.3f} "
-                f"| {metrics['following_error_rms_m']:.2f} m "
-                f"| {np.quantile(late, 0.95):.2f} m | {metrics['detections']:.0f} |",
-                flush=True,
+            row = (
+                name,
+                seed,
+                result.cause,
+                f"{following:.3f}",
+                f"{metrics['following_error_rms_m']:.2f} m",
+                f"{np.quantile(late, 0.95):.2f} m",
+                f"{metrics['detections']:.0f}",
             )
+            print(markdown_row(row), flush=True)
     return {name: float(np.mean(share)) for name, share in shares.items()}
 
 
 def print_behind(settings: dict[str, list[str]], starts: int) -> dict[str, list[float]]:
     """A row a setting; returns the shares on the right side after each burst."""
-    print(
-        "\n| where | starts with the source behind | right side after one burst "
-        "| after two | after three | error after two, median |\n" + "|---" * 6 + "|"
-    )
+    print(f"\n{markdown_head(BEHIND)}")
     shares = {}
     for name, overrides in settings.items():
         resolved, errors = [], []
@@ -153,9 +170,9 @@ def print_behind(settings: dict[str, list[str]], starts: int) -> dict[str, list[
             resolved.append(on_the_right_side(result)[ends])
             errors.append(target_errors(result)[ends[1]])
         shares[name] = np.mean(resolved, axis=0).tolist()
-        row = " | ".join(f"{share:.2f}" for share in shares[name])
+        row = [f"{share:.2f}" for share in shares[name]]
         error = f"{np.median(errors):.2f} m"
-        print(f"| {name} | {starts} | {row} | {error} |", flush=True)
+        print(markdown_row([name, starts, *row, error]), flush=True)
     return shares
 
 

@@ -21,6 +21,7 @@ from analysis.hearing.free_field import (
     total_consistency,
 )
 from analysis.hearing.paper_tables import PAPER_CELLS
+from analysis.reporting.markdown import markdown_head, markdown_row
 from systems.base.robot import RobotParameters
 from systems.hearing.localise import TDOAParameters
 from systems.sound.array_shape import ArrayShape
@@ -28,10 +29,16 @@ from systems.sound.array_shape import ArrayShape
 C = 340.0
 METHODS = ("gcc", "ml")
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)
-HEADING = """\
-| sound | SNR | method | bearing RMSE / bound | range RMSE / bound \
-| stated / RMSE | NEES (interval) | outliers |
-|---|---|---|---|---|---|---|---|"""
+HEADINGS = (
+    "sound",
+    "SNR",
+    "method",
+    "bearing RMSE / bound",
+    "range RMSE / bound",
+    "stated / RMSE",
+    "NEES (interval)",
+    "outliers",
+)
 
 
 def estimators() -> dict[str, Estimator]:
@@ -46,7 +53,7 @@ def estimators() -> dict[str, Estimator]:
 
 def run(trials: int) -> None:
     """Prints the table, a row as soon as it is known."""
-    print(HEADING)
+    print(markdown_head(HEADINGS))
     everything: dict[str, list[FreeFieldCell]] = {method: [] for method in METHODS}
     seed = 0
     for kind in ("chirp", "band_noise"):
@@ -71,12 +78,12 @@ def run(trials: int) -> None:
             for method in METHODS:
                 cells = [row[method] for row in rows]
                 everything[method] += cells
-                print_row(f"{kind} | {snr_db:g} dB | {method}", cells)
+                print_row((kind, f"{snr_db:g} dB", method), cells)
     for method in METHODS:
-        print_row(f"all | all | {method}", everything[method])
+        print_row(("all", "all", method), everything[method])
 
 
-def print_row(title: str, cells: list[FreeFieldCell]) -> None:
+def print_row(title: tuple[str, ...], cells: list[FreeFieldCell]) -> None:
     """The median cell's ratio, and the worst with its interval's lower end."""
     parts = []
     for name in ("bearing_ratio", "range_ratio"):
@@ -93,7 +100,7 @@ def print_row(title: str, cells: list[FreeFieldCell]) -> None:
     nees = total_consistency(cells)
     parts.append(f"{nees.mean:.3f} ({nees.low:.3f}-{nees.high:.3f})")
     parts.append(str(sum(cell.outliers for cell in cells)))
-    print(f"| {title} | {' | '.join(parts)} |", flush=True)
+    print(markdown_row([*title, *parts]), flush=True)
 
 
 def print_times(frames: int = 200) -> None:

@@ -23,6 +23,7 @@ from analysis.hearing.detection import (
 )
 from analysis.hearing.detection_plots import plot_detection
 from analysis.hearing.free_field import Loudspeaker
+from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from systems.base.robot import RobotParameters
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
@@ -99,8 +100,7 @@ def print_detection(trials: int) -> dict[str, list[DetectionPoint]]:
         The points by sound.
     """
     curves = {}
-    print("| sound | " + " | ".join(f"{level:g} dB" for level in LEVELS_DB) + " |")
-    print("|---" * (len(LEVELS_DB) + 1) + "|")
+    print(markdown_head(["sound", *(f"{level:g} dB" for level in LEVELS_DB)]))
     for kind in ("chirp", "band_noise"):
         points = detection_curve(
             Loudspeaker.of(kind, seed=3),
@@ -112,8 +112,8 @@ def print_detection(trials: int) -> dict[str, list[DetectionPoint]]:
         )
         for what in ("heard", "ranged", "wrong"):
             shares = (getattr(point, what) / point.trials for point in points)
-            row = " | ".join(f"{100.0 * share:.1f}" for share in shares)
-            print(f"| {kind}, {what}, % | {row} |", flush=True)
+            row = [f"{100.0 * share:.1f}" for share in shares]
+            print(markdown_row([f"{kind}, {what}, %", *row]), flush=True)
         curves[kind] = points
     return curves
 
@@ -122,9 +122,10 @@ def print_false_alarms(frames: int) -> list[FalseAlarms]:
     """Measured beside set rates, in noise alone."""
     rates = (*RATES, TDOAParameters().false_alarm_rate)
     alarms = false_alarms(rates, frames, shape=SHAPE, c=C, seed=9)
-    print(f"| set rate | share of {frames} frames of noise |\n|---|---|")
+    print(markdown_head(["set rate", f"share of {frames} frames of noise"]))
     for alarm in alarms:
-        print(f"| {alarm.rate:g} | {alarm.count / frames:.2g} ({alarm.count}) |")
+        share = f"{alarm.count / frames:.2g} ({alarm.count})"
+        print(markdown_row([f"{alarm.rate:g}", share]))
     return alarms
 
 

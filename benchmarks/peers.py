@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from analysis.hearing.cramer_rao import LocalizationBound, position_bound
 from analysis.hearing.free_field import Loudspeaker
 from analysis.hearing.paper_tables import PAPER_CELLS
+from analysis.reporting.markdown import markdown_table
 from benchmarks.figures import stay_on_one_core
 from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
 from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
@@ -145,7 +146,7 @@ def table(results: list[PeerResult]) -> str:
     distances = sorted({cell.range_m for cell in results[0].cells})
     fastest = next(result.time_ms for result in results if result.name == "gcc")
     header = ["estimator", "bearing", *(f"{r:g} m" for r in distances), "ms", "x gcc"]
-    rows = [header, ["---"] * len(header)]
+    rows = []
     for result in results:
         title = [result.name]
         times = [f"{result.time_ms:.2f}", f"{result.time_ms / fastest:.1f}"]
@@ -157,7 +158,7 @@ def table(results: list[PeerResult]) -> str:
             texts = [_cell_text(cell) for cell in cells]
             rows.append([*title, f"{bearing:g} deg", *texts, *times])
             title, times = [""], ["", ""]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(header, rows)
 
 
 def _cell_text(cell: PeerCell) -> str:

@@ -12,6 +12,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from analysis.hearing.room_trials import RoomResult, draw_layouts, locate_bursts
+from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.figures import Figure, print_figures
 from systems.hearing.tdoa_estimator import TDOAParameters
 from systems.sound.room import RoomParameters
@@ -34,6 +35,17 @@ class RoomTask(NamedTuple):
     """Of the bursts that must be located."""
 
 
+HEADINGS = (
+    "T60",
+    "range",
+    "sound",
+    "located (95 %)",
+    "asked",
+    "heard",
+    "bearing, median",
+    "range, median",
+    "located without precedence",
+)
 ROOMS = (RoomTask(0.25, 2.0, 0.98), RoomTask(0.4, 3.0, 0.95), RoomTask(0.6, 4.0, 0.80))
 
 
@@ -58,10 +70,7 @@ def run_task(
 
 def run(layouts: int) -> int:
     """Prints a row a room and sound; returns the exit status."""
-    print(
-        "| T60 | range | sound | located (95 %) | asked | heard | bearing, median "
-        "| range, median | located without precedence |\n" + "|---" * 9 + "|"
-    )
+    print(markdown_head(HEADINGS))
     figures = []
     for task in ROOMS:
         for kind in SOUNDS:
@@ -79,7 +88,7 @@ def run(layouts: int) -> int:
                 f"{100.0 * np.nanmedian(np.abs(found.range_errors)):.1f} %",
                 f"{plain.located.mean():.3f}",
             )
-            print(f"| {' | '.join(row)} |", flush=True)
+            print(markdown_row(row), flush=True)
             figures.append(Figure(", ".join(row[:3]), share, ">=", task.share))
     print()
     return print_figures(figures)

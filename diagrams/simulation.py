@@ -19,7 +19,13 @@ from diagrams.scenario import Scenario
 from diagrams.stop_rules import StopRules
 from systems.framework.input_error import InputError
 
-__all__ = ["RunResult", "load_compiled_code", "make_simulator", "simulate"]
+__all__ = [
+    "RunResult",
+    "load_compiled_code",
+    "make_simulator",
+    "simulate",
+    "simulator_config",
+]
 
 # Until then a source that sounds from the first instant has been heard and followed.
 _FIRST_TICKS_S = 0.15
@@ -30,12 +36,17 @@ _LOADED: set[tuple[object, ...]] = set()
 def make_simulator(follower: SoundFollower) -> Simulator:
     """A simulator of the diagram with the scenario's integrator."""
     simulator = Simulator(follower.diagram)
-    config = SimulatorConfig()
-    config.integration_scheme = follower.scenario.integrator.scheme
-    config.max_step_size = follower.scenario.integrator.step_s
-    config.use_error_control = False
-    ApplySimulatorConfig(config, simulator)
+    ApplySimulatorConfig(simulator_config(follower.scenario), simulator)
     return simulator
+
+
+def simulator_config(scenario: Scenario) -> SimulatorConfig:
+    """The scenario's integrator, as Drake takes it."""
+    return SimulatorConfig(
+        integration_scheme=scenario.integrator.scheme,
+        max_step_size=scenario.integrator.step_s,
+        use_error_control=False,
+    )
 
 
 def simulate(

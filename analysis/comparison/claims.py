@@ -29,6 +29,7 @@ from analysis.comparison.claim_judges import (
     smoother,
     vibrates,
 )
+from analysis.reporting.markdown import markdown_table
 
 __all__ = ["CLAIMS", "Claim", "claims_table"]
 
@@ -55,11 +56,11 @@ def claims_table(summaries: Sequence[dict[str, Any]]) -> str:
         part: [entry for document in summaries for entry in document[part]]
         for part in ("cells", "pairs")
     }
-    lines = ["| claim | source | our figure | verdict |", "|---|---|---|---|"]
+    rows = []
     for claim in CLAIMS:
         figure, verdict = claim.judge(summary)
-        lines.append(f"| {claim.text} | {claim.source} | {figure} | **{verdict}** |")
-    return "\n".join(lines)
+        rows.append((claim.text, claim.source, figure, f"**{verdict}**"))
+    return markdown_table(("claim", "source", "our figure", "verdict"), rows)
 
 
 CLAIMS = (

@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 
 from analysis.comparison.cells import LawCell, Mean
 from analysis.comparison.laws_in_pairs import Comparison
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.scene import bounds, looks
 from analysis.runs.trajectory_artists import (
     draw_collision,
@@ -86,8 +86,7 @@ def _median_panel(axes: Axes, cells: Sequence[LawCell], name: str) -> None:
 def _label_laws(axes: Axes, cells: Sequence[LawCell]) -> None:
     axes.set_yticks(np.arange(len(cells)), [cell.label for cell in cells])
     axes.set_ylim(len(cells) - 0.5, -0.5)
-    axes.grid(axis="x", color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    draw_grid(axes, "x")
 
 
 def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure:

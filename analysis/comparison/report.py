@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 import shlex
 from collections.abc import Callable, Iterator, Sequence
@@ -13,6 +12,7 @@ from typing import Any
 from analysis.comparison.cells import LawCell, Mean, Median
 from analysis.comparison.compare import PreparedComparison
 from analysis.comparison.laws_in_pairs import Comparison, Pair
+from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import versions
 from diagrams import RunResult, dump_scenario, simulate
 
@@ -106,8 +106,7 @@ def write_comparison(
                     progress(done)
             rows.append((cell, results))
         plot_examples(rows).savefig(out / f"{name}.png", dpi=150)
-    text = json.dumps(summary, indent=2, allow_nan=False)
-    (out / "summary.json").write_text(text + "\n")
+    write_json(summary, out / "summary.json")
 
 
 def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunResult]:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
 
 from analysis.design.design_study import Alternative, DesignStudy
 from analysis.design.requirements import Check
+from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
@@ -96,7 +96,7 @@ def write_design(study: DesignStudy, summary: dict[str, Any], directory: Path) -
     from analysis.laws.law_curves_plots import plot_law_curves
     from analysis.laws.push_and_pull import DESIGNED_LAWS
 
-    (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_json(summary, directory / "summary.json")
     for name, alternative in (
         ("scenario", study.today),
         ("recommended", study.recommended),

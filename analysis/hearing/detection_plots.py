@@ -11,7 +11,7 @@ from matplotlib.ticker import PercentFormatter
 
 from analysis.hearing.detection import DetectionPoint, FalseAlarms
 from analysis.reporting.intervals import wilson_interval
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
 
 __all__ = ["plot_detection"]
 
@@ -51,8 +51,7 @@ def plot_detection(
     left.set_title("Sounds that are heard", fontsize=11)
     _false_alarms(right, alarms, default_rate)
     for axes in (left, right):
-        axes.grid(color="#E5E5E5", linewidth=0.6)
-        axes.set_axisbelow(True)
+        draw_grid(axes)
     return figure
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from itertools import groupby
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Any
 from analysis.hearing.free_field import frame_estimator
 from analysis.hearing.localization import LocalizationCell, LocalizationExperiment
 from analysis.hearing.sensitivity import sensitivity_table
+from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
@@ -88,7 +88,7 @@ def write_localization(
     (directory / "scenario.yaml").write_text(
         dump_scenario(experiment.scenario), "utf-8"
     )
-    (directory / "summary.json").write_text(json.dumps(summary, indent=2) + "\n")
+    write_json(summary, directory / "summary.json")
     plot_localization(cells).savefig(directory / "localization.png", dpi=150)
 
 

@@ -10,7 +10,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from analysis.linear.robustness import PoleCloud, PoleSensitivity
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
 
 __all__ = ["plot_pole_cloud", "plot_sensitivities"]
 
@@ -72,7 +72,6 @@ def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
         axes.barh(names, changes, color=colours)
         axes.axvline(0.0, color="black", linewidth=0.8)
         axes.set_title(title, fontsize=10)
-        axes.grid(color="#E5E5E5", linewidth=0.6, axis="x")
-        axes.set_axisbelow(True)
+        draw_grid(axes, "x")
         axes.xaxis.set_major_locator(MaxNLocator(4))
     return figure

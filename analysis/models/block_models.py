@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.analysis import DiscreteTimeApproximation, SimulatorConfig
+from pydrake.systems.analysis import DiscreteTimeApproximation
 
 from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.diagram_state import set_discrete_state
 from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
+from diagrams.simulation import simulator_config
 from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["block_model", "join_blocks", "sampled_blocks", "sampled_twin"]
@@ -113,7 +114,7 @@ def block_model(
         read_after: Whether it reads such signals itself.
 
     Returns:
-        Its states, inputs and outputs are elements of vectors, named by port.
+        A model of one period; inputs and outputs are named by port and element.
     """
     ports = ports or twin
     count = len(state)
@@ -171,12 +172,7 @@ def sampled_twin(loop: IdealLoop, role: str) -> Any:
         The block as a discrete one, for AutoDiffXd.
     """
     if role not in loop.sampled_twins:
-        integrator = loop.scenario.integrator
-        config = SimulatorConfig(
-            integration_scheme=integrator.scheme,
-            max_step_size=integrator.step_s,
-            use_error_control=False,
-        )
+        config = simulator_config(loop.scenario)
         sampled = DiscreteTimeApproximation(loop.block(role), FRAME_PERIOD_S, config)
         loop.sampled_twins[role] = sampled.ToAutoDiffXd()
     return loop.sampled_twins[role]

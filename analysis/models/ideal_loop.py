@@ -16,12 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
-from pydrake.systems.analysis import (
-    ApplySimulatorConfig,
-    Simulator,
-    Simulator_,
-    SimulatorConfig,
-)
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, Simulator_
 
 from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.diagram_state import (
@@ -39,6 +34,7 @@ from analysis.models.ideal_scenarios import (
 from diagrams import build_sound_follower
 from diagrams.robot import parts_of
 from diagrams.scenario import Scenario
+from diagrams.simulation import simulator_config
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.framework.signals import FRAME_PERIOD_S
@@ -165,7 +161,7 @@ class IdealLoop:
             twin: Whether the one for AutoDiffXd is meant.
 
         Returns:
-            The block.
+            A LeafSystem of float, or of AutoDiffXd.
         """
         return self._twin_blocks[role] if twin else self.follower.blocks[role]
 
@@ -347,12 +343,7 @@ class IdealLoop:
                 else (Simulator, self.follower.diagram)
             )
             simulator = make(diagram)
-            integrator = self.scenario.integrator
-            config = SimulatorConfig()
-            config.integration_scheme = integrator.scheme
-            config.max_step_size = integrator.step_s
-            config.use_error_control = False
-            ApplySimulatorConfig(config, simulator)
+            ApplySimulatorConfig(simulator_config(self.scenario), simulator)
             self._simulators[key] = simulator
         return self._simulators[key]
 

@@ -47,7 +47,7 @@ def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (c
 
     Args:
         points: (n, 2) in W, m.
-        bodies: (k, 6), see above.
+        bodies: (k, 6), see the module.
 
     Returns:
         (n, k) m.
@@ -142,10 +142,10 @@ def forces(
 
     Args:
         states: (n, 4) x, y, vx, vy, m and m/s.
-        bodies: (k, 6), see above.
+        bodies: (k, 6), see the module.
         p_WS: (2,) the source, m.
-        gains: See above.
-        tables: See above.
+        gains: See the module.
+        tables: See the module.
 
     Returns:
         (n, 2) in W, N.
@@ -234,10 +234,10 @@ def run(
         steps: Most steps.
         h: Step, s.
         contact: P nearer to a body is contact, m.
-        bodies: (k, 6), see above.
+        bodies: (k, 6), see the module.
         p_WS: (2,) the source, m.
-        gains: See above.
-        tables: See above.
+        gains: See the module.
+        tables: See the module.
 
     Returns:
         Times of contact (n,), s, infinite without; least distances (n,), m; largest
@@ -277,10 +277,10 @@ def trajectory(
         start: (4,) x, y, vx, vy, m and m/s.
         steps: Number of steps.
         h: Step, s.
-        bodies: (k, 6), see above.
+        bodies: (k, 6), see the module.
         p_WS: (2,) the source, m.
-        gains: See above.
-        tables: See above.
+        gains: See the module.
+        tables: See the module.
 
     Returns:
         (steps + 1, 4), h apart.

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Any
@@ -12,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from analysis.recordings.locate_result import LocateResult
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.reporting.plain_values import write_json
 
 __all__ = ["plot_locate", "write_locate"]
 
@@ -29,8 +29,7 @@ def write_locate(
         document: Plain values.
         directory: Exists.
     """
-    text = json.dumps(document, indent=2, allow_nan=False)
-    (directory / "locate.json").write_text(text + "\n")
+    write_json(document, directory / "locate.json")
     plot_locate(result).savefig(directory / "locate.png", dpi=150)
 
 
@@ -103,8 +102,7 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
             alpha=0.15,
             linewidth=0,
         )
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    draw_grid(axes)
 
 
 def _plan(axes: Axes, result: LocateResult) -> None:

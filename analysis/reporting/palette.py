@@ -1,8 +1,13 @@
-"""The colours of things: the same in every picture."""
+"""The colours of things, and the grid behind them: the same in every picture."""
 
 from __future__ import annotations
 
-__all__ = ["COLOURS", "ROBOT_COLOURS", "SERIES_COLOURS"]
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+__all__ = ["COLOURS", "ROBOT_COLOURS", "SERIES_COLOURS", "draw_grid"]
 
 #: Okabe and Ito's palette: told apart with any colour vision.
 COLOURS = {
@@ -33,3 +38,14 @@ SERIES_COLOURS = (
     "#F0E442",
     "#000000",
 )
+
+
+def draw_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:
+    """A faint grid behind all else.
+
+    Args:
+        axes: Where to draw.
+        axis: Whose ticks have lines.
+    """
+    axes.grid(axis=axis, color="#E5E5E5", linewidth=0.6)
+    axes.set_axisbelow(True)

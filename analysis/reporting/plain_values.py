@@ -1,7 +1,8 @@
-"""Data objects as values that JSON can hold."""
+"""Data objects as values that JSON can hold, and JSON as files."""
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -12,7 +13,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-__all__ = ["plain"]
+__all__ = ["plain", "write_json"]
 
 
 def plain(value: Any) -> Any:
@@ -52,3 +53,17 @@ def _leaf(value: Any) -> Any:
     if isinstance(value, Enum | Path):
         return str(value)
     raise TypeError(f"{type(value).__name__} has no plain form; give its numbers")
+
+
+def write_json(document: Any, path: Path) -> None:
+    """Writes a document for people and programs to read.
+
+    Args:
+        document: Plain values.
+        path: The file.
+
+    Raises:
+        ValueError: A number is not finite.
+    """
+    text = json.dumps(document, indent=2, allow_nan=False)
+    path.write_text(f"{text}\n", "utf-8")

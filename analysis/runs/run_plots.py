@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.scene import bounds, looks, run_title, sound_bursts
 from analysis.runs.trajectory_artists import (
     draw_collision,
@@ -39,8 +39,7 @@ def plot_trajectory(result: RunResult) -> Figure:
     are drawn where a frame was heard, faint ones early, strong ones late.
     """
     figure, axes = _map(result)
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    draw_grid(axes)
     axes.set_title(_title(result), fontsize=11)
     for own in result.robots.values():
         draw_cones(axes, own, times_apart(own))
@@ -126,8 +125,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
-        axes.grid(axis="y", color="#E5E5E5", linewidth=0.6)
-        axes.set_axisbelow(True)
+        draw_grid(axes, "y")
         axes.legend(
             loc="upper left",
             bbox_to_anchor=(1.005, 1.03),

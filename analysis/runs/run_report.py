@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from analysis.reporting.plain_values import plain
+from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
@@ -77,9 +76,7 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     (directory / "scenario.yaml").write_text(
         dump_scenario(result.full_scenario), "utf-8"
     )
-    (directory / "summary.json").write_text(
-        json.dumps(summary, indent=2, allow_nan=False) + "\n"
-    )
+    write_json(summary, directory / "summary.json")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
     for name, own in result.robots.items():

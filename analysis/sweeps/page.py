@@ -19,6 +19,7 @@ from analysis.reporting.html_page import (
     section,
     table,
 )
+from analysis.reporting.plain_values import write_json
 from analysis.sweeps.estimates import cell_label, ended, quantities, shown
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
@@ -54,8 +55,7 @@ def write_sweep(
         summary: From ``sweep_summary``; names the directory, which exists.
     """
     out = Path(summary["out"])
-    document = json.dumps(summary, indent=2, allow_nan=False)
-    (out / "summary.json").write_text(document + "\n", "utf-8")
+    write_json(summary, out / "summary.json")
     (out / "report.html").write_text(
         sweep_page(plan, points, results, summary), "utf-8"
     )

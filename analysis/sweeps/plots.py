@@ -11,6 +11,7 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.reporting.palette import draw_grid
 from analysis.sweeps.estimates import (
     Estimate,
     Quantity,
@@ -205,7 +206,6 @@ def _errorbars(
 
 def _frame(axes: Axes, quantity: Quantity) -> None:
     axes.set_title(quantity.title, fontsize=10)
-    axes.grid(color="#E5E5E5", linewidth=0.6)
-    axes.set_axisbelow(True)
+    draw_grid(axes)
     if quantity.rate:
         axes.set_ylim(-0.03, 1.03)

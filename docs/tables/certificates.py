@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -16,6 +16,7 @@ from analysis.certificates.certificate_trials import CertificateTrials, try_cert
 from analysis.certificates.diagram_trials import DiagramTrials, try_diagram
 from analysis.certificates.energy_certificate import certify_energy
 from analysis.certificates.sos_region import SosRegion, sos_region
+from analysis.reporting.markdown import markdown_table
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
 
@@ -85,7 +86,7 @@ def certificate_rows(
 
 def certificate_table(rows: Sequence[CertificateRow]) -> str:
     """Three Markdown tables: energy certificate, full diagram, sums of squares."""
-    energy = _table(
+    energy = markdown_table(
         (
             "law",
             "velocity term",
@@ -100,7 +101,7 @@ def certificate_table(rows: Sequence[CertificateRow]) -> str:
         ),
         map(_energy_row, rows),
     )
-    diagram = _table(
+    diagram = markdown_table(
         (
             "law",
             "runs from certified starts",
@@ -112,7 +113,7 @@ def certificate_table(rows: Sequence[CertificateRow]) -> str:
         ),
         map(_diagram_row, rows),
     )
-    squares = _table(
+    squares = markdown_table(
         (
             "law",
             "proved",
@@ -127,17 +128,9 @@ def certificate_table(rows: Sequence[CertificateRow]) -> str:
     return "\n\n".join((energy, diagram, squares))
 
 
-def _table(titles: Sequence[str], rows: Iterable[str]) -> str:
-    return "\n".join([_row(*titles), "|---" * len(titles) + "|", *rows])
-
-
-def _row(*cells: object) -> str:
-    return f"| {' | '.join(str(cell) for cell in cells)} |"
-
-
-def _energy_row(row: CertificateRow) -> str:
+def _energy_row(row: CertificateRow) -> tuple[object, ...]:
     trials = row.trials
-    return _row(
+    return (
         f"`{row.law}`",
         trials.certificate.term,
         len(trials.inside.starts),
@@ -151,11 +144,11 @@ def _energy_row(row: CertificateRow) -> str:
     )
 
 
-def _diagram_row(row: CertificateRow) -> str:
+def _diagram_row(row: CertificateRow) -> tuple[object, ...]:
     found = row.diagram
     low, high = found.interval
     counts = [found.mechanisms.count(name) for name in ("ahead", "beside", "behind")]
-    return _row(
+    return (
         f"`{row.law}`",
         len(found.causes),
         found.collisions,
@@ -164,12 +157,12 @@ def _diagram_row(row: CertificateRow) -> str:
     )
 
 
-def _squares_row(row: CertificateRow) -> str:
+def _squares_row(row: CertificateRow) -> tuple[object, ...]:
     region = row.region
     if isinstance(region, str):
-        return _row(f"`{row.law}`", "no: " + region.partition(": ")[2], *["-"] * 5)
+        return f"`{row.law}`", "no: " + region.partition(": ")[2], *["-"] * 5
     c, v, _ = region.extent()
-    return _row(
+    return (
         f"`{row.law}`",
         "yes" if region.certified else "no",
         f"{c:.3f} m, {v:.3f} m/s",

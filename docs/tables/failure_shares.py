@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from analysis.reporting.markdown import markdown_table
+
 __all__ = ["failure_table"]
 
 MECHANISMS = (
@@ -37,17 +39,16 @@ def failure_table(summary: dict[str, Any]) -> str:
     """
     found = [cell["mechanisms"] for cell in summary["cells"]]
     names = [name for name in MECHANISMS if any(counts.get(name) for counts in found)]
-    heading = "| scenario | law | failures | " + " | ".join(names) + " |"
-    lines = [heading, "|---" * (3 + len(names)) + "|"]
+    rows = []
     for cell in summary["cells"]:
         counts, runs = cell["mechanisms"], cell["runs"]
         failures = sum(counts.values())
         if failures == 0:
             continue
         shares = [_share(counts, name, runs) for name in names]
-        row = [cell["scenario"], cell["law"], f"{100.0 * failures / runs:.1f} %"]
-        lines.append("| " + " | ".join(row + shares) + " |")
-    return "\n".join(lines)
+        failed = f"{100.0 * failures / runs:.1f} %"
+        rows.append([cell["scenario"], cell["law"], failed, *shares])
+    return markdown_table(["scenario", "law", "failures", *names], rows)
 
 
 def _share(counts: dict[str, int], name: str, runs: int) -> str:

@@ -11,6 +11,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from analysis.reporting.markdown import markdown_table
+
 __all__ = ["CLEARANCE_M", "RATE", "equivalent", "hearing_table"]
 
 #: Bounds within which both count as equivalent.
@@ -43,30 +45,32 @@ def hearing_table(summary: dict[str, Any]) -> str:
         "median clearance, audio / ideal",
         "layouts on which one alone succeeds",
     )
-    lines = ["| " + " | ".join(headings) + " |", "|---" * len(headings) + "|"]
     pairs = [pair for pair in summary["pairs"] if pair["field"] == "hearing"]
-    lines += [_row(summary, pair) for pair in pairs]
+    rows = [_row(summary, pair) for pair in pairs]
     pair = _pooled(summary)
     clearance = pair["metrics"][_CLEARANCE]
-    rates = " | ".join(
+    rates = (
         f"{100.0 * rate['difference']:+.1f} points "
         f"({100.0 * rate['low']:+.1f}, {100.0 * rate['high']:+.1f})"
         for rate in (pair["success"], pair["collision"])
     )
-    lines.append(
-        f"| all {pair['success']['pairs']} pairs, audio less ideal | {rates} | "
-        f"{100.0 * clearance['difference']:+.2f} cm "
-        f"({100.0 * clearance['low']:+.2f}, {100.0 * clearance['high']:+.2f}) | "
-        f"{_apart(pair)} |"
+    bounds = ", ".join(f"{100.0 * clearance[end]:+.2f}" for end in ("low", "high"))
+    rows.append(
+        (
+            f"all {pair['success']['pairs']} pairs, audio less ideal",
+            *rates,
+            f"{100.0 * clearance['difference']:+.2f} cm ({bounds})",
+            _apart(pair),
+        )
     )
-    return "\n".join(lines)
+    return markdown_table(headings, rows)
 
 
 def _pooled(summary: dict[str, Any]) -> dict[str, Any]:
     return next(pair for pair in summary["pooled"] if pair["field"] == "hearing")
 
 
-def _row(summary: dict[str, Any], pair: dict[str, Any]) -> str:
+def _row(summary: dict[str, Any], pair: dict[str, Any]) -> tuple[str, ...]:
     audio, ideal = (
         next(
             cell
@@ -87,10 +91,7 @@ def _row(summary: dict[str, Any], pair: dict[str, Any]) -> str:
         for cell in (audio, ideal)
     )
     law = pair["fields"]["law"]
-    return (
-        f"| {pair['scenario']}, {law} | {' | '.join(rates)} | {clearances} cm | "
-        f"{_apart(pair)} |"
-    )
+    return f"{pair['scenario']}, {law}", *rates, f"{clearances} cm", _apart(pair)
 
 
 def _apart(pair: dict[str, Any]) -> str:

@@ -22,6 +22,7 @@ from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.models.linearisation import check_gradient, compare_routes
 from analysis.models.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.models.operating_points import OperatingPoint, moving_equilibrium
+from analysis.reporting.markdown import markdown_table
 from diagrams import load_scenario
 from diagrams.scenario import Scenario
 from systems.framework.signals import FRAME_PERIOD_S
@@ -40,13 +41,6 @@ __all__ = [
 LAWS = ("none", "conventional", "active", "active2017")
 #: Slower modes are of the motion, faster ones of motors and filters, rad/s.
 _MOTION_RAD_S = 5.0
-
-
-def _table(heads: Sequence[str], rows: Iterator[Sequence[str]]) -> Iterator[str]:
-    yield f"| {' | '.join(heads)} |"
-    yield f"|{'---|' * len(heads)}"
-    for row in rows:
-        yield f"| {' | '.join(row)} |"
 
 
 def _points() -> Iterator[tuple[str, str, OperatingPoint]]:
@@ -186,49 +180,49 @@ def equilibrium_rows() -> Iterator[Sequence[str]]:
 
 
 def tables(duration_s: float = 300.0) -> Iterator[str]:
-    """Lines of all tables, as Markdown.
+    """All tables, as Markdown, with empty lines between them.
 
     Args:
         duration_s: Of the runs that check delay margins, s.
     """
-    yield from _table(
+    yield markdown_table(
         ("scenario", "law", "sinks", "saddles", "sources", "switching",
          "complete"),
         equilibrium_rows(),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("law", "operating point", "states", "matrices apart", "poles apart",
          "AutoDiff against differences", "corner"),
         _routes(),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("law", "operating point", "offset (m)", "pole (rad/s)", "damping ratio",
          "frequency (rad/s)"),
         mode_rows(),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("law", "predicted (rad/s, ratio)", "all ideal", "audio and cones",
          "prediction off"),
         _steps(),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("loop", "cut at", "gain up to", "gain down to", "phase margin (deg)",
          "crossover (rad/s)", "modulus margin", "disk"),
         margin_rows(),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("law", "delay at", "margin (s)", "frequency (rad/s)",
          "growth at 0.95: computed, simulated (1/s)",
          "at 1.05", "confirmed"),
         _delays(duration_s),
     )  # fmt: skip
     yield ""
-    yield from _table(
+    yield markdown_table(
         ("scheme", "condition", "pairs", "stable", "mismatches"),
         (
             (check.scheme, f"`{check.condition}`", *(
@@ -238,10 +232,10 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
         ),
     )  # fmt: skip
     yield ""
-    yield from _table(("law", "hold", "largest multiplier", "simulated"), _bursts())
+    yield markdown_table(("law", "hold", "largest multiplier", "simulated"), _bursts())
     yield ""
     latencies = contact_limits(Scenario()).latency_ticks
-    yield from _table(
+    yield markdown_table(
         ("motor lag", *(f"{25 * ticks} ms late" for ticks in latencies)), contact_rows()
     )
 

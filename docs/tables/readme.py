@@ -9,6 +9,7 @@ import sys
 
 import numpy as np
 
+from analysis.reporting.markdown import markdown_head, markdown_row
 from analysis.runs.metrics import run_metrics
 from diagrams import RunResult, load_scenario, simulate
 from diagrams.laws import LAWS
@@ -54,19 +55,19 @@ def following_rows() -> list[str]:
         "at the end, the source at rest": f"{distance[-1]:.2f} m",
         "least clearance": f"{metrics['minimum_clearance_m']:.2f} m",
     }
-    return [f"| {name} | {figure} |" for name, figure in figures.items()]
+    return [markdown_row(row) for row in figures.items()]
 
 
 def laws_heading() -> str:
-    """Heading of the table of endings."""
+    """Heading of the table of endings, with its rule."""
     names = ("no avoidance" if law == "none" else law for law in LAWS)
-    return f"| scenario | {' | '.join(names)} |"
+    return markdown_head(["scenario", *names])
 
 
 def ending_row(scenario: str) -> str:
     """How a scenario ends with each law."""
     runs = (simulate(load_scenario(scenario, [f"law={law}"])) for law in LAWS)
-    return f"| {scenario} | {' | '.join(_ending(run) for run in runs)} |"
+    return markdown_row([scenario, *map(_ending, runs)])
 
 
 def _ending(result: RunResult) -> str:
@@ -82,7 +83,6 @@ def _millimetres(value: float | None) -> str:
 
 
 if __name__ == "__main__":
-    rows = ["| | |", "|---|---|", *following_rows(), ""]
-    rows += [laws_heading(), "|---" * (1 + len(LAWS)) + "|"]
+    rows = [markdown_head(["", ""]), *following_rows(), "", laws_heading()]
     rows += [ending_row(scenario) for scenario in SCENARIOS]
     sys.stdout.write("\n".join(rows) + "\n")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.reporting.plain_values import plain
+from analysis.reporting.plain_values import plain, write_json
 from systems.base.robot import RobotParameters
 
 
@@ -59,3 +59,12 @@ def test_arrays_of_complex_numbers_and_mappings() -> None:
 def test_what_has_no_plain_form_is_named() -> None:
     with pytest.raises(TypeError, match="object has no plain form"):
         plain([object()])
+
+
+def test_document_ends_with_a_line_and_holds_no_nan(tmp_path):
+    path = tmp_path / "summary.json"
+    write_json({"runs": [1, 2.5]}, path)
+    assert path.read_text("utf-8").endswith("}\n")
+    assert json.loads(path.read_text("utf-8")) == {"runs": [1, 2.5]}
+    with pytest.raises(ValueError, match="JSON"):
+        write_json({"runs": float("nan")}, path)

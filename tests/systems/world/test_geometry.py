@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 
 from systems.world.geometry import (
+    beyond_rectangle,
     cone_range,
     contact_time,
     control_point,
@@ -123,6 +124,21 @@ def test_nearest_point_of_a_rectangle(point, rectangle):
     sampled = np.min(np.linalg.norm(edges(rectangle) - point, axis=1))
     assert distance <= sampled + 1e-9
     assert sampled <= math.hypot(distance, SPACING) + 1e-9
+
+
+@given(st.lists(st.tuples(place, place), min_size=1), rectangles)
+def test_nearest_points_of_arrays_are_those_of_each_point(points, rectangle):
+    """To the last bit: runs and their analysis must agree."""
+    array = nearest_point_on_rectangle(np.array(points).T, rectangle)
+    each = [nearest_point_on_rectangle(point, rectangle) for point in points]
+    np.testing.assert_array_equal(np.transpose(array), each)
+
+
+@given(st.tuples(place, place), rectangles)
+def test_way_beyond_a_rectangle_is_as_long_along_its_axes(point, rectangle):
+    own = math.hypot(*beyond_rectangle(point, rectangle))
+    outer = math.hypot(*nearest_point_on_rectangle(point, rectangle))
+    assert own == pytest.approx(outer, rel=1e-12)
 
 
 def sampled_cone_range(x, y, axis, half_angle, bodies) -> float:
