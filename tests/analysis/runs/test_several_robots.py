@@ -30,7 +30,10 @@ def test_metrics_are_those_of_each_robot(convoy):
     gap = metrics["second.minimum_clearance_m"]
     assert gap == pytest.approx(metrics["leader.minimum_obstacle_clearance_m"])
     # The leader is what it follows, and so no obstacle; the source is one.
-    assert metrics["second.minimum_obstacle_clearance_m"] > gap + 0.5
+    beside = metrics["second.minimum_obstacle_clearance_m"]
+    assert gap is not None
+    assert beside is not None
+    assert beside > gap + 0.5
 
 
 def test_summary_names_each_robot(convoy):
