@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib.machinery import ExtensionFileLoader
@@ -27,8 +28,8 @@ class Interrupts:
     """The interrupts of a command, as KeyboardInterrupt.
 
     A C extension that an interrupt strikes while it is loaded prints what it likes
-    and raises something else: the interrupt waits. Compiled callbacks may swallow
-    it: it strikes again until it is noticed.
+    and raises something else: the interrupt waits. Callbacks of compiled code may
+    swallow it: it strikes again until it is noticed.
 
     Args:
         last: Whether the process ends with the command: nothing is left then that
@@ -42,10 +43,12 @@ class Interrupts:
 
     def __enter__(self) -> Interrupts:
         self._before = {each: signal.signal(each, self._strike) for each in _SIGNALS}
+        self._hook, sys.unraisablehook = sys.unraisablehook, self._swallowed
         return self
 
     def __exit__(self, *exception: object) -> None:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
+        sys.unraisablehook = self._hook
         for each, handler in self._before.items():
             signal.signal(each, signal.SIG_IGN if self._last else handler)
 
@@ -55,6 +58,11 @@ class Interrupts:
             signal.setitimer(signal.ITIMER_REAL, _AGAIN_S)
             if not _loads_extension(frame):
                 raise _Interrupt
+
+    def _swallowed(self, ignored: sys.UnraisableHookArgs) -> None:
+        # Python prints what a callback, as numba's, has swallowed: not ours.
+        if not issubclass(ignored.exc_type, _Interrupt):
+            self._hook(ignored)
 
     def check(self) -> None:
         """Lets an interrupt through that was held back.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import importlib.machinery
 import os
 import signal
@@ -105,6 +106,23 @@ def test_one_that_was_swallowed_strikes_again():
         steps.append("never")
 
     assert steps_until_interrupted(work) == ["swallowed"]
+
+
+def test_one_that_a_callback_swallowed_is_not_printed(capsys):
+    """As numba's, while it compiles."""
+
+    def work(_, steps):
+        def callback():
+            strike()
+            wait()
+
+        ctypes.CFUNCTYPE(None)(callback)()
+        steps.append("swallowed")
+        wait()
+        steps.append("never")
+
+    assert steps_until_interrupted(work) == ["swallowed"]
+    assert capsys.readouterr().err == ""
 
 
 def test_an_extension_that_loads_is_not_disturbed():
