@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -22,11 +23,11 @@ sys.exit(phonotaxis.main())
 """
 
 
-def begin(folder: Path, *words: str) -> subprocess.Popen[str]:
+def started(folder: Path, *words: str) -> subprocess.Popen[str]:
     process = subprocess.Popen(
         [sys.executable, "-c", CODE, *words],
         cwd=folder,
-        env={"PYTHONPATH": str(ROOT)},
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -36,10 +37,15 @@ def begin(folder: Path, *words: str) -> subprocess.Popen[str]:
     return process
 
 
-@pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
-@pytest.mark.parametrize("after_s", [0.05, 0.1, 0.2, 0.4, 0.8, 1.6])
+@pytest.mark.parametrize(
+    ("kind", "after_s"),
+    [
+        *((signal.SIGINT, after_s) for after_s in (0.0, 0.1, 0.2, 0.4, 0.8, 1.6)),
+        (signal.SIGTERM, 0.8),
+    ],
+)
 def test_an_early_interrupt_is_one_line(tmp_path, kind, after_s):
-    process = begin(tmp_path, "simulate", "--set", "duration_s=2000", "--out", "run")
+    process = started(tmp_path, "simulate", "--set", "duration_s=2000", "--out", "run")
     time.sleep(after_s)
     process.send_signal(kind)
     printed, complaint = process.communicate(timeout=60)
