@@ -1,6 +1,7 @@
 """Data in, data out; plots and reports on top, in files of their own.
 
-``hearing``: how well sounds are located. ``runs``: metrics, pictures and results of
-one run. ``sweeps``: many runs, and laws side by side. ``gains``: the laws' curves,
-and gains from requirements. ``stability``: models, margins, maps, certificates.
+Runs: ``runs``, ``sweeps``, ``comparison``. Ears: ``hearing``, ``recordings``.
+Stability: ``laws``, ``models``, ``linear``, ``nonlinear``, ``certificates``,
+``design``, gathered by ``stability``. Pages and files: ``reporting``. The command
+line: ``commands``.
 """

@@ -16,6 +16,7 @@ SHORT = ("--set", "duration_s=0.05")
 _COMMANDS = (
     "simulate",
     "scenarios",
+    "laws",
     "locate",
     "localization",
     "compare",

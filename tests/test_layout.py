@@ -123,8 +123,53 @@ def test_imports_are_absolute_and_narrow(package: str) -> None:
 
 def test_command_line_imports_nothing_but_python_on_load() -> None:
     """`--help` and a mistyped option answer at once."""
-    tree = ast.parse((ROOT / "phonotaxis.py").read_text("utf-8"))
-    wrong = {top(name) for name in imported_on_load(tree)} - sys.stdlib_module_names
+    commands = sources("analysis/commands")
+    assert commands
+    wrong = {
+        f"{path.relative_to(ROOT)} imports {name}"
+        for path in (ROOT / "phonotaxis.py", ROOT / "analysis/__init__.py", *commands)
+        for name in imported_on_load(ast.parse(path.read_text("utf-8")))
+        if top(name) not in sys.stdlib_module_names
+        and not name.startswith("analysis.commands")
+    }
+    assert not wrong
+
+
+def test_help_of_every_command_loads_nothing_else() -> None:
+    code = """
+import contextlib, io, sys
+import phonotaxis
+from analysis.commands.command_line import COMMANDS
+for words in ([], *([name] for name in COMMANDS)):
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        phonotaxis.main([*words, "--help"])
+print(*COMMANDS, *(name.partition(".")[0] for name in sys.modules))
+"""
+    loaded = set(python(code))
+    assert {"simulate", "laws", "analysis"} <= loaded
+    assert not {"systems", "diagrams", "numpy", "pydrake", "pydantic"} & loaded
+
+
+def python(code: str) -> list[str]:
+    """Words that a new process prints."""
+    return subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+
+
+def test_no_other_room_imports_the_commands() -> None:
+    wrong = [
+        path.relative_to(ROOT)
+        for package in FOLDERS
+        for path in sources(package)
+        if "commands" not in path.relative_to(ROOT).parts
+        for name in imported(ast.parse(path.read_text("utf-8")))
+        if name.startswith("analysis.commands")
+    ]
     assert not wrong
 
 
@@ -132,13 +177,7 @@ def test_command_line_imports_nothing_but_python_on_load() -> None:
 def test_simulation_loads_no_plotting(package: str) -> None:
     """Nor python-control, pydrake.all, and what scipy imports for a second."""
     code = f"import sys, {package}; print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code],
-        cwd=ROOT,
-        capture_output=True,
-        text=True,
-        check=True,
-    ).stdout.split()
+    loaded = python(code)
     assert package in loaded
     slow = {"matplotlib", "control", "pydrake.all", "scipy.signal", "scipy.stats"}
     assert not slow & set(loaded)

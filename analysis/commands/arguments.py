@@ -1,0 +1,56 @@
+"""Arguments that several subcommands take."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+
+__all__ = ["LAW_HELP", "overrides", "take_json", "take_output", "take_scenario"]
+
+#: The names stand in ``phonotaxis laws`` alone: to load them takes seconds.
+LAW_HELP = "a name (phonotaxis laws lists them), or package.module:Name"
+
+
+def take_json(parser: ArgumentParser) -> None:
+    """``--json``."""
+    parser.add_argument("--json", action="store_true", help="print one JSON document")
+
+
+def take_output(parser: ArgumentParser) -> None:
+    """``--out`` and ``--json``."""
+    parser.add_argument(
+        "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
+    )
+    take_json(parser)
+
+
+def take_scenario(parser: ArgumentParser) -> None:
+    """A scenario, and the options that change its fields."""
+    parser.add_argument(
+        "scenario", nargs="?", default="default", help="library name or YAML file"
+    )
+    parser.add_argument("--seed", metavar="N", help="seed of all random numbers")
+    parser.add_argument(
+        "--velocity-term",
+        metavar="TERM",
+        help="printed (|dC/dt|) or closing (the speed of approach alone)",
+    )
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as source.speed_m_s=0.2; may be repeated",
+    )
+
+
+def overrides(options: Namespace) -> list[str]:
+    """The options that stand for fields, after --set so that they win."""
+    found = list(options.set)
+    for option, field in (
+        ("seed", "seed"),
+        ("velocity_term", "repulsion.velocity_term"),
+    ):
+        value = getattr(options, option)
+        if value is not None:
+            found.append(f"{field}={value}")
+    return found

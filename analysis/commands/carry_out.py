@@ -1,0 +1,87 @@
+"""The path that every subcommand takes: prepare, run, write, print."""
+
+from __future__ import annotations
+
+import json
+import sys
+from argparse import Namespace
+from contextlib import ExitStack, nullcontext
+from functools import partial
+from typing import Any
+
+from analysis.commands.command import Command, Job, Place
+from analysis.commands.interrupts import Interrupts
+from analysis.commands.progress import Progress
+
+__all__ = ["carry_out"]
+
+
+def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> None:
+    """Does what a subcommand is asked for.
+
+    Args:
+        command: The subcommand.
+        options: Its words.
+        interrupts: Of the process.
+
+    Raises:
+        InputError: Something of the input is no good.
+        RunError: The run failed, or was interrupted and left something behind.
+        KeyboardInterrupt: It was interrupted and left nothing behind.
+    """
+    job: Job[Any] | None = None
+    try:
+        with ExitStack() as stack, interrupts.watched():
+            # Loads most of the libraries, so that it has to be watched.
+            from analysis.run_error import RunError, no_exit
+
+            with no_exit():
+                job = command.prepare(options, partial(_take, stack, interrupts))
+                found, summary = _run(job, interrupts)
+    except KeyboardInterrupt:
+        if job is None or job.kept is None:
+            raise
+        raise RunError(
+            f"interrupted; {job.kept()} of {job.total} runs are kept: go on with "
+            f"--out {job.out} --resume"
+        ) from None
+    try:
+        interrupts.release()
+        _print(job, found, summary, as_json=options.json)
+        interrupts.hold()
+    except KeyboardInterrupt:
+        interrupts.hold()
+        if job.out is None:
+            raise
+        raise RunError(f"interrupted; the results are in {job.out}") from None
+    job.demand(found)
+
+
+def _take(stack: ExitStack, interrupts: Interrupts, out: str | None) -> Place:
+    from analysis.reporting.result_directory import whole_directory
+
+    with interrupts.held():
+        return Place(*stack.enter_context(whole_directory(out)))
+
+
+def _run(job: Job[Any], interrupts: Interrupts) -> tuple[Any, dict[str, Any]]:
+    done = job.kept() if job.kept is not None else 0.0
+    with Progress(interrupts, job.total, job.unit, done) as progress:
+        # Compiled callbacks make a SystemError of what strikes inside them.
+        with interrupts.held() if job.total else nullcontext():
+            found = job.run(progress)
+        summary = job.summary(found)
+        job.write(found, summary)
+    return found, summary
+
+
+def _print(job: Job[Any], found: Any, summary: Any, *, as_json: bool) -> None:
+    for remark in job.remarks(found):
+        print(f"phonotaxis: {remark}", file=sys.stderr)
+    if as_json:
+        print(json.dumps(summary, allow_nan=False))
+    else:
+        print(job.text(found, summary))
+        if job.out is not None:
+            print(job.where.format(out=job.out))
+    sys.stdout.flush()

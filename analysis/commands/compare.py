@@ -1,0 +1,98 @@
+"""``phonotaxis compare``: laws side by side on the same random layouts."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from analysis.commands.arguments import take_output
+from analysis.commands.command import Command, Job, Take
+
+if TYPE_CHECKING:
+    from analysis.comparison.laws_in_pairs import Comparison, Pair
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "scenario",
+        nargs="*",
+        help="library name, YAML file of layouts, or YAML file of a scenario "
+        "(default: the papers' four experiments)",
+    )
+    parser.add_argument(
+        "--laws",
+        metavar="LAW,...",
+        help="laws to compare (default: all that phonotaxis laws lists)",
+    )
+    parser.add_argument(
+        "--velocity-term",
+        metavar="TERM,...",
+        help="printed, closing, or both (default: the scenario's)",
+    )
+    parser.add_argument(
+        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+    )
+    parser.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
+    parser.add_argument(
+        "--set",
+        metavar="KEY=VALUE",
+        action="append",
+        default=[],
+        help="set any field, as hearing=ideal; may be repeated",
+    )
+    parser.add_argument(
+        "--grid",
+        metavar="KEY=[VALUE,...]",
+        action="append",
+        default=[],
+        help="compare values of a further field, as hearing=[audio,ideal]",
+    )
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+    )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with the runs in --out"
+    )
+    take_output(parser)
+
+
+def _prepare(
+    options: Namespace, take: Take
+) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
+    from analysis.comparison.compare import prepare_comparison
+    from analysis.comparison.options import comparison_plans
+    from analysis.comparison.report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+
+    plans = comparison_plans(
+        options.scenario,
+        laws=options.laws,
+        velocity_terms=options.velocity_term,
+        runs=options.runs,
+        seed=options.seed,
+        settings=options.set,
+        grid=options.grid,
+    )
+    prepared = prepare_comparison(
+        plans, options.out, workers=options.workers, resume=options.resume
+    )
+    return Job(
+        run=prepared.run,
+        summary=lambda found: compare_summary(prepared, *found),
+        text=lambda found, summary: compare_text(summary, *found),
+        out=prepared.out,
+        write=lambda found, summary: write_comparison(prepared, found[0], summary),
+        total=prepared.runs,
+        unit="runs",
+        kept=lambda: prepared.done,
+    )
+
+
+COMMAND = Command(
+    "compare", "laws side by side on the same random layouts", _add_arguments, _prepare
+)

@@ -1,0 +1,45 @@
+"""``phonotaxis design``: the laws' gains from stated requirements."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from analysis.commands.arguments import overrides, take_output, take_scenario
+from analysis.commands.command import Command, Job, Take
+
+if TYPE_CHECKING:
+    from analysis.design.design_study import DesignStudy
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    take_scenario(parser)
+    take_output(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
+    from analysis.design.design_study import STUDY_RUNS, study_design
+    from analysis.design.design_text import design_summary, design_text, write_design
+    from diagrams import load_scenario
+
+    place = take(options.out)
+    scenario = load_scenario(options.scenario, overrides(options))
+    return Job(
+        run=lambda progress: study_design(scenario, progress=progress),
+        summary=lambda study: design_summary(study, place.out),
+        text=lambda study, _: design_text(study),
+        out=place.out,
+        write=lambda study, summary: write_design(study, summary, place.directory),
+        total=STUDY_RUNS,
+        unit="runs",
+    )
+
+
+COMMAND = Command(
+    "design",
+    "the laws' gains, derived from stated requirements",
+    _add_arguments,
+    _prepare,
+)

@@ -1,0 +1,22 @@
+"""``phonotaxis laws``: the laws that come with the package."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+from analysis.commands.arguments import take_json
+from analysis.commands.command import Command, Job, Take
+from analysis.commands.listing import listing
+
+__all__ = ["COMMAND"]
+
+
+def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
+    from systems.laws.catalogue import LAWS
+
+    return listing(
+        "laws", "title", lambda: {name: law.title for name, law in LAWS.items()}
+    )
+
+
+COMMAND = Command("laws", "list the laws that can be named", take_json, _prepare)

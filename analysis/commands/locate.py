@@ -1,0 +1,59 @@
+"""``phonotaxis locate``: bearing and range over time of a recording."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from analysis.commands.arguments import take_json
+from analysis.commands.command import Command, Job, Take
+
+if TYPE_CHECKING:
+    from analysis.recordings.locate_result import LocateResult
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
+    parser.add_argument(
+        "--geometry", metavar="FILE.yaml", help="places of the microphones"
+    )
+    parser.add_argument(
+        "--out", metavar="DIR", help="directory for locate.json and locate.png"
+    )
+    take_json(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
+    from analysis.recordings.locate import load_geometry, locate
+    from analysis.recordings.locate_text import locate_text
+
+    geometry = load_geometry(Path(options.geometry)) if options.geometry else None
+    place = take(options.out) if options.out is not None else None
+
+    def summary(result: LocateResult) -> dict[str, Any]:
+        where = {"out": str(place.out)} if place is not None else {}
+        return {**result.to_dict(), **where}
+
+    def write(result: LocateResult, document: dict[str, Any]) -> None:
+        if place is not None:
+            from analysis.recordings.locate_plots import write_locate
+
+            write_locate(result, document, place.directory)
+
+    return Job(
+        run=lambda _: locate(Path(options.recording), geometry),
+        summary=summary,
+        text=lambda result, _: locate_text(result),
+        out=place.out if place is not None else None,
+        write=write,
+        where="results in {out}",
+        remarks=lambda result: [fault.message for fault in result.faults],
+    )
+
+
+COMMAND = Command(
+    "locate", "bearing and range over time of a recording", _add_arguments, _prepare
+)

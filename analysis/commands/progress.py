@@ -1,0 +1,61 @@
+"""The progress bar of a command."""
+
+from __future__ import annotations
+
+import sys
+
+from analysis.commands.interrupts import Interrupts
+
+__all__ = ["Progress"]
+
+
+class Progress:
+    """A bar on a terminal, nothing in a pipe. Each call lets interrupts through.
+
+    Args:
+        interrupts: They are held back between the calls.
+        total: What there is to do; nothing: there is no bar.
+        unit: Of what is counted.
+        done: What has been done before.
+    """
+
+    def __init__(
+        self, interrupts: Interrupts, total: float, unit: str, done: float = 0.0
+    ) -> None:
+        from tqdm import tqdm
+
+        form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
+        self._interrupts = interrupts
+        self._bar = tqdm(
+            total=total,
+            initial=done,
+            disable=not total or not sys.stderr.isatty(),
+            bar_format=form,
+            leave=False,
+        )
+        self._steps = 0
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self._bar.close()
+
+    def __call__(self, done: float) -> None:
+        """Shows how much is done.
+
+        Raises:
+            KeyboardInterrupt: An interrupt has come meanwhile.
+        """
+        self._bar.update(done - self._bar.n)
+        self._interrupts.check()
+
+    def step(self, title: str) -> None:
+        """Names what comes next; what came before is done.
+
+        Raises:
+            KeyboardInterrupt: As a call.
+        """
+        self._bar.set_description(title)
+        self(self._steps)
+        self._steps += 1

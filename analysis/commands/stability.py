@@ -1,0 +1,88 @@
+"""``phonotaxis stability``: the stability of a scenario's loop."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING
+
+from analysis.commands.arguments import (
+    LAW_HELP,
+    overrides,
+    take_output,
+    take_scenario,
+)
+from analysis.commands.command import Command, Job, Take
+from analysis.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from analysis.stability.law_analysis import LawAnalysis
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--law",
+        metavar="LAW",
+        action="append",
+        help=f"{LAW_HELP}; may be repeated, to compare laws; "
+        "all: those that avoid obstacles (default: the scenario's law)",
+    )
+    take_scenario(parser)
+    parser.add_argument(
+        "--full", action="store_true", help="everything, also what takes minutes"
+    )
+    take_output(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
+    from analysis.run_error import RunError
+    from analysis.stability.law_analysis import analyse_law, chosen_laws
+    from analysis.stability.report_files import (
+        stability_document,
+        stability_text,
+        write_stability,
+    )
+    from analysis.stability.report_parts import parts
+    from diagrams import load_scenario
+
+    place = take(options.out)
+    scenario = load_scenario(options.scenario, overrides(options))
+    scenarios = chosen_laws(scenario, options.law or [])
+    work = parts(full=options.full)
+
+    def run(progress: Progress) -> list[LawAnalysis]:
+        analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]
+        progress.step("writing the report")
+        return analyses
+
+    def demand(analyses: list[LawAnalysis]) -> None:
+        failures = [each for one in analyses for each in one.failures.items()]
+        if failures:
+            names = ", ".join(key for key, _ in failures)
+            raise RunError(
+                f"parts of the report failed: {names}; {place.out / 'report.html'} "
+                "says how (--debug prints the traceback)"
+            ) from failures[0][1]
+
+    return Job(
+        run=run,
+        summary=lambda analyses: stability_document(analyses, place.out),
+        text=lambda _, document: stability_text(document),
+        out=place.out,
+        write=lambda analyses, document: write_stability(
+            analyses, document, place.directory
+        ),
+        where="\nreport in {out}/report.html",
+        total=len(work) * len(scenarios) + 1,
+        unit="parts",
+        demand=demand,
+    )
+
+
+COMMAND = Command(
+    "stability",
+    "stability of a scenario's loop: report, models, numbers",
+    _add_arguments,
+    _prepare,
+)

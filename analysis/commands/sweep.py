@@ -1,0 +1,70 @@
+"""``phonotaxis sweep``: many scenarios, drawn from distributions and grids."""
+
+from __future__ import annotations
+
+from argparse import ArgumentParser, Namespace
+from typing import TYPE_CHECKING, Any
+
+from analysis.commands.arguments import take_output
+from analysis.commands.command import Command, Job, Take
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/sweeps.md")
+    parser.add_argument(
+        "--workers", metavar="N", type=int, help="local processes (default: one a core)"
+    )
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a Dask cluster, as tcp://host:8786"
+    )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on with what --out holds"
+    )
+    take_output(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
+    from analysis.sweeps.one_run import require_runs
+    from analysis.sweeps.page import write_sweep
+    from analysis.sweeps.plan import load_sweep
+    from analysis.sweeps.summary import sweep_summary, sweep_text
+    from analysis.sweeps.sweep import prepare_sweep
+
+    plan = load_sweep(options.sweep)
+    sweep = prepare_sweep(
+        plan,
+        options.out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        resume=options.resume,
+    )
+    points, out = sweep.points, sweep.store.out
+
+    def write(results: pd.DataFrame, summary: dict[str, Any]) -> None:
+        write_sweep(plan, points, results, summary)
+        require_runs([results], out)
+
+    return Job(
+        run=sweep.run,
+        summary=lambda results: sweep_summary(plan, points, results, out),
+        text=lambda results, _: sweep_text(plan, results),
+        out=out,
+        write=write,
+        where="\nresults in {out}, report in {out}/report.html",
+        total=len(points),
+        unit="runs",
+        kept=lambda: len(sweep.store.done),
+    )
+
+
+COMMAND = Command(
+    "sweep",
+    "run many scenarios, drawn from distributions and grids",
+    _add_arguments,
+    _prepare,
+)
