@@ -25,7 +25,7 @@ from systems.sound.array_shape import ArrayShape
 
 pytestmark = pytest.mark.slow
 
-C, TRIALS = 340.0, 300
+C, TRIALS = 340.0, 400
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)
 #: Largest RMSE over bound; the lower end of its 95 % interval counts.
 LARGEST_RATIO = {"gcc": 1.25, "ml": 1.10}
