@@ -35,10 +35,15 @@ from systems.laws.impedance import ImpedanceLoop
 from systems.sound.mic_array import microphone_reach
 from systems.sound.waveforms import SoundParameters
 
-__all__ = ["LOG", "Parts", "block_seed", "make_robot", "make_source", "parts_of"]
+__all__ = [
+    "Parts",
+    "block_seed",
+    "connect_by_name",
+    "make_robot",
+    "make_source",
+    "parts_of",
+]
 
-#: Name of a robot's log.
-LOG = "log"
 #: What a robot takes from the world around it; of emissions, all.
 _OUTSIDE = ("pose_WS", "poses_WO", "sizes", "emission")
 
@@ -389,4 +394,4 @@ def _add_log(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
     sink = LogVectorOutput(
         multiplexer.get_output_port(0), builder, publish_period=FRAME_PERIOD_S
     )
-    sink.set_name(LOG)
+    sink.set_name("log")

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from diagrams.bodies import RecordedPath, Surroundings
 from diagrams.robot import Parts
 from diagrams.scenario import ROBOT, Scenario
-from diagrams.stop_rules import Collision, RobotRules, whole_cause
+from diagrams.stop_rules import Collision, RobotRules, decisive_robot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -146,7 +146,7 @@ def gather_result(
         for key, values in result.columns.items():
             if key != "t":
                 columns[f"{name}.{key}"] = values
-    decisive = results[whole_cause(rules)]
+    decisive = results[decisive_robot(rules)]
     return RunResult(
         scenario,
         decisive.cause,

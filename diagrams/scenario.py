@@ -212,11 +212,13 @@ class Scenario(FollowerParameters, RunParameters):
         if any(robot.hearing == "audio" for robot in robots.values()):
             return
         followed = {self.target(name) for name in robots}
-        for name in played:
+        # The one source that is always there may be a body alone.
+        named = [each for each in played if each in robots or each in self.sources]
+        for name in named:
             if name not in followed:
-                group = "robots" if name in robots else "sources"
+                field = f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
                 raise InputError(
-                    f"{group}.{name}",
+                    field if name in robots else f"sources.{name}",
                     "nobody hears its sound: no robot follows it, and none has hearing "
                     "'audio'; let one, or make it an obstacle",
                 )

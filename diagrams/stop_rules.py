@@ -28,7 +28,7 @@ __all__ = [
     "Collision",
     "RobotRules",
     "StopRules",
-    "whole_cause",
+    "decisive_robot",
 ]
 
 #: Causes of runs that did what they should.
@@ -63,8 +63,8 @@ class Collision:
     """First contact, s, to a fifth of a tick."""
 
 
-def whole_cause(robots: Mapping[str, RobotRules]) -> str:
-    """Name of the robot whose end is that of the whole run.
+def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
+    """Name of the robot whose cause is that of the whole run.
 
     The first that touched something, else the first that did not do what it
     should, else the first.
@@ -112,7 +112,7 @@ class StopRules:
         """Cause of the whole run; empty while it goes on."""
         if not self.over:
             return ""
-        return self.robots[whole_cause(self.robots)].final_cause()
+        return self.robots[decisive_robot(self.robots)].final_cause()
 
     @property
     def over(self) -> bool:

@@ -220,7 +220,7 @@ def test_frames_that_can_hold_the_sound(time, may):
 
 
 def test_both_followers_of_one_source_complete():
-    result = simulate(load_scenario("two_followers", ["hearing=ideal"]))
+    result = simulate(load_scenario("two_followers"))
     assert {own.cause for own in result.robots.values()} == {"completed"}
     assert result.cause == "completed"
 
@@ -311,7 +311,11 @@ PAIR = "robots={a: {}, b: {start: {position_m: [-2, 0]}}}"
         ),
         (
             ["hearing=ideal", PAIR, "robots.b.loudspeaker={}"],
-            r"robots\.b: nobody hears its sound",
+            r"robots\.b\.loudspeaker: nobody hears its sound",
+        ),
+        (
+            ["hearing=ideal", "loudspeaker={}"],
+            r"loudspeaker: nobody hears its sound",
         ),
         (
             ["tdoa.schedule_known=true", "sound.on_s=2", "sound.period_s=2"],
@@ -336,6 +340,13 @@ def test_bad_input_names_the_robot(overrides, message):
         load_scenario("default", overrides)
     assert "\n" not in str(error.value)
     assert len(str(error.value)) <= 300
+
+
+def test_two_robots_may_follow_each_other_past_a_silent_source():
+    """It is there in every scenario, and no fault where nobody listens to it."""
+    each = "{loudspeaker: {}, follows: %s, start: {position_m: [%d, 0]}}"
+    pair = f"robots={{a: {each % ('b', 0)}, b: {each % ('a', -3)}}}"
+    assert set(load_scenario("default", ["hearing=ideal", pair]).robots) == {"a", "b"}
 
 
 def test_two_robots_of_one_name_are_refused(tmp_path):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_each_robot_moves_in_the_replay(convoy):
         def __getattr__(self, name: str):
             return lambda path, *rest, **_: paths.add(path)
 
-    record_run(Recorder(), convoy)  # type: ignore[arg-type]
+    record_run(cast("Any", Recorder()), convoy)
     expected = {"robots/leader", "robots/second", "source", "estimates/second"}
     assert expected <= paths
     assert "robots/leader/ring_1" in paths, "its loudspeaker"
