@@ -12,9 +12,11 @@ from systems.framework.parameters import (
     Fraction,
     Length,
     Parameters,
+    Period,
     Size,
     Speed,
 )
+from systems.framework.signals import TICK_S
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.room import RoomParameters
 from systems.sound.waveforms import SoundParameters
@@ -68,6 +70,9 @@ class RunParameters(Parameters):
     """One line for ``phonotaxis scenarios``."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""
+    tick_s: Period = TICK_S
+    """Period of control, odometry, sources and log, s; hearing and range sensors have
+    periods of their own, multiples of it."""
     duration_s: float = Field(default=40.0, ge=1e-9, le=3_600.0)
     """Longest simulated time, s; an hour at most."""
     arena_m: Size = (7.0, 7.0)

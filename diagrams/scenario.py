@@ -21,6 +21,7 @@ from diagrams.run_parameters import RunParameters
 from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
+from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.sound.mic_array import microphones_B
 from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import rectangle_clearance, rotate
@@ -116,6 +117,26 @@ class Scenario(FollowerParameters, RunParameters):
                     field,
                     f"has {', '.join(named)}, but {purpose} is of one robot and one "
                     f"source; leave {field} out",
+                )
+
+    def require_one_rate(self, purpose: str) -> None:
+        """Refuses hearing and range sensors that are slower than the tick.
+
+        Args:
+            purpose: What is of one rate, as 'a linear model'.
+
+        Raises:
+            InputError: One is.
+        """
+        for field, period in (
+            ("microphones.frame_s", self.microphones.frame_s),
+            ("ultrasonic.period_s", self.ultrasonic.period_s),
+        ):
+            if period != self.tick_s:
+                raise InputError(
+                    field,
+                    f"is {period:g} s, but {purpose} is of one rate; set it to tick_s, "
+                    f"{self.tick_s:g} s",
                 )
 
     def surroundings(
@@ -222,6 +243,38 @@ class Scenario(FollowerParameters, RunParameters):
                     "nobody hears its sound: no robot follows it, and none has hearing "
                     "'audio'; let one, or make it an obstacle",
                 )
+
+    @model_validator(mode="after")
+    def _check_rates(self) -> Scenario:
+        tick = self.tick_s
+        if not whole(tick * SAMPLE_RATE_HZ):
+            raise InputError(
+                "tick_s",
+                f"{tick:g} s is no multiple of {1.0 / SAMPLE_RATE_HZ:g} s, a sample of "
+                "sound; round it",
+            )
+        periods = [("room.update_period_s", self.room and self.room.update_period_s)]
+        for prefix, robot in self._robot_fields():
+            frame, rate = robot.microphones.frame_s, robot.microphones.sample_rate_hz
+            periods += [
+                (f"{prefix}microphones.frame_s", frame),
+                (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
+            ]
+            if not whole(frame * rate):
+                raise InputError(
+                    f"{prefix}microphones.sample_rate_hz",
+                    f"{rate:g} Hz gives {frame * rate:.4f} samples in a frame of "
+                    f"{frame:g} s; use {round(frame * rate) / frame:g}",
+                )
+        for field, period in periods:
+            if period and not whole(period / tick):
+                ticks = max(1, round(period / tick))
+                raise InputError(
+                    field,
+                    f"{period:g} s is no multiple of tick_s, {tick:g} s; use "
+                    f"{ticks * tick:g}, or another tick_s",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_step(self) -> Scenario:

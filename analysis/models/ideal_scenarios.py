@@ -88,6 +88,7 @@ def require_ideal(scenario: Scenario) -> None:
         InputError: Some block has no derivative.
     """
     scenario.require_one_robot("a linear model")
+    scenario.require_one_rate("a linear model")
     require_rolling(scenario.plant)
     hearing = scenario.ideal_hearing
     checks = (

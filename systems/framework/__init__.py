@@ -10,6 +10,7 @@ from systems.framework.signals import (
     FRAME_PERIOD_S,
     FRAME_SAMPLES,
     SAMPLE_RATE_HZ,
+    TICK_S,
     AudioFrame,
     Emission,
 )
@@ -18,6 +19,7 @@ __all__ = [
     "FRAME_PERIOD_S",
     "FRAME_SAMPLES",
     "SAMPLE_RATE_HZ",
+    "TICK_S",
     "AudioFrame",
     "Emission",
     "InputError",

@@ -29,6 +29,7 @@ __all__ = [
     "NonNegativeStiffness",
     "Parameters",
     "Point",
+    "Period",
     "Positive",
     "Size",
     "SoundSpeed",
@@ -55,6 +56,7 @@ Coordinate = Annotated[float, Field(ge=-_LARGEST_M, le=_LARGEST_M)]
 Angle = Annotated[float, Field(ge=-3_600.0, le=3_600.0)]
 Duration = Annotated[float, Field(ge=1e-9, le=_DAY_S)]
 Time = Annotated[float, Field(ge=0.0, le=_DAY_S)]
+Period = Annotated[float, Field(ge=1e-3, le=1.0)]
 Speed = Annotated[float, Field(ge=1e-3, le=100.0)]
 NonNegativeSpeed = Annotated[float, Field(ge=0.0, le=100.0)]
 Acceleration = Annotated[float, Field(ge=1e-3, le=_LARGEST)]

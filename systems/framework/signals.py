@@ -11,19 +11,30 @@ __all__ = [
     "FRAME_PERIOD_S",
     "FRAME_SAMPLES",
     "SAMPLE_RATE_HZ",
+    "TICK_S",
     "AudioFrame",
     "Emission",
     "read_only",
+    "whole",
 ]
 
 #: Period of every discrete block (Han 2019, section 4.1; printed "25 m/s").
 FRAME_PERIOD_S = 0.025
+
+#: Period of a robot's control unless a scenario says another, s (Han 2019, section
+#: 4.1; printed "25 m/s").
+TICK_S = 0.025
 
 #: Rate of the analogue-to-digital converter (Han 2019, section 4.1).
 SAMPLE_RATE_HZ = 100_000
 
 #: Samples a channel in a frame.
 FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
+
+
+def whole(count: float) -> bool:
+    """Whether a number of ticks or samples is a whole one, but for rounding."""
+    return round(count) >= 1 and abs(count - round(count)) < 1e-6
 
 
 def read_only(*arrays: NDArray[Any]) -> None:

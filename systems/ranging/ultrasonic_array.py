@@ -27,11 +27,12 @@ from systems.framework.parameters import (
     Length,
     NonNegativeLength,
     Parameters,
+    Period,
     Point,
     Size,
     SoundSpeed,
 )
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_PERIOD_S, TICK_S
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
@@ -69,8 +70,10 @@ class UltrasonicParameters(Parameters):
     """Standard deviation of a range, m."""
     dropout_probability: Fraction = 0.0
     """Probability that an echo is missed."""
+    period_s: Period = TICK_S
+    """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
-    """All sensors at every tick, or one after the other, a tick each."""
+    """All sensors at once, or one after the other, a period each."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed by which the sensors turn time into range, m/s; none: the true one."""
 

@@ -13,8 +13,14 @@ from pydantic import Field, Strict, model_validator
 
 from systems.framework.finite import check_finite, total
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Fraction, Parameters, Positive, Time
-from systems.framework.signals import SAMPLE_RATE_HZ
+from systems.framework.parameters import (
+    Fraction,
+    Parameters,
+    Period,
+    Positive,
+    Time,
+)
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S
 
 __all__ = ["MicArrayParameters", "channel_skew", "convert"]
 
@@ -22,6 +28,10 @@ __all__ = ["MicArrayParameters", "channel_skew", "convert"]
 class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
+    sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
+    """Rate of the converter, Hz; at most that at which sound is computed."""
+    frame_s: Period = TICK_S
+    """Length of a frame, and time from one to the next, s: so often the robot hears."""
     snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m over the noise, dB.
 
