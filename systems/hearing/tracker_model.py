@@ -94,7 +94,7 @@ class Track(NamedTuple):
         """From the discrete state's vector, of which these are views.
 
         Args:
-            state: What ``pack`` gave.
+            state: (n,) what ``pack`` gave.
             ticks: Number of past poses.
 
         Returns:

@@ -142,6 +142,20 @@ def test_resting_places_are_exact():
     assert np.std(found - expected) < 1e-3 * np.std(expected)
 
 
+def test_a_slower_converter_hears_every_other_sample():
+    source, pose = np.array([1.6, 0.9]), np.array([-0.8, -0.3, 0.4])
+    old, new = places(pose, source), places(pose + 0.05, source)
+    slow = MicArrayParameters(sample_rate_hz=50_000.0)
+    of_all, of_half = (
+        Reverberation(ROOM, C, parameters).frames(
+            [emission(source)], TIME, old, new, ARRAY
+        )[0]
+        for parameters in (MicArrayParameters(), slow)
+    )
+    assert of_half.shape == (len(of_all), FRAME_SAMPLES // 2)
+    np.testing.assert_allclose(of_half, of_all[:, ::2], atol=1e-4 * np.std(of_all))
+
+
 def driven(ticks_held):
     """Errors of four frames of moving bodies, places taken every so many ticks."""
     velocity, pose_velocity = np.array([0.0, 0.3]), np.array([0.4, -0.2, 0.3])
