@@ -17,7 +17,7 @@ from analysis.models.ideal_loop import (
     require_ideal,
 )
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S as T
+from systems.framework.signals import TICK_S as T
 
 
 def rest(law="conventional", **data):
