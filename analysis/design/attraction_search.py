@@ -19,7 +19,6 @@ from analysis.models.ideal_loop import ideal_scenario
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulate
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.impedance import AttractionParameters
 
 __all__ = [
@@ -112,7 +111,7 @@ def attraction_damping_ratio(scenario: Scenario) -> float:
     Sampled, with the motors' lag; no obstacle.
     """
     z = np.linalg.eigvals(contact_matrix(scenario, scenario.attraction.stiffness_n_m))
-    s = np.log(z[np.abs(z) > 1e-6].astype(complex)) / FRAME_PERIOD_S
+    s = np.log(z[np.abs(z) > 1e-6].astype(complex)) / scenario.tick_s
     return float(np.min(-s.real / np.abs(s)))
 
 

@@ -68,7 +68,8 @@ def _plot_conflict(axes: Axes, study: DesignStudy) -> None:
             - attraction.stiffness_n_m
             for D_r in _DAMPING_N_S_M.tolist()
         ]
-        label = f"contact is stable below: echoes {25 * ticks} ms old"
+        age = f"{1e3 * scenario.tick_s * ticks:g} ms"
+        label = f"contact is stable below: echoes {age} old"
         axes.plot(_DAMPING_N_S_M, limits, f"k{line}", label=label)
     for law in DESIGNED_LAWS:
         colour, title = LAW_STYLES[law]

@@ -16,7 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 from diagrams.laws import make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.ranging.collision_vector import SLOTS
 
 __all__ = ["LawCurves", "law_curves", "radial_forces"]
@@ -115,10 +114,11 @@ def radial_forces(
     features = np.eye(SLOTS)[0]
     controller.GetInputPort("features").FixValue(context, features)
     forces = controller.GetOutputPort("forces_W")
+    period_s = controller.GetUniquePeriodicDiscreteUpdateAttribute().period_sec()
     distances, speeds = np.broadcast_arrays(c, approach)
     found = []
     for now, speed in zip(distances.ravel(), speeds.ravel(), strict=True):
-        _see(controller, context, now + speed * FRAME_PERIOD_S)
+        _see(controller, context, now + speed * period_s)
         update = controller.EvalUniquePeriodicDiscreteUpdate(context)
         context.SetDiscreteState(update)
         _see(controller, context, now)

@@ -21,7 +21,6 @@ from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.world.geometry import control_point
 
 __all__ = [
@@ -129,12 +128,13 @@ def burst_cycle(
     sound = scenario.sound
     on = sound.on_s if on_s is None else on_s
     gap = sound.period_s - sound.on_s if gap_s is None else gap_s
-    ticks = (on + gap) / FRAME_PERIOD_S
+    tick_s = scenario.tick_s
+    ticks = (on + gap) / tick_s
     if on <= 0.0 or gap < 0.0 or abs(ticks - round(ticks)) > 1e-6:
         raise InputError(
             "sound",
             f"{on:g} s of sound and {gap:g} s of silence make no cycle of whole "
-            f"ticks; give multiples of {FRAME_PERIOD_S} s, and some sound",
+            f"ticks; give multiples of {tick_s} s, and some sound",
         )
     loop = ideal_loop(_with_bursts(point.loop.scenario, hold, on, on + gap))
     state = _settled(loop, point, round(ticks))
@@ -175,7 +175,7 @@ def _matrices(
 ) -> NDArray[np.float64]:
     start, found = _SETTLING_CYCLES * ticks, []
     for k in range(start, start + ticks):
-        period = loop.period_derivatives(state, k * FRAME_PERIOD_S)
+        period = loop.period_derivatives(state, k * loop.tick_s)
         found.append(period.A)
         state = period.next_state
     return np.array(found)
@@ -225,12 +225,12 @@ def simulate_burst_cycle(
     state = cycle.state.copy()
     kick = [loop.state_names.index(f"command.v_WP_{k}") for k in "xy"]
     state[kick] += _KICK_M_S * axis
-    ticks = round(cycle.period_s / FRAME_PERIOD_S)
+    ticks = round(cycle.period_s / loop.tick_s)
     start, plant = _SETTLING_CYCLES * ticks, loop.indices("plant")[:3]
-    run = loop.runner(state, start * FRAME_PERIOD_S)
+    run = loop.runner(state, start * loop.tick_s)
     poses = []
     for k in range(start, start + cycles * ticks):
-        run.advance((k + 1) * FRAME_PERIOD_S)
+        run.advance((k + 1) * loop.tick_s)
         poses.append(run.state()[plant])
     x, y, theta = np.array(poses).T
     epsilon = loop.scenario.robot.control_point_m
@@ -238,7 +238,7 @@ def simulate_burst_cycle(
     offset: NDArray[np.float64] = (places - point.p_WP) @ axis
     once = offset.reshape(cycles, ticks)[cycles // 4 :, -1]
     factor = _dominant_factor(once)
-    time_s: NDArray[np.float64] = FRAME_PERIOD_S * np.arange(1.0, len(offset) + 1)
+    time_s: NDArray[np.float64] = loop.tick_s * np.arange(1.0, len(offset) + 1)
     return BurstRun(cycle.hold, factor, time_s, offset)
 
 

@@ -12,7 +12,6 @@ from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["GapChart", "gap_chart"]
 
@@ -71,21 +70,22 @@ def gap_chart(
     """
     point = point or follow_equilibrium(scenario)
     gaps = np.arange(0.0, 4.01, 0.25) if gaps_s is None else np.asarray(gaps_s, float)
-    ticks = np.rint(gaps / FRAME_PERIOD_S).astype(int)
+    tick_s = scenario.tick_s
+    ticks = np.rint(gaps / tick_s).astype(int)
     on = scenario.sound.on_s
-    longest = int(ticks.max()) * FRAME_PERIOD_S
+    longest = int(ticks.max()) * tick_s
     rows = []
     for hold in holds:
         cycle = burst_cycle(scenario, hold, on_s=on, gap_s=longest, point=point)
         rows.append(
             [
                 _largest(point, product)
-                for product in _products(cycle.matrices, on, ticks)
+                for product in _products(cycle.matrices, round(on / tick_s), ticks)
             ]
         )
     return GapChart(
         on_s=on,
-        gaps_s=ticks * FRAME_PERIOD_S,
+        gaps_s=ticks * tick_s,
         holds=tuple(holds),
         multiplier=np.array(rows),
         today=(scenario.sound.period_s - on, scenario.tracker.hold),
@@ -93,11 +93,10 @@ def gap_chart(
 
 
 def _products(
-    matrices: NDArray[np.float64], on: float, ticks: NDArray[np.int_]
+    matrices: NDArray[np.float64], heard: int, ticks: NDArray[np.int_]
 ) -> list[NDArray[np.float64]]:
-    """Over the sound and the first so many ticks of silence."""
+    """Over the ticks that are heard and the first so many of silence."""
     product, products = np.eye(matrices.shape[1]), []
-    heard = round(on / FRAME_PERIOD_S)
     for matrix in matrices[:heard]:
         product = matrix @ product
     wanted = dict.fromkeys(ticks.tolist())

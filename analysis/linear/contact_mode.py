@@ -31,7 +31,7 @@ from systems import DiffDrivePlant
 from systems.base.diff_drive_plant import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelSpeedCommand_
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 __all__ = [
     "ContactLimits",
@@ -55,7 +55,7 @@ def motion_chain(
     scenario: Scenario,
     *,
     motor_lag_s: float | None = None,
-    period_s: float = FRAME_PERIOD_S,
+    period_s: float | None = None,
 ) -> LinearModel:
     """How P moves along the robot's axis, from ``acceleration_W`` on, at rest.
 
@@ -65,7 +65,7 @@ def motion_chain(
     Args:
         scenario: Robot and plant are used.
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
-        period_s: In place of the 25 ms tick, s.
+        period_s: In place of the scenario's tick, s.
 
     Returns:
         The model of one period, of as few states as the motion along the axis has.
@@ -77,7 +77,7 @@ def motion_chain(
     require_rolling(plant)
     if motor_lag_s is not None:
         plant = plant.model_copy(update={"motor_lag_s": motor_lag_s})
-    return _chain(scenario.robot, plant, period_s)
+    return _chain(scenario.robot, plant, period_s or scenario.tick_s)
 
 
 @lru_cache(maxsize=256)
@@ -93,9 +93,9 @@ def _chain(
 
     command = WheelSpeedCommand_[AutoDiffXd](robot=robot)
     rest = [np.zeros(2), np.zeros(3)]
-    update = block_model(command, np.zeros(4), rest)
+    update = block_model(command, np.zeros(4), rest, period_s=TICK_S)
     # v+ = v + T a and the wheels follow v+: the acceleration's column goes with T.
-    push = update.B[:, 0] * (period_s / FRAME_PERIOD_S)
+    push = update.B[:, 0] * (period_s / TICK_S)
     v, w = slice(0, 2), slice(2, 4)
     A = np.block(
         [
@@ -157,7 +157,7 @@ def contact_matrix(
     motor_lag_s: float | None = None,
     latency_ticks: int = 0,
     approach_damping_n_s_m: float = 0.0,
-    period_s: float = FRAME_PERIOD_S,
+    period_s: float | None = None,
 ) -> NDArray[np.float64]:
     """One-period matrix of the radial motion before an obstacle.
 
@@ -171,7 +171,7 @@ def contact_matrix(
         approach_damping_n_s_m: Slope of a law in the obstacle's speed, which is
             the change of that position over a tick, N s/m. For the half of an
             oscillation in which the obstacle comes nearer.
-        period_s: In place of the 25 ms tick, s.
+        period_s: In place of the scenario's tick, s.
 
     Returns:
         (n, n) x+ = A x; states are those of ``motion_chain``, then the aged positions,
@@ -187,7 +187,8 @@ def contact_matrix(
         return now.A + now.B @ law @ now.C
     before = delayed_output(chain, "p_WP", latency_ticks + 1)
     # The longer chain holds the shorter one's position too, one place earlier.
-    speed = approach_damping_n_s_m / period_s / scenario.robot.mass_kg
+    period = period_s or scenario.tick_s
+    speed = approach_damping_n_s_m / period / scenario.robot.mass_kg
     position = np.hstack([now.C[0], [0.0]])
     row = law[0, 0] * position + law[0, 1] * before.C[1]
     row = row - speed * (position - before.C[0])
@@ -201,7 +202,7 @@ def contact_spectral_radius(
     damping_n_s_m: float | None = None,
     motor_lag_s: float | None = None,
     latency_ticks: int = 0,
-    period_s: float = FRAME_PERIOD_S,
+    period_s: float | None = None,
 ) -> float:
     """Largest |z| of the radial motion; stable below 1. See ``contact_matrix``.
 
@@ -211,7 +212,7 @@ def contact_spectral_radius(
         damping_n_s_m: In place of D_r, N s/m.
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
         latency_ticks: Age of the position that the springs act on, periods.
-        period_s: In place of the 25 ms tick, s.
+        period_s: In place of the scenario's tick, s.
 
     Returns:
         |z| over one period, 0 or more.
@@ -233,7 +234,7 @@ def largest_contact_stiffness(
     damping_n_s_m: float | None = None,
     motor_lag_s: float | None = None,
     latency_ticks: int = 0,
-    period_s: float = FRAME_PERIOD_S,
+    period_s: float | None = None,
 ) -> float:
     """Sum of springs, K_r + K_0, at which the radial motion stops decaying, N/m.
 
@@ -244,7 +245,7 @@ def largest_contact_stiffness(
         damping_n_s_m: In place of D_r, N s/m.
         motor_lag_s: In place of ``plant.motor_lag_s``, s.
         latency_ticks: Age of the position that the springs act on, periods.
-        period_s: In place of the 25 ms tick, s.
+        period_s: In place of the scenario's tick, s.
 
     Returns:
         N/m; infinite where every spring that is tried is stable.
@@ -278,7 +279,7 @@ class ContactLimits:
     motor_lags_s: tuple[float, ...]
     """s, one a row."""
     latency_ticks: tuple[int, ...]
-    """25 ms each, one a column."""
+    """A tick each, one a column."""
     stiffness_n_m: NDArray[np.float64]
     """(rows, columns) largest K_0 of the conventional law, N/m; negative where
     the attraction alone is too stiff."""
@@ -291,6 +292,8 @@ class ContactLimits:
     """K_0 of the scenario, N/m."""
     reference_stiffness_today_n_m: float
     """k_ref of the scenario, N/m."""
+    tick_s: float
+    """Of the scenario, s."""
 
 
 def contact_limits(
@@ -330,4 +333,5 @@ def contact_limits(
         today=(scenario.plant.motor_lag_s, 0),
         stiffness_today_n_m=scenario.repulsion.conventional.stiffness_n_m,
         reference_stiffness_today_n_m=scenario.repulsion.active.reference_stiffness_n_m,
+        tick_s=scenario.tick_s,
     )

@@ -24,7 +24,6 @@ from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model, open_loop
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "DELAY_PLACES",
@@ -59,11 +58,6 @@ class DelayMargin:
     frequency_rad_s: float
     """Of the oscillation, rad/s; not a number where there is none."""
 
-    @property
-    def ticks(self) -> float:
-        """In control periods."""
-        return self.delay_s / FRAME_PERIOD_S
-
 
 class DelayedLoop:
     """The sampled loop of one direction with any delay in it.
@@ -88,6 +82,7 @@ class DelayedLoop:
         self._column = whole.input_names.index(own)
         self._at = at
         loop = point.loop
+        self._tick_s = loop.tick_s
         self._plant = loop.indices("plant")
         self._A_plant, self._B_plant = plant_jacobians(point)
         names = loop.state_names
@@ -107,7 +102,7 @@ class DelayedLoop:
 
     def period_matrix(self, delay_s: float) -> NDArray[np.float64]:
         """One-period map of the motion and of the signals under way."""
-        ticks, part = divmod(delay_s, FRAME_PERIOD_S)
+        ticks, part = divmod(delay_s, self._tick_s)
         late = int(ticks)
         return (self._wheel_delay if self._at == "wheels" else self._sensor_delay)(
             late, part
@@ -116,7 +111,7 @@ class DelayedLoop:
     def _wheel_delay(self, late: int, part: float) -> NDArray[np.float64]:
         """The wheels hold an older command until ``part`` of the period is over."""
         cut, column = self._cut, self._column
-        rest, _ = self._flow(FRAME_PERIOD_S - part)
+        rest, _ = self._flow(self._tick_s - part)
         _, first = self._flow(part)
         older = np.zeros(len(cut.A))
         older[self._plant] = rest @ first @ self._turn[column]
@@ -126,7 +121,7 @@ class DelayedLoop:
     def _sensor_delay(self, late: int, part: float) -> NDArray[np.float64]:
         """Hearing measures where the robot was, within an earlier period."""
         cut, column = self._cut, self._column
-        state, held = self._flow(FRAME_PERIOD_S - part)
+        state, held = self._flow(self._tick_s - part)
         measured = np.zeros(len(cut.A))
         by_plant = cut.A[self._hearing, self._plant]
         measured[self._plant] = by_plant @ state
@@ -146,7 +141,7 @@ class DelayedLoop:
 
     def critical_frequency(self, delay_s: float) -> float:
         """Frequency of the pole nearest to leaving, rad/s."""
-        return abs(float(np.angle(self._largest(delay_s)[1]))) / FRAME_PERIOD_S
+        return abs(float(np.angle(self._largest(delay_s)[1]))) / self._tick_s
 
 
 def _with_delays(
@@ -208,6 +203,7 @@ def delay_margin(
             "the loop is unstable without a delay, and has no "
             "delay margin; take a stable operating point (follow_equilibrium)",
         )
+    tick_s = point.loop.tick_s
     none = DelayMargin(at, direction, math.inf, math.nan)
     opened = open_loop(point, at, direction)
     if not is_loop(opened):
@@ -221,10 +217,10 @@ def delay_margin(
 
     low, high = guess, guess
     while excess(low) >= 0.0:
-        low = max(0.0, low - FRAME_PERIOD_S)
+        low = max(0.0, low - tick_s)
     while excess(high) < 0.0:
-        high += FRAME_PERIOD_S
-        if high > _LONGEST_S + FRAME_PERIOD_S:
+        high += tick_s
+        if high > _LONGEST_S + tick_s:
             return none
     found = float(brentq(excess, low, high, xtol=1e-9))
     return DelayMargin(at, direction, found, loop.critical_frequency(found))

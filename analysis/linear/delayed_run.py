@@ -13,7 +13,6 @@ from analysis.linear.delay_margin import DelayMargin, DelayPlace, delay_margin
 from analysis.models.open_loops import Direction
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.hearing.ideal_source_sensor import relative_position
 
 __all__ = [
@@ -144,13 +143,13 @@ def simulate_delayed(
     kick = [loop.state_names.index(f"command.v_WP_{k}") for k in "xy"]
     state[kick] += _KICK_M_S * axis
     advance = _wheels_late if at == "wheels" else _hearing_late
-    ticks = round(duration_s / FRAME_PERIOD_S)
+    ticks = round(duration_s / loop.tick_s)
     poses = np.array(advance(point, state, delay_s, ticks))
     epsilon = loop.scenario.robot.control_point_m
     x, y, theta = poses.T
     places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
     offset: NDArray[np.float64] = (places - point.p_WP) @ axis
-    time_s: NDArray[np.float64] = FRAME_PERIOD_S * np.arange(1.0, ticks + 1)
+    time_s: NDArray[np.float64] = loop.tick_s * np.arange(1.0, ticks + 1)
     growth, frequency = fitted_oscillation(time_s, offset)
     return DelayedRun(delay_s, duration_s, growth, frequency, time_s, offset)
 
@@ -159,8 +158,9 @@ def _wheels_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
     """The plant's input is cut off, and fed with older commands."""
-    loop, start = point.loop, round(point.time_s / FRAME_PERIOD_S)
-    late, part = divmod(delay_s, FRAME_PERIOD_S)
+    loop, tick_s = point.loop, point.loop.tick_s
+    start = round(point.time_s / tick_s)
+    late, part = divmod(delay_s, tick_s)
     port = ("plant", "wheel_speeds")
     run = loop.runner(state, point.time_s, fixed=(port,))
     sent = deque([np.zeros(2)] * (int(late) + 2), maxlen=int(late) + 2)
@@ -168,7 +168,7 @@ def _wheels_late(
     poses = []
     for k in range(start, start + ticks):
         # Ticks are multiples in Drake's arithmetic too: a sum would miss them.
-        now, then = k * FRAME_PERIOD_S, (k + 1) * FRAME_PERIOD_S
+        now, then = k * tick_s, (k + 1) * tick_s
         # Newest last; until the end of ``part`` the one before the due one holds.
         run.fix(port, sent[1] if late else sent[-1])
         run.advance(now + max(part, 1e-9))
@@ -183,8 +183,9 @@ def _hearing_late(
     point: OperatingPoint, state: NDArray[np.float64], delay_s: float, ticks: int
 ) -> list[NDArray[np.float64]]:
     """Hearing's state is replaced by what it would have measured earlier."""
-    loop, start = point.loop, round(point.time_s / FRAME_PERIOD_S)
-    late, part = divmod(delay_s, FRAME_PERIOD_S)
+    loop, tick_s = point.loop, point.loop.tick_s
+    start = round(point.time_s / tick_s)
+    late, part = divmod(delay_s, tick_s)
     pose_WS = loop.scenario.source.path().pose(0.0)
     epsilon = loop.scenario.robot.control_point_m
     hearing, plant = loop.indices("hearing")[:2], loop.indices("plant")[:3]
@@ -193,7 +194,7 @@ def _hearing_late(
     poses = []
     for k in range(start, start + ticks):
         # Ticks are multiples in Drake's arithmetic too: a sum would miss them.
-        then = (k + 1) * FRAME_PERIOD_S
+        then = (k + 1) * tick_s
         run.advance(then - part)
         # Taken for the tick after the next ``late`` ones.
         pose: Any = run.state()[plant]

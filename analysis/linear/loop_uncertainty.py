@@ -19,7 +19,6 @@ from analysis.models.operating_points import OperatingPoint, resting_equilibrium
 from diagrams import Scenario
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "contact_poles",
@@ -88,7 +87,7 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
         UncertainParameter(
             "extra_ticks",
             "latency",
-            "25 ms",
+            f"{scenario.tick_s * 1e3:g} ms",
             0.0,
             0.0,
             1.0,
@@ -212,6 +211,6 @@ def following_poles(at: OperatingPoint) -> PoleFunction:
                 f" {at.p_WP[1]:.3f}) m is gone; narrow the box",
             )
         moved = resting_equilibrium(loop, place)
-        return np.asarray(np.exp(moved.eigenvalues * FRAME_PERIOD_S))
+        return np.asarray(np.exp(moved.eigenvalues * loop.tick_s))
 
     return poles

@@ -13,7 +13,6 @@ from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import frozen_scenario, ideal_loop, ideal_scenario
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.catalogue import LAWS
 
 __all__ = ["ContactSlopes", "RootLocus", "contact_slopes", "root_loci"]
@@ -92,71 +91,70 @@ def root_loci(scenario: Scenario) -> tuple[RootLocus, ...]:
     """Against K_r and D_r, and the gains of the law's two terms, if it has them."""
     attraction = scenario.attraction
     K, D = attraction.stiffness_n_m, attraction.damping_n_s_m
-    loci = [
-        _locus(
+
+    def locus(
+        parameter: str,
+        loop: str,
+        today: float,
+        matrix: Callable[[float], NDArray[np.float64]],
+    ) -> RootLocus:
+        values = _FACTORS * (today if today > 0.0 else 1.0)
+        return RootLocus(
+            parameter=parameter,
+            loop=loop,
+            values=values,
+            poles=np.array(
+                [_poles(matrix(float(value)), scenario.tick_s) for value in values]
+            ),
+            today=today,
+            poles_today=_poles(matrix(today), scenario.tick_s),
+        )
+
+    target = (
+        locus(
             "attraction.stiffness_n_m",
             "target",
             K,
             lambda value: contact_matrix(scenario, value),
         ),
-        _locus(
+        locus(
             "attraction.damping_n_s_m",
             "target",
             D,
             lambda value: contact_matrix(scenario, K, damping_n_s_m=value),
         ),
-    ]
+    )
     record = LAWS.get(scenario.law)
     if record is None or record.loop_gains is None:
-        return tuple(loci)
+        return target
     slopes = contact_slopes(scenario)
     k, d = slopes.stiffness_n_m, slopes.approach_damping_n_s_m
     law = getattr(scenario.repulsion, scenario.law)
     spring, damper = record.loop_gains
-    today = getattr(law, spring)
-    loci.append(
-        _locus(
+    today, strength = getattr(law, spring), getattr(law, damper)
+    return (
+        *target,
+        locus(
             f"repulsion.{scenario.law}.{spring}",
             "contact",
             today,
             lambda value: contact_matrix(scenario, K + k * value / today),
-        )
-    )
-    strength = getattr(law, damper)
-    loci.append(
-        _locus(
+        ),
+        locus(
             f"repulsion.{scenario.law}.{damper}",
             "contact",
             strength,
             lambda value: contact_matrix(
                 scenario, K + k, approach_damping_n_s_m=d * value / strength
             ),
-        )
-    )
-    return tuple(loci)
-
-
-def _locus(
-    parameter: str,
-    loop: str,
-    today: float,
-    matrix: Callable[[float], NDArray[np.float64]],
-) -> RootLocus:
-    values = _FACTORS * (today if today > 0.0 else 1.0)
-    return RootLocus(
-        parameter=parameter,
-        loop=loop,
-        values=values,
-        poles=np.array([_poles(matrix(float(value))) for value in values]),
-        today=today,
-        poles_today=_poles(matrix(today)),
+        ),
     )
 
 
-def _poles(matrix: NDArray[np.float64]) -> NDArray[np.complex128]:
+def _poles(matrix: NDArray[np.float64], tick_s: float) -> NDArray[np.complex128]:
     z = np.linalg.eigvals(matrix).astype(complex)
     z[np.abs(z) < 1e-9] = 0.0
     gone = z == 0.0
-    poles = np.log(np.where(gone, 1.0, z)) / FRAME_PERIOD_S
+    poles = np.log(np.where(gone, 1.0, z)) / tick_s
     poles[gone] = -np.inf
     return np.sort_complex(poles)

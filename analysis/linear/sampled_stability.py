@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.linear.contact_mode import contact_matrix, delayed_output, motion_chain
 from analysis.models.linear_models import LinearModel
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 __all__ = [
     "SCHEMES",
@@ -61,20 +61,23 @@ class ConditionCheck:
     """Of them, in which the condition says otherwise."""
 
 
-def check_conditions(pairs: int = 10_000, seed: int = 1) -> tuple[ConditionCheck, ...]:
+def check_conditions(
+    pairs: int = 10_000, seed: int = 1, *, tick_s: float = TICK_S
+) -> tuple[ConditionCheck, ...]:
     """Tests the three conditions on random pairs about their boundaries.
 
-    The matrices are those of the blocks at 25 ms (without motor lag), and of
+    The matrices are those of the blocks (without motor lag), and of
     ``control.sample_system`` for the held acceleration.
 
     Args:
         pairs: For each scheme.
         seed: Of the pairs.
+        tick_s: The period, s.
 
     Returns:
         One a scheme, with the number of pairs on which both disagree.
     """
-    rng, T = np.random.default_rng(seed), FRAME_PERIOD_S
+    rng, T = np.random.default_rng(seed), tick_s
     K = 10.0 ** rng.uniform(-1.0, math.log10(8.0 / T**2), pairs)
     D = 10.0 ** rng.uniform(-3.0, math.log10(4.0 / T), pairs)
     holds = {
@@ -84,7 +87,7 @@ def check_conditions(pairs: int = 10_000, seed: int = 1) -> tuple[ConditionCheck
     }
     checks = []
     for scheme in SCHEMES:
-        chain = _chain(scheme)
+        chain = _chain(scheme, tick_s)
         law = -np.stack([K, D], axis=1)
         matrices = chain.A + np.einsum("i,pj,jk->pik", chain.B[:, 0], law, chain.C)
         stable = np.abs(np.linalg.eigvals(matrices)).max(axis=1) < 1.0
@@ -95,9 +98,9 @@ def check_conditions(pairs: int = 10_000, seed: int = 1) -> tuple[ConditionCheck
     return tuple(checks)
 
 
-def _chain(scheme: Scheme) -> LinearModel:
+def _chain(scheme: Scheme, tick_s: float) -> LinearModel:
     """From the acceleration of a unit mass to what the law sees of it."""
-    built = motion_chain(Scenario(), motor_lag_s=_NO_LAG_S)
+    built = motion_chain(Scenario(), motor_lag_s=_NO_LAG_S, period_s=tick_s)
     if scheme == "held velocity":
         return built
     if scheme == "held velocity, one tick late":
@@ -105,9 +108,9 @@ def _chain(scheme: Scheme) -> LinearModel:
     import control
 
     double = control.ss([[0, 1], [0, 0]], [[0], [1]], np.eye(2), np.zeros((2, 1)))
-    A, B, C, D = control.ssdata(control.sample_system(double, FRAME_PERIOD_S))
+    A, B, C, D = control.ssdata(control.sample_system(double, tick_s))
     names = built.input_names, built.output_names
-    return LinearModel(scheme, A, B, C, D, ("p", "v"), *names, FRAME_PERIOD_S)
+    return LinearModel(scheme, A, B, C, D, ("p", "v"), *names, tick_s)
 
 
 @dataclass(frozen=True)
@@ -162,7 +165,7 @@ def poles_against_period(
     return PolesAgainstPeriod(
         periods_s=periods,
         poles=poles,
-        today_s=FRAME_PERIOD_S,
+        today_s=scenario.tick_s,
         longest_stable_s=float(periods[first - 1]) if first else 0.0,
     )
 
@@ -192,17 +195,19 @@ class StabilityChart:
         return float(np.mean(self.growth_per_s < 0.0))
 
 
-def _growth(matrix: NDArray[np.float64]) -> float:
-    radius = float(np.abs(np.linalg.eigvals(matrix)).max())
-    return math.log(max(radius, 1e-12)) / FRAME_PERIOD_S
-
-
-def _filled(
-    x: NDArray[np.float64],
+def _growth(
+    matrix: Callable[[Any, float], NDArray[np.float64]],
+    x: NDArray[Any],
     y: NDArray[np.float64],
-    function: Callable[[float, float], NDArray[np.float64]],
+    tick_s: float,
 ) -> NDArray[np.float64]:
-    return np.array([[_growth(function(float(a), float(b))) for a in x] for b in y])
+    """(ny, nx) exponents of the slowest mode of ``matrix(x, y)``, 1/s."""
+
+    def growth(a: Any, b: float) -> float:
+        radius = float(np.abs(np.linalg.eigvals(matrix(a, b))).max())
+        return math.log(max(radius, 1e-12)) / tick_s
+
+    return np.array([[growth(a, b) for a in x.tolist()] for b in y.tolist()])
 
 
 def gain_chart(
@@ -222,16 +227,17 @@ def gain_chart(
         Growth of the slowest mode, (ny, nx) 1/s.
     """
     K, D = scenario.attraction.stiffness_n_m, scenario.attraction.damping_n_s_m
+    tick_s = scenario.tick_s
     x = _values(stiffnesses_n_m, np.geomspace(0.1, 400.0, 60))
     y = _values(dampings_n_s_m, np.geomspace(0.05, 400.0, 60))
     return StabilityChart(
-        title="attraction, with motor lag and 25 ms sampling",
+        title=f"attraction, with motor lag and {tick_s * 1e3:g} ms sampling",
         x_name="K_r (N/m)",
         y_name="D_r (N s/m)",
         x=x,
         y=y,
-        growth_per_s=_filled(
-            x, y, lambda k, d: contact_matrix(scenario, k, damping_n_s_m=d)
+        growth_per_s=_growth(
+            lambda k, d: contact_matrix(scenario, k, damping_n_s_m=d), x, y, tick_s
         ),
         today=(K, D),
     )
@@ -255,24 +261,19 @@ def gain_delay_chart(
     Returns:
         Growth of the slowest mode, (ny, nx) 1/s.
     """
-    longest = np.arange(0.0, 1.0, 2 * FRAME_PERIOD_S)
-    x = _values(delays_s, longest)
-    ticks = np.rint(x / FRAME_PERIOD_S).astype(int)
-    x = ticks * FRAME_PERIOD_S
+    tick_s = scenario.tick_s
+    delays = _values(delays_s, np.arange(0.0, 1.0, 2 * tick_s))
+    ticks = np.rint(delays / tick_s).astype(int)
     y = _values(stiffnesses_n_m, np.geomspace(0.2, 100.0, 50))
-    growth = np.array(
-        [
-            [_growth(contact_matrix(scenario, k, latency_ticks=int(n))) for n in ticks]
-            for k in y
-        ]
-    )
     return StabilityChart(
         title="all springs together, on a position of some age",
         x_name="delay (s)",
         y_name="stiffness (N/m)",
-        x=x,
+        x=ticks * tick_s,
         y=y,
-        growth_per_s=growth,
+        growth_per_s=_growth(
+            lambda n, k: contact_matrix(scenario, k, latency_ticks=n), ticks, y, tick_s
+        ),
         today=(0.0, scenario.attraction.stiffness_n_m),
     )
 

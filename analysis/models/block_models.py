@@ -20,7 +20,6 @@ from analysis.models.diagram_state import set_discrete_state
 from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
 from diagrams.simulation import simulator_config
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["block_model", "join_blocks", "sampled_blocks", "sampled_twin"]
 
@@ -62,6 +61,7 @@ def sampled_blocks(
             state[loop.indices(role)],
             # What a continuous block reads is held from after the tick's updates.
             _input_values(loop, role, after if flows else state, time_s),
+            period_s=loop.tick_s,
             ports=block,
             time_s=time_s,
             held=held,
@@ -97,6 +97,7 @@ def block_model(
     state: NDArray[np.float64],
     values: Sequence[NDArray[np.float64]],
     *,
+    period_s: float,
     ports: Any = None,
     time_s: float = 0.0,
     held: Collection[str] = (),
@@ -108,6 +109,7 @@ def block_model(
         twin: The block as LeafSystem_[AutoDiffXd].
         state: (n,) its state, just before its update.
         values: Of its input ports, in order.
+        period_s: Of its updates, s.
         ports: The block whose ports have the names to use, if not ``twin``.
         time_s: The time, s.
         held: Output ports that continuous blocks read, after the update.
@@ -149,7 +151,7 @@ def block_model(
         state_names=tuple(f"{ports.get_name()}.{k}" for k in range(count)),
         input_names=tuple(f"{name}{suffix}" for name in heard),
         output_names=tuple(names),
-        period_s=FRAME_PERIOD_S,
+        period_s=period_s,
     )
 
 
@@ -173,7 +175,7 @@ def sampled_twin(loop: IdealLoop, role: str) -> Any:
     """
     if role not in loop.sampled_twins:
         config = simulator_config(loop.scenario)
-        sampled = DiscreteTimeApproximation(loop.block(role), FRAME_PERIOD_S, config)
+        sampled = DiscreteTimeApproximation(loop.block(role), loop.tick_s, config)
         loop.sampled_twins[role] = sampled.ToAutoDiffXd()
     return loop.sampled_twins[role]
 
@@ -194,7 +196,7 @@ def join_blocks(
     """Joins the outputs to the inputs of the same name, by ``control``.
 
     Args:
-        models: Linearised blocks.
+        models: Linearised blocks, of one period.
         state_names: The order of states to return.
         name: Of the joined model.
         cut: Signals whose wires are left open, to be fed from outside.
@@ -230,11 +232,11 @@ def join_blocks(
         state_names=state_names,
         input_names=inputs,
         output_names=outputs,
-        period_s=FRAME_PERIOD_S,
+        period_s=models[0].period_s,
     )
 
 
 def _stateful(model: LinearModel) -> Any:
     import control
 
-    return control.ss(model.A, model.B, model.C, model.D, dt=FRAME_PERIOD_S)
+    return control.ss(model.A, model.B, model.C, model.D, dt=model.period_s)

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import InitializeParams
 
-from systems.framework.signals import FRAME_PERIOD_S
-
 __all__ = [
     "Port",
     "Runner",
@@ -35,6 +33,7 @@ class Runner:
         fix: ``fix(context, port, value)`` sets what a cut input reads.
         state: (n,) just before the updates of the tick at ``time_s``.
         time_s: A multiple of the period, s.
+        tick_s: The period, s.
     """
 
     def __init__(
@@ -43,10 +42,11 @@ class Runner:
         fix: Callable[[Any, Port, Any], None],
         state: NDArray[np.float64],
         time_s: float,
+        tick_s: float,
     ) -> None:
         self._simulator, self._fix = simulator, fix
         self._context = simulator.get_mutable_context()
-        begin(simulator, state, time_s)
+        begin(simulator, state, time_s, tick_s)
 
     def fix(self, port: Port, value: NDArray[np.float64]) -> None:
         """What a cut input reads from now on.
@@ -78,7 +78,9 @@ class Runner:
         set_state(self._context, state)
 
 
-def run_periods(simulator: Any, state: Any, time_s: float, periods: int) -> None:
+def run_periods(
+    simulator: Any, state: Any, time_s: float, periods: int, tick_s: float
+) -> None:
     """Simulates whole periods from a state, to just before the next tick.
 
     Args:
@@ -86,22 +88,24 @@ def run_periods(simulator: Any, state: Any, time_s: float, periods: int) -> None
         state: (n,) just before the updates of the tick at ``time_s``.
         time_s: A multiple of the period, s.
         periods: How many, 0 or more.
+        tick_s: The period, s.
     """
-    begin(simulator, state, time_s)
+    begin(simulator, state, time_s, tick_s)
     # Ticks are multiples in Drake's arithmetic: a sum could miss the next one.
-    simulator.AdvanceTo((round(time_s / FRAME_PERIOD_S) + periods) * FRAME_PERIOD_S)
+    simulator.AdvanceTo((round(time_s / tick_s) + periods) * tick_s)
 
 
-def begin(simulator: Any, state: Any, time_s: float) -> None:
+def begin(simulator: Any, state: Any, time_s: float, tick_s: float) -> None:
     """Puts a simulator just before the updates of the tick at ``time_s``.
 
     Args:
         simulator: Its context is changed.
         state: (n,) just before the updates of the tick.
         time_s: Of the tick; rounded to a multiple of the period, s.
+        tick_s: The period, s.
     """
     context = simulator.get_mutable_context()
-    context.SetTime(round(time_s / FRAME_PERIOD_S) * FRAME_PERIOD_S)
+    context.SetTime(round(time_s / tick_s) * tick_s)
     set_state(context, state)
     quiet = InitializeParams()
     quiet.suppress_initialization_events = True

@@ -11,7 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.ideal_loop import IdealLoop
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["ForceField"]
 
@@ -109,8 +108,8 @@ class ForceField:
         port = block.GetInputPort("collision_vectors_B")
         port.FixValue(context, [distance, 0.0, 0.0, 0.0, 0.0, 0.0])
         state = context.get_discrete_state(0).CopyToVector()
-        pushes = []
-        for earlier in (distance, distance + speed * FRAME_PERIOD_S):
+        pushes, tick_s = [], self.loop.tick_s
+        for earlier in (distance, distance + speed * tick_s):
             seen = np.zeros(len(state))
             seen[:2] = 1.0, earlier
             context.SetDiscreteState(0, seen)

@@ -37,7 +37,6 @@ from diagrams.scenario import Scenario
 from diagrams.simulation import simulator_config
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "IdealLoop",
@@ -111,6 +110,11 @@ class IdealLoop:
         """Continuous blocks as maps of one period, see
         ``analysis.models.block_models``."""
         self._simulators: dict[Any, Any] = {}
+
+    @property
+    def tick_s(self) -> float:
+        """The period, s."""
+        return self.scenario.tick_s
 
     def _require_forces(self) -> None:
         """Refuses a law whose loop is another than that of the virtual mass."""
@@ -227,7 +231,7 @@ class IdealLoop:
         context = simulator.get_mutable_context()
         for port, value in fixed.items():
             self.fix(context, port, np.asarray(value, dtype=float))
-        run_periods(simulator, state, time_s, periods)
+        run_periods(simulator, state, time_s, periods, self.tick_s)
         return get_state(context)
 
     def period_derivatives(
@@ -268,7 +272,7 @@ class IdealLoop:
         y, by_all = value_and_gradient(
             np.concatenate(read) if read else np.empty(0), start
         )
-        run_periods(simulator, seeded[:count], time_s, 1)
+        run_periods(simulator, seeded[:count], time_s, 1, self.tick_s)
         after, jacobian = value_and_gradient(get_state(context), start)
         return PeriodDerivatives(
             next_state=after,
@@ -293,7 +297,7 @@ class IdealLoop:
             The run, before its first tick.
         """
         simulator = self._simulator(frozenset(fixed), twin=False)
-        return Runner(simulator, self.fix, state, time_s)
+        return Runner(simulator, self.fix, state, time_s, self.tick_s)
 
     def settled_state(
         self,
@@ -309,7 +313,7 @@ class IdealLoop:
         Args:
             pose_WB: Pose at ``begin_s``, m and rad.
             v_WP: Velocity of P in W, m/s, along the heading.
-            begin_s: A multiple of 25 ms, s: when the source's motion is steady.
+            begin_s: A multiple of the period, s: when the source's motion is steady.
 
         Returns:
             State and its time in s.
@@ -326,7 +330,7 @@ class IdealLoop:
         state[tracker[:9]] = [*pose_WB] * 3
         no_force = {("command", "acceleration_W"): (0.0, 0.0)}
         state = self.period_map(state, begin_s, fixed=no_force, periods=SETTLING_TICKS)
-        time_s = begin_s + SETTLING_TICKS * FRAME_PERIOD_S
+        time_s = begin_s + SETTLING_TICKS * self.tick_s
         # An obstacle's speed of rounding errors alone would have a slope.
         remembered = self.period_map(state, time_s, fixed=no_force)
         controller = self.indices("controller")

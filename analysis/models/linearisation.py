@@ -18,7 +18,6 @@ from analysis.models.block_models import join_blocks, sampled_blocks
 from analysis.models.ideal_loop import Port
 from analysis.models.linear_models import LinearModel, simple_poles
 from analysis.models.operating_points import OperatingPoint
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "GradientCheck",
@@ -45,7 +44,7 @@ _READ: tuple[Port, ...] = (
 
 
 def sampled_model(point: OperatingPoint) -> LinearModel:
-    """The closed loop over 25 ms, by AutoDiff of one period of the diagram.
+    """The closed loop over a tick, by AutoDiff of one period of the diagram.
 
     Inputs: pose of the source at the tick. Outputs, at the tick before its
     updates: position of P, heading, what hearing says, and the law's
@@ -68,7 +67,7 @@ def sampled_model(point: OperatingPoint) -> LinearModel:
         state_names=loop.state_names,
         input_names=_INPUTS,
         output_names=_OUTPUTS,
-        period_s=FRAME_PERIOD_S,
+        period_s=loop.tick_s,
     )
 
 

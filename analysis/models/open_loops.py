@@ -20,7 +20,6 @@ from analysis.models.model_reduction import minimal_model
 from analysis.models.operating_points import OperatingPoint
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "BREAK_POINTS",
@@ -101,7 +100,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
         state_names=loop.state_names,
         input_names=names,
         output_names=names,
-        period_s=FRAME_PERIOD_S,
+        period_s=loop.tick_s,
     )
 
 

@@ -21,7 +21,6 @@ from analysis.models.linear_models import LinearModel, Mode
 from analysis.models.model_reduction import minimal_model
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.world.geometry import control_point, nearest_point_on_rectangle
 
 __all__ = [
@@ -99,7 +98,7 @@ class OperatingPoint:
         position of P, m; and the heading, rad, where the robot moves.
         """
         A = self.loop.period_derivatives(self.state, self.time_s).A
-        return motion_model(self, A, FRAME_PERIOD_S)
+        return motion_model(self, A, self.loop.tick_s)
 
     @cached_property
     def modes(self) -> tuple[Mode, ...]:
@@ -115,7 +114,7 @@ class OperatingPoint:
         """Poles of the motion in the s plane, ln(z)/T, rad/s; no neutral ones."""
         poles = self.motion.poles
         poles = poles[(np.abs(poles - 1.0) > _NEUTRAL) & (np.abs(poles) > 1e-6)]
-        return np.asarray(np.log(poles) / FRAME_PERIOD_S, dtype=complex)
+        return np.asarray(np.log(poles) / self.loop.tick_s, dtype=complex)
 
     @property
     def stable(self) -> bool:

@@ -19,7 +19,6 @@ from analysis.laws.head_on import HeadOn
 from analysis.linear.contact_mode import motion_chain
 from analysis.models.linear_models import LinearModel
 from analysis.nonlinear.velocity_terms import Variant
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.impedance import obstacle_speed
 
 __all__ = ["OscillationPrediction", "predict_oscillation"]
@@ -131,21 +130,20 @@ def _imbalance(
 ) -> NDArray[np.float64]:
     """Mean force, and what the first harmonic lacks to go round the loop."""
     centre, growth, frequency = x
-    turn = frequency * FRAME_PERIOD_S
+    tick_s = contact.scenario.tick_s
+    turn = frequency * tick_s
     phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
     c = centre + amplitude * np.sin(phase)
     before = centre + amplitude * np.sin(phase - turn)
     force = np.array(
         [
-            contact.force(
-                now, obstacle_speed((now, 0.0), (then, 0.0), term, FRAME_PERIOD_S)
-            )
+            contact.force(now, obstacle_speed((now, 0.0), (then, 0.0), term, tick_s))
             for now, then in zip(c.tolist(), before.tolist(), strict=True)
         ]
     )
     # sin(phase) is the imaginary part of exp(j phase).
     harmonic = 2.0j * np.mean(force * np.exp(-1j * phase)) / amplitude
-    z = np.exp((growth + 1j * frequency) * FRAME_PERIOD_S)
+    z = np.exp((growth + 1j * frequency) * tick_s)
     inverse = np.linalg.solve(z * np.eye(len(chain.A)) - chain.A, chain.B[:, 0])
     position, velocity = chain.C @ inverse
     scenario = contact.scenario

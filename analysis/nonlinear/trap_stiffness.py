@@ -17,7 +17,6 @@ from analysis.laws.head_on import head_on
 from analysis.nonlinear.equilibrium_maps import BOX_M, BOX_X_M, TO_GO_M, boxes_scenario
 from diagrams import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.impedance import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
@@ -123,7 +122,7 @@ def _block_force(
         )
     vectors_W = [(v[0], *rotate(theta, v[1], v[2])) for v in vectors]
     term = case.repulsion.velocity_term
-    F_b, _ = repulsion_force(vectors_W, {}, law, term, FRAME_PERIOD_S)
+    F_b, _ = repulsion_force(vectors_W, {}, law, term, case.tick_s)
     p_WP, p_WS = control_point(pose, offset), case.source.path().pose(0.0)[:2]
     F_m = attraction_force(
         p_WP, (0.0, 0.0), p_WS, 1.0, case.attraction, case.robot.mass_kg

@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.impedance import obstacle_speed
 
 __all__ = [
@@ -263,15 +262,16 @@ def _sampled_harmonics(
     contact: HeadOn, added: Callable[[float], float], amplitude: float, term: Variant
 ) -> tuple[float, float]:
     """The same of the controller's difference of C over a tick."""
-    omega = 2.0 * np.pi / (_CYCLE_TICKS * FRAME_PERIOD_S)
-    turn = omega * FRAME_PERIOD_S
+    tick_s = contact.scenario.tick_s
+    omega = 2.0 * np.pi / (_CYCLE_TICKS * tick_s)
+    turn = omega * tick_s
     # Ticks fall between those of the exact integral's symmetric grid.
     phase = turn * (np.arange(_CYCLE_TICKS, dtype=float) + 0.25)
     c = contact.equilibrium_m + amplitude / omega * np.sin(phase)
     before = contact.equilibrium_m + amplitude / omega * np.sin(phase - turn)
     speeds = np.array(
         [
-            obstacle_speed((now, 0.0), (then, 0.0), term, FRAME_PERIOD_S)
+            obstacle_speed((now, 0.0), (then, 0.0), term, tick_s)
             for now, then in zip(c.tolist(), before.tolist(), strict=True)
         ]
     )

@@ -69,7 +69,7 @@ def chart_parts() -> tuple[Part, ...]:
 def _sampling(study: Study) -> SamplingCharts:
     scenario = study.scenario
     return SamplingCharts(
-        check_conditions(seed=scenario.seed),
+        check_conditions(seed=scenario.seed, tick_s=scenario.tick_s),
         poles_against_period(scenario),
         (gain_chart(scenario), gain_delay_chart(scenario)),
     )

@@ -16,7 +16,6 @@ from analysis.linear.delayed_run import DelayCheck
 from analysis.linear.root_locus import RootLocus
 from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 from analysis.reporting.palette import COLOURS
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "plot_chart",
@@ -132,7 +131,7 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
                 "o-",
                 markersize=3,
                 color=_LINES[k % len(_LINES)],
-                label=f"{ticks * FRAME_PERIOD_S * 1e3:.0f} ms",
+                label=f"{ticks * limits.tick_s * 1e3:.0f} ms",
             )
         axes.plot(
             limits.today[0], today, "*", markersize=14, color="#F0E442",

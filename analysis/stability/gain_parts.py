@@ -45,8 +45,8 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
         paragraph(
             "Before an obstacle the law's spring adds to K_r, while the damping is "
             "still D_r. The largest springs that come to rest, against the motors' lag "
-            f"and the age of an echo (ticks of 25 ms). This scenario: {lag:g} s and "
-            f"{ticks} ticks."
+            f"and the age of an echo (ticks of {data.tick_s * 1e3:g} ms). "
+            f"This scenario: {lag:g} s and {ticks} ticks."
         ),
         table(headings, rows, caption=caption),
         figure_html(plot_contact_limits(data), name, "Limits of the contact mode."),

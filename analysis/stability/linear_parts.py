@@ -247,12 +247,13 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
             check.kink,
         ],
     ]
+    tick_ms = 1e3 * (data.sampled.period_s or 0.0)
     return [
         paragraph(
             "Deviations from the operating point, SI units. Continuous: without "
-            "sampling and without the tick of latency. Sampled: one period of 25 ms "
-            f"of the built diagram, {routes.states} states; its matrices are in the "
-            "exported files."
+            "sampling and without the tick of latency. Sampled: one period of "
+            f"{tick_ms:g} ms of the built diagram, {routes.states} states; its "
+            "matrices are in the exported files."
         ),
         table(["check", "of", "largest difference"], checks),
         *(

@@ -175,7 +175,8 @@ def _margin_document(margins: LoopMargins) -> dict[str, Any]:
 def _render(data: Margins, name: str) -> list[str]:
     rows: list[list[Cell]] = [["Ideal target loop: no lag, no sampling, no obstacle"]]
     rows += [_row(at, "along", margins) for at, margins in data.target.items()]
-    rows.append(["Implemented loop, 25 ms, at the operating point"])
+    tick_ms = 1e3 * data.at.loop.tick_s
+    rows.append([f"Implemented loop, {tick_ms:g} ms, at the operating point"])
     rows += [_row(m.at, m.direction, m.margins) for m in data.implemented]
     headings = [
         "cut at", "direction", "gain up (dB)", "gain down (dB)", "phase (deg)",

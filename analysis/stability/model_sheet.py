@@ -14,7 +14,6 @@ from typing import Any
 from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
 from systems.framework.parameters import Parameters
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
@@ -138,7 +137,7 @@ def model_sheet(scenario: Scenario) -> ModelSheet:
         law=scenario.law,
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
-        motion=_MOTION,
+        motion=_motion(scenario.tick_s),
         law_equations=law.equations if law else (),
         parameters=tuple(_parameters(scenario)),
         envelope=_envelope(scenario),
@@ -186,14 +185,15 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
 
 
 def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
-    half = FRAME_PERIOD_S / 2.0
+    tick = scenario.tick_s
+    half, frame = tick / 2.0, f"middle of a {tick * 1e3:g} ms frame"
     sound, lag = scenario.sound, scenario.plant.motor_lag_s
     silent = max(sound.period_s - sound.on_s, 0.0)
     hold = Latency("source", "velocity held for a tick", half, "WheelSpeedCommand")
     motor = Latency("source", "motor lag", lag, "first order")
     return (
-        Latency("source", "sound collected", half, "middle of a 25 ms frame"),
-        Latency("source", "estimate computed", FRAME_PERIOD_S, "TDOAEstimator: a tick"),
+        Latency("source", "sound collected", half, frame),
+        Latency("source", "estimate computed", tick, "TDOAEstimator: a tick"),
         Latency(
             "source",
             "silence between bursts",
@@ -208,29 +208,30 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
     )
 
 
-_MOTION = (
-    Equation(
-        "Virtual mass at P",
-        r"M\,\ddot{p} = F_m + F_b,\quad F_b=\sum f(c,s)\,u,"
-        r"\quad u=-C_W/c,\quad c=|C_W|",
-        "M p'' = F_m + sum of f(c, s) u, u = -C_W/c, c = |C_W|",
-    ),
-    Equation(
-        "Attraction",
-        r"F_m = K_r\,(p_S-p)\left(1-\frac{d_f}{|p_S-p|}\right)-D_r\,v_P",
-        "F_m = K_r (p_S - p)(1 - d_f/|p_S - p|) - D_r v_P",
-    ),
-    Equation(
-        "Command, each tick T = 25 ms",
-        r"v_P \leftarrow v_P + T\,\ddot{p},\quad v=v_P\cdot x_B,"
-        r"\quad \omega=v_P\cdot y_B/\epsilon",
-        "v_P <- v_P + T p'', v = v_P . x_B, omega = v_P . y_B / epsilon",
-    ),
-    Equation(
-        "Plant",
-        r"\dot{x}=v\cos\theta,\quad\dot{y}=v\sin\theta,\quad\dot{\theta}=\omega,"
-        r"\quad\ddot{\phi}_i=(\dot{\phi}_i^{cmd}-\dot{\phi}_i)/\mathrm{lag}",
-        "x' = v cos theta, y' = v sin theta, theta' = omega, "
-        "phi_i'' = (commanded - phi_i')/lag",
-    ),
-)
+def _motion(tick_s: float) -> tuple[Equation, ...]:
+    return (
+        Equation(
+            "Virtual mass at P",
+            r"M\,\ddot{p} = F_m + F_b,\quad F_b=\sum f(c,s)\,u,"
+            r"\quad u=-C_W/c,\quad c=|C_W|",
+            "M p'' = F_m + sum of f(c, s) u, u = -C_W/c, c = |C_W|",
+        ),
+        Equation(
+            "Attraction",
+            r"F_m = K_r\,(p_S-p)\left(1-\frac{d_f}{|p_S-p|}\right)-D_r\,v_P",
+            "F_m = K_r (p_S - p)(1 - d_f/|p_S - p|) - D_r v_P",
+        ),
+        Equation(
+            f"Command, each tick T = {tick_s * 1e3:g} ms",
+            r"v_P \leftarrow v_P + T\,\ddot{p},\quad v=v_P\cdot x_B,"
+            r"\quad \omega=v_P\cdot y_B/\epsilon",
+            "v_P <- v_P + T p'', v = v_P . x_B, omega = v_P . y_B / epsilon",
+        ),
+        Equation(
+            "Plant",
+            r"\dot{x}=v\cos\theta,\quad\dot{y}=v\sin\theta,\quad\dot{\theta}=\omega,"
+            r"\quad\ddot{\phi}_i=(\dot{\phi}_i^{cmd}-\dot{\phi}_i)/\mathrm{lag}",
+            "x' = v cos theta, y' = v sin theta, theta' = omega, "
+            "phi_i'' = (commanded - phi_i')/lag",
+        ),
+    )

@@ -27,7 +27,6 @@ from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BreakPoint
 from diagrams import Scenario
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "GainChoice",
@@ -213,7 +212,7 @@ def gain_figures(scenario: Scenario, thresholds: GainThresholds) -> GainFigures:
     margins = [loop_margins(attraction_loop(scenario, at)) for at in _CUTS]
     K_r = scenario.attraction.stiffness_n_m
     z = np.linalg.eigvals(contact_matrix(scenario, K_r))
-    slowest = -math.log(float(np.abs(z).max())) / FRAME_PERIOD_S
+    slowest = -math.log(float(np.abs(z).max())) / scenario.tick_s
 
     def least(name: str) -> float:
         return min(float(getattr(m, name)) for m in margins)

@@ -25,7 +25,6 @@ from analysis.linear.robustness import (
 from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.law_analysis import Part, Study
 from diagrams import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
 
@@ -72,10 +71,10 @@ def loop_robustness(
     *,
     samples: int,
 ) -> LoopRobustness:
-    """Pole cloud, worst case and sensitivities of a loop of 25 ms periods.
+    """Pole cloud, worst case and sensitivities of a sampled loop.
 
     Args:
-        scenario: Gives the seed.
+        scenario: Gives the period and the seed.
         poles: The loop, from parameters to poles in the z plane.
         parameters: The box.
         samples: Random points of the box.
@@ -87,11 +86,11 @@ def loop_robustness(
         pole_cloud(
             poles,
             parameters,
-            period=FRAME_PERIOD_S,
+            period=scenario.tick_s,
             samples=samples,
             seed=scenario.seed,
         ),
-        pole_sensitivities(poles, parameters, period=FRAME_PERIOD_S),
+        pole_sensitivities(poles, parameters, period=scenario.tick_s),
     )
 
 

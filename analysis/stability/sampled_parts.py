@@ -24,7 +24,6 @@ from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.chart_plots import plot_delay_check, plot_gap_chart
 from analysis.stability.law_analysis import Part, Study
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = ["BurstCycles", "SampledLoop", "sampled_parts"]
 
@@ -102,7 +101,7 @@ def _sampled(study: Study, duration_s: float) -> SampledLoop:
             margin.delay_s
         ):
             check = check_delay_margin(at, duration_s=duration_s)
-    return SampledLoop(FRAME_PERIOD_S, at.motion.poles, margins, check)
+    return SampledLoop(at.loop.tick_s, at.motion.poles, margins, check)
 
 
 def _document(data: SampledLoop) -> dict[str, Any]:
@@ -129,7 +128,8 @@ def _run_document(run: Any) -> dict[str, float]:
 
 def _render_sampled(data: SampledLoop, name: str) -> list[str]:
     rows: list[list[Cell]] = [
-        [m.at, m.direction, m.delay_s, m.ticks, m.frequency_rad_s] for m in data.margins
+        [m.at, m.direction, m.delay_s, m.delay_s / data.period_s, m.frequency_rad_s]
+        for m in data.margins
     ]
     parts = [
         paragraph(

@@ -13,7 +13,6 @@ from analysis.linear.contact_mode import contact_spectral_radius
 from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
-from systems.framework.signals import FRAME_PERIOD_S
 
 __all__ = [
     "Reading",
@@ -111,7 +110,7 @@ def read_contact(study: Study, ticks: int) -> Reading:
 
     Args:
         study: Has the scenario.
-        ticks: Age of the position that the springs act on, periods of 25 ms.
+        ticks: Age of the position that the springs act on, periods.
 
     Returns:
         1/s, negative where it decays; a text says why there is none.
@@ -121,12 +120,8 @@ def read_contact(study: Study, ticks: int) -> Reading:
     if stiffness <= 0.0:
         return "the law does not push off obstacles"
     total = scenario.attraction.stiffness_n_m + stiffness
-    return _growth(contact_spectral_radius(scenario, total, latency_ticks=ticks))
-
-
-def _growth(radius: float) -> float:
-    """ln(|z|)/T of the sampled loop, 1/s."""
-    return math.log(radius) / FRAME_PERIOD_S
+    radius = contact_spectral_radius(scenario, total, latency_ticks=ticks)
+    return math.log(radius) / scenario.tick_s
 
 
 def read_worst_case(key: str) -> Callable[[Study], Reading]:
@@ -134,7 +129,9 @@ def read_worst_case(key: str) -> Callable[[Study], Reading]:
 
     def read(study: Study) -> Reading:
         data = study.found.get(key)
-        return _growth(data.cloud.worst_radius) if data else "it was not computed"
+        if not data:
+            return "it was not computed"
+        return math.log(data.cloud.worst_radius) / study.scenario.tick_s
 
     return read
 

@@ -11,7 +11,6 @@ from scipy.optimize import brentq
 from analysis.linear.delay_margin import (
     DELAY_PLACES,
     DelayedLoop,
-    DelayMargin,
     delay_margin,
 )
 from analysis.linear.delayed_run import (
@@ -79,10 +78,6 @@ def test_margin_separates_decay_from_growth(at, direction):
     loop = DelayedLoop(point, at, direction)
     assert loop.spectral_radius(0.99 * margin.delay_s) < 1.0
     assert loop.spectral_radius(1.01 * margin.delay_s) > 1.0
-
-
-def test_margin_in_ticks_of_25_ms():
-    assert DelayMargin("wheels", "along", 0.06, 0.7).ticks == pytest.approx(2.4)
 
 
 def test_what_swings_without_a_delay_has_no_margin():
