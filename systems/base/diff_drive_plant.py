@@ -45,6 +45,7 @@ class PlantParameters(Parameters):
     would need more force than this share of the weight. None: they never do."""
 
 
+@register_jitable
 def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
     """Motion of the body from the speeds of its wheels.
 

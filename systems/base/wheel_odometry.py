@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-import numpy as np
+from numba.extending import register_jitable
 from pydantic import Field
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.diff_drive_plant import body_twist
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import check_finite, read_list
+from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
 
 __all__ = [
     "OdometryParameters",
@@ -36,6 +38,7 @@ class OdometryParameters(Parameters):
     """Angles in whole pulses; off: exact angles, as linearisation needs."""
 
 
+@register_jitable
 def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
     """Wheel angle in whole pulses, rad.
 
@@ -50,6 +53,7 @@ def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
     return math.floor(angle / pulse) * pulse
 
 
+@register_jitable
 def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
     """Pose after the wheels have turned, by the arc's chord.
 
@@ -71,9 +75,43 @@ def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
     )
 
 
+class OdometryNumbers(NamedTuple):
+    """What the step of ``WheelOdometry`` depends on."""
+
+    robot: RobotParameters
+    pulses: int
+    """A revolution; 0 where angles are not rounded."""
+    tick_s: float
+
+
+def odometry_step(tick, state, inputs, outputs, numbers):
+    """Pose and velocity of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: Pose, m and rad, and left and right encoder angle, rad, at the last tick.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``OdometryNumbers``.
+    """
+    left, right = inputs[0][0], inputs[0][1]
+    if numbers.pulses > 0:
+        left = encoder_angle(left, numbers.pulses)
+        right = encoder_angle(right, numbers.pulses)
+    then = state[0], state[1], state[2]
+    turned = left - state[3], right - state[4]
+    now = advance_pose(then, turned, numbers.robot)
+    pose, velocity = outputs
+    for k in range(3):
+        pose[k] = now[k]
+        velocity[k] = (now[k] - then[k]) / numbers.tick_s
+        state[k] = now[k]
+    state[3], state[4] = left, right
+
+
 @define_for_scalars("WheelOdometry_", __name__)
 def WheelOdometry_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(LeafSystem_[T], StepBlock):
         """Estimates pose and velocity from the wheels' encoders.
 
         .. pydrake_system::
@@ -136,22 +174,16 @@ def WheelOdometry_(T):
                     "has no derivative; set odometry.rounding to false",
                 )
             self.set_name("wheel_odometry")
-            self._angles = self.DeclareVectorInputPort(name="wheel_angles", size=2)
-            self.DeclareDiscreteState([T(v) for v in (*self._initial_pose, 0, 0)])
-            self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._update
-            )
-            self._pose, _ = (
-                self.DeclareVectorOutputPort(
-                    name=name,
-                    size=3,
-                    calc=calc,
-                    prerequisites_of_calc={self._angles.ticket(), self.xd_ticket()},
-                )
-                for name, calc in (
-                    ("pose_WB_estimated", self._advance),
-                    ("velocity_WB_estimated", self._velocity),
-                )
+            pulses = 0
+            if self._odometry.rounding:
+                pulses = self._odometry.pulses_per_revolution
+            numbers = OdometryNumbers(self._robot, pulses, tick_s)
+            self._declare_step(
+                T,
+                Step(odometry_step, numbers, [*self._initial_pose, 0.0, 0.0]),
+                (("wheel_angles", 2),),
+                (("pose_WB_estimated", 3), ("velocity_WB_estimated", 3)),
+                tick_s,
             )
 
         def _construct_copy(self, other, converter=None):
@@ -163,31 +195,6 @@ def WheelOdometry_(T):
                 tick_s=other._tick_s,
                 converter=converter,
             )
-
-        def _encoder_angles(self, context):
-            angles = read_list(context, self._angles)
-            if self._odometry.rounding:
-                pulses = self._odometry.pulses_per_revolution
-                return [encoder_angle(angle, pulses) for angle in angles]
-            return angles
-
-        def _held(self, context):
-            return context.get_discrete_state(0).CopyToVector().tolist()
-
-        def _advance(self, context, output):
-            left, right = self._encoder_angles(context)
-            *pose, left_then, right_then = self._held(context)
-            steps = (left - left_then, right - right_then)
-            output.SetFromVector(advance_pose(pose, steps, self._robot))
-
-        def _update(self, context, discrete_state):
-            pose = self._pose.Eval(context).tolist()
-            now = [*pose, *self._encoder_angles(context)]
-            discrete_state.set_value(np.array(now))
-
-        def _velocity(self, context, output):
-            now, held = self._pose.Eval(context), self._held(context)
-            output.SetFromVector([(now[k] - held[k]) / self._tick_s for k in range(3)])
 
     return Impl
 

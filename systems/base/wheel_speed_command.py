@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
 import numpy as np
+from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
@@ -10,6 +14,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step
 from systems.world.geometry import rotate, safe_norm
 
 __all__ = [
@@ -31,6 +36,7 @@ __all__ = [
 _V_WP, _WHEEL_SPEEDS = range(2)
 
 
+@register_jitable
 def clamped_velocity(vx, vy, top_speed):
     """A velocity in its direction, its magnitude top_speed at most.
 
@@ -48,6 +54,7 @@ def clamped_velocity(vx, vy, top_speed):
     return vx, vy
 
 
+@register_jitable
 def integrate_velocity(v_WP, acceleration_W, period, top_speed):
     """Velocity of the virtual mass after one period, its magnitude clamped.
 
@@ -68,6 +75,7 @@ def integrate_velocity(v_WP, acceleration_W, period, top_speed):
     return clamped_velocity(vx, vy, top_speed)
 
 
+@register_jitable
 def hand_position_twist(v_WP, theta, control_point_m):
     """Forward speed and yaw rate that give P the velocity v_WP.
 
@@ -86,6 +94,7 @@ def hand_position_twist(v_WP, theta, control_point_m):
     return along, across / control_point_m
 
 
+@register_jitable
 def hand_position_velocity(twist_B, theta, control_point_m):
     """Velocity of P in W that a twist gives it: undoes ``hand_position_twist``.
 
@@ -100,6 +109,7 @@ def hand_position_velocity(twist_B, theta, control_point_m):
     return rotate(theta, twist_B[0], control_point_m * twist_B[1])
 
 
+@register_jitable
 def limited_wheel_speeds(v, omega, robot: RobotParameters):
     """Left and right wheel speed, scaled together to the limit.
 
@@ -114,21 +124,67 @@ def limited_wheel_speeds(v, omega, robot: RobotParameters):
     half = omega * robot.wheel_separation_m / 2.0
     left = (v - half) / robot.wheel_radius_m
     right = (v + half) / robot.wheel_radius_m
-    largest = abs(left)
-    largest = max(largest, abs(right))
+    largest = max(abs(left), abs(right))
     if largest > robot.top_wheel_speed:
         scale = robot.top_wheel_speed / largest
         left, right = left * scale, right * scale
     return left, right
 
 
+class CommandNumbers(NamedTuple):
+    """What the step of a wheel command depends on."""
+
+    velocity: Callable[..., Any]
+    """``velocity(v_WP, command, theta, robot, tick_s)``: the velocity of P from the
+    last one, what the port reads, and the heading."""
+    robot: RobotParameters
+    tick_s: float
+
+
+def command_step(tick, state, inputs, outputs, numbers):
+    """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: Velocity of P, m/s, x and y, and wheel speeds, rad/s, left and right.
+        inputs: As the input ports.
+        outputs: Left as they are: they are state.
+        numbers: ``CommandNumbers``.
+    """
+    command, pose = inputs
+    robot, theta = numbers.robot, pose[2]
+    before = state[0], state[1]
+    v_WP = numbers.velocity(before, command, theta, robot, numbers.tick_s)
+    v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
+    wheels = limited_wheel_speeds(v, omega, robot)
+    state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
+
+
+def publish_command(state, outputs, numbers):
+    """The outputs of ``command_step``'s state."""
+    wheel_speeds, v_WP = outputs
+    wheel_speeds[0], wheel_speeds[1] = state[2], state[3]
+    v_WP[0], v_WP[1] = state[0], state[1]
+
+
+def _accelerated(v_WP, acceleration_W, theta, robot, tick_s):
+    return integrate_velocity(v_WP, acceleration_W, tick_s, robot.top_speed_m_s)
+
+
+def _at_velocity(v_WP, velocity_W, theta, robot, tick_s):
+    return clamped_velocity(velocity_W[0], velocity_W[1], robot.top_speed_m_s)
+
+
+def _at_twist(v_WP, twist_B, theta, robot, tick_s):
+    vx, vy = hand_position_velocity(twist_B, theta, robot.control_point_m)
+    return clamped_velocity(vx, vy, robot.top_speed_m_s)
+
+
 class _WheelCommand:
     """Ports, state and limits of the command, whatever it is that is commanded.
 
-    A mix-in beside ``LeafSystem_[T]``: a block adds ``_velocity(v_WP, command,
-    theta)``, the velocity of P from the last one, what its port reads, and the
-    heading. A twist is a velocity of P as well, whose axes turn with B: one limit
-    of speed serves them all.
+    A mix-in beside ``LeafSystem_[T]``. A twist is a velocity of P as well, whose axes
+    turn with B: one limit of speed serves them all.
     """
 
     FACTS = BlockFacts(
@@ -141,9 +197,11 @@ class _WheelCommand:
         states=("v_WP_x", "v_WP_y", "wheel_left", "wheel_right"),
     )
 
-    def _declare_command(self, name, port, robot, tick_s):
+    def _declare_command(self, name, port, velocity, robot, tick_s):
         self._tick_s = tick_s
         self._robot = robot or RobotParameters()
+        numbers = CommandNumbers(velocity, self._robot, tick_s)
+        self.step = Step(command_step, numbers, [0.0] * 4, publish_command)
         self.set_name(name)
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)
@@ -158,14 +216,12 @@ class _WheelCommand:
         )
 
     def _update(self, context, discrete_state):
-        robot = self._robot
-        command, (_, _, theta) = read_lists(context, self._inputs)
-        before = context.get_discrete_state(_V_WP).CopyToVector().tolist()
-        v_WP = self._velocity(before, command, theta)
-        twist = hand_position_twist(v_WP, theta, robot.control_point_m)
-        wheels = limited_wheel_speeds(*twist, robot)
-        discrete_state.set_value(_V_WP, np.array(v_WP))
-        discrete_state.set_value(_WHEEL_SPEEDS, np.array(wheels))
+        inputs, state = read_lists(context, self._inputs), []
+        for group in (_V_WP, _WHEEL_SPEEDS):
+            state += context.get_discrete_state(group).CopyToVector().tolist()
+        command_step(0, state, inputs, (), self.step.numbers)
+        discrete_state.set_value(_V_WP, np.array(state[:2]))
+        discrete_state.set_value(_WHEEL_SPEEDS, np.array(state[2:]))
 
 
 @define_for_scalars("WheelSpeedCommand_", __name__)
@@ -199,17 +255,13 @@ def WheelSpeedCommand_(T):
         def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
             self._declare_command(
-                "wheel_speed_command", "acceleration_W", robot, tick_s
+                "wheel_speed_command", "acceleration_W", _accelerated, robot, tick_s
             )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(
                 self, robot=other._robot, tick_s=other._tick_s, converter=converter
             )
-
-        def _velocity(self, v_WP, acceleration_W, theta):
-            top_speed = self._robot.top_speed_m_s
-            return integrate_velocity(v_WP, acceleration_W, self._tick_s, top_speed)
 
     return Impl
 
@@ -240,15 +292,14 @@ def VelocityWheelCommand_(T):
 
         def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
-            self._declare_command("velocity_wheel_command", "velocity_W", robot, tick_s)
+            self._declare_command(
+                "velocity_wheel_command", "velocity_W", _at_velocity, robot, tick_s
+            )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(
                 self, robot=other._robot, tick_s=other._tick_s, converter=converter
             )
-
-        def _velocity(self, v_WP, velocity_W, theta):
-            return clamped_velocity(*velocity_W, self._robot.top_speed_m_s)
 
     return Impl
 
@@ -278,17 +329,14 @@ def TwistWheelCommand_(T):
 
         def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
-            self._declare_command("twist_wheel_command", "twist_B", robot, tick_s)
+            self._declare_command(
+                "twist_wheel_command", "twist_B", _at_twist, robot, tick_s
+            )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(
                 self, robot=other._robot, tick_s=other._tick_s, converter=converter
             )
-
-        def _velocity(self, v_WP, twist_B, theta):
-            epsilon = self._robot.control_point_m
-            velocity_W = hand_position_velocity(twist_B, theta, epsilon)
-            return clamped_velocity(*velocity_W, self._robot.top_speed_m_s)
 
     return Impl
 

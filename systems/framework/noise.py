@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,7 +13,15 @@ from scipy.special import ndtri
 
 from systems.framework.compiling import REORDER
 
-__all__ = ["BEFORE_THE_RUN", "frame_noise", "standard_normals", "tick_generator"]
+__all__ = [
+    "BEFORE_THE_RUN",
+    "TickNoise",
+    "fill_with_tick_noise",
+    "frame_noise",
+    "standard_normals",
+    "tick_generator",
+    "tick_noise",
+]
 
 #: Tick of what is drawn once, when a block is built; no run gets there.
 BEFORE_THE_RUN = 2**62
@@ -124,6 +132,39 @@ def standard_normals(
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)
     _add_quantiles(*words, _QUANTILES, out.reshape(-1))
     return out
+
+
+class TickNoise(NamedTuple):
+    """What ``standard_normals`` of a block are made from, in compiled code."""
+
+    seed: np.uint64
+    quantiles: NDArray[np.float32]
+
+
+def tick_noise(seed: int) -> TickNoise:
+    """That of a block.
+
+    Args:
+        seed: Of the block.
+
+    Returns:
+        For ``fill_with_tick_noise``.
+    """
+    return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
+
+
+@njit(cache=True)
+def fill_with_tick_noise(
+    noise: TickNoise, tick: int, out: NDArray[np.float32]
+) -> None:  # pragma: no cover  (compiled)
+    """``standard_normals`` of a tick.
+
+    Args:
+        noise: Of the block.
+        tick: Number of the tick.
+        out: (rows, columns), filled with numbers of unit variance.
+    """
+    _add_quantiles(noise.seed, np.uint64(tick), noise.quantiles, out.reshape(-1))
 
 
 def _polynomial(function: Any, low: float, high: float, degree: int) -> tuple[Any, ...]:

@@ -8,15 +8,14 @@ that grow with distance; eq. 19 replaces them. See docs/errata.md.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
+from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.cache import declare_cache
-from systems.framework.finite import read_lists
 from systems.framework.parameters import (
     Duration,
     NonNegativeDamping,
@@ -26,6 +25,7 @@ from systems.framework.parameters import (
 )
 from systems.framework.scalar_math import float_of
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
 from systems.ranging.collision_vector import SLOTS
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -67,6 +67,7 @@ class SharedRepulsion(Parameters):
     """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
 
 
+@register_jitable
 def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):
     """Force on the virtual mass towards the follow point, N.
 
@@ -106,10 +107,25 @@ def obstacle_speed(C_now, C_before, velocity_term: VelocityTerm, period):
     """
     if C_before is None:
         return 0.0 * C_now[0]
-    if velocity_term == "printed":
+    return _changing(C_now, C_before, velocity_term == "closing", period)
+
+
+@register_jitable
+def _changing(C_now, C_before, closing, period):
+    if not closing:
         return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period
-    closing = (safe_norm(*C_before) - safe_norm(*C_now)) / period
-    return closing if closing > 0.0 else 0.0 * closing
+    speed = (
+        safe_norm(C_before[0], C_before[1]) - safe_norm(C_now[0], C_now[1])
+    ) / period
+    return speed if speed > 0.0 else 0.0 * speed
+
+
+@register_jitable
+def _push(C_W, s, law, arguments):
+    """Force on the virtual mass off one obstacle, N in W."""
+    c = safe_norm(C_W[0], C_W[1])
+    f = law(c, s, *arguments)
+    return -f * C_W[0] / c, -f * C_W[1] / c
 
 
 def repulsion_force(vectors, before, law, velocity_term: VelocityTerm, period):
@@ -129,14 +145,83 @@ def repulsion_force(vectors, before, law, velocity_term: VelocityTerm, period):
     speeds = []
     for feature, *C_W in vectors:
         s = obstacle_speed(C_W, before.get(_key(feature)), velocity_term, period)
-        c = safe_norm(*C_W)
-        f = law(c, s)
-        Fx, Fy = Fx - f * C_W[0] / c, Fy - f * C_W[1] / c
+        fx, fy = _push(C_W, s, law, ())
+        Fx, Fy = Fx + fx, Fy + fy
         speeds.append(s)
     return (Fx, Fy), speeds
 
 
-class ImpedanceLoop:
+class ImpedanceNumbers(NamedTuple):
+    """What the step of an impedance controller depends on."""
+
+    law: Callable[..., Any]
+    """``law(c, s, *arguments)``, N."""
+    arguments: tuple[Any, ...]
+    """Gains."""
+    attraction: AttractionParameters
+    mass_kg: float
+    """Of the virtual mass, kg."""
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    closing: bool
+    """Whether s is the speed of approach alone."""
+    round_s: float
+    """Time of a round of the sensors, s."""
+
+
+def impedance_step(tick, state, inputs, outputs, numbers):
+    """The forces of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: Rows of ``SLOTS`` times feature, C_x and C_y in W, m: those of the last
+            tick first, as many as a round has ticks.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``ImpedanceNumbers``.
+    """
+    p_WS, valid, C_B, features, pose, v_WP = inputs
+    acceleration, forces, speeds = outputs
+    F_m = attraction_force(
+        control_point(pose, numbers.control_point_m),
+        v_WP,
+        p_WS,
+        valid[0] > 0.5,
+        numbers.attraction,
+        numbers.mass_kg,
+    )
+    Fx = Fy = 0.0 * valid[0]
+    oldest, seen = len(state) - _ROW, 0
+    now = [0.0 * valid[0]] * _ROW
+    for k in range(SLOTS):
+        if features[k] > 0.5:
+            C_W = rotate(pose[2], C_B[2 * k], C_B[2 * k + 1])
+            s = 0.0 * C_W[0]
+            for j in range(oldest, oldest + _ROW, 3):
+                if _same_feature(state[j], features[k]):
+                    before = state[j + 1], state[j + 2]
+                    s = _changing(C_W, before, numbers.closing, numbers.round_s)
+            fx, fy = _push(C_W, s, numbers.law, numbers.arguments)
+            Fx, Fy = Fx + fx, Fy + fy
+            speeds[seen] = s
+            now[3 * seen], now[3 * seen + 1], now[3 * seen + 2] = features[k], *C_W
+            seen += 1
+    acceleration[0] = (F_m[0] + Fx) / numbers.mass_kg
+    acceleration[1] = (F_m[1] + Fy) / numbers.mass_kg
+    forces[0], forces[1], forces[2], forces[3] = F_m[0], F_m[1], Fx, Fy
+    for k in range(len(state) - 1, _ROW - 1, -1):
+        state[k] = state[k - _ROW]
+    for k in range(_ROW):
+        state[k] = now[k]
+
+
+@register_jitable
+def _same_feature(before, now):
+    """Features are whole numbers from 1 on, whatever their scalar type."""
+    return before > 0.5 and abs(float_of(before) - float_of(now)) < 0.5
+
+
+class ImpedanceLoop(StepBlock):
     """Ports, state and sum of forces of every impedance controller.
 
     A mix-in beside ``LeafSystem_[T]``: the controller's file adds its law as
@@ -172,16 +257,14 @@ class ImpedanceLoop:
         sensors=None,
         tick_s=TICK_S,
     ):
-        self._scalar = scalar
         self._robot = robot or RobotParameters()
         self._attraction = attraction or AttractionParameters()
         self._repulsion = repulsion
         self._velocity_term = (repulsion or SharedRepulsion()).velocity_term
         sensors = sensors or UltrasonicParameters()
-        self._round_ticks = sensors.round_ticks(tick_s)
-        self._round_s = self._round_ticks * tick_s
+        round_ticks = sensors.round_ticks(tick_s)
         self._least_range_m = sensors.minimum_range_m
-        self.FACTS = replace(self.FACTS, states=_slot_names(self._round_ticks))
+        self.FACTS = replace(self.FACTS, states=_slot_names(round_ticks))
         # What a copy for another scalar type is made with.
         self._options = {
             "robot": self._robot,
@@ -191,95 +274,39 @@ class ImpedanceLoop:
             "tick_s": tick_s,
         }
         self.set_name(name)
-        self._inputs = [
-            self.DeclareVectorInputPort(name=port_name, size=size)
-            for port_name, size in (
-                ("p_WS_estimated", 2),
-                ("target_valid", 1),
-                ("collision_vectors_B", 2 * SLOTS),
-                ("features", SLOTS),
-                ("pose_WB_estimated", 3),
-                ("v_WP", 2),
-            )
-        ]
-        self.DeclareDiscreteState([scalar(0.0)] * (_ROW * self._round_ticks))
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=tick_s, offset_sec=0.0, update=self._remember
+        self._declare_step(
+            scalar,
+            Step(
+                impedance_step,
+                ImpedanceNumbers(
+                    *self._law(),
+                    self._attraction,
+                    self._robot.mass_kg,
+                    self._robot.control_point_m,
+                    self._velocity_term == "closing",
+                    round_ticks * tick_s,
+                ),
+                [0.0] * (_ROW * round_ticks),
+            ),
+            _INPUTS,
+            _OUTPUTS,
+            tick_s,
         )
-        sources = {port.ticket() for port in self._inputs}
-        sources.add(self.xd_ticket())
-        self._forces = declare_cache(self, "forces", self._sum_forces, sources)
-        for port_name, size, calc in (
-            ("acceleration_W", 2, self._acceleration),
-            ("forces_W", 4, self._forces_W),
-            ("obstacle_speeds", SLOTS, self._speeds),
-        ):
-            self.DeclareVectorOutputPort(
-                name=port_name,
-                size=size,
-                calc=calc,
-                prerequisites_of_calc={self._forces.ticket()},
-            )
 
-    def _sum_forces(self, context):
-        """(F_m, F_b, s of each slot, [(feature, C_x, C_y)] in W)."""
-        values = read_lists(context, self._inputs)
-        target, valid, vectors, features, pose, v_WP = values
-        F_m = attraction_force(
-            control_point(pose, self._robot.control_point_m),
-            v_WP,
-            target,
-            valid[0] > 0.5,
-            self._attraction,
-            self._robot.mass_kg,
-        )
-        zero = self._scalar(0.0)
-        vectors_W = [
-            (features[k], *rotate(pose[2], vectors[2 * k], vectors[2 * k + 1]))
-            for k in range(SLOTS)
-            if features[k] > 0.5
-        ]
-        if not vectors_W:
-            return F_m, [zero] * 2, [zero] * SLOTS, vectors_W
-        F_b, speeds = repulsion_force(
-            vectors_W,
-            self._before(context),
-            self.radial_force,
-            self._velocity_term,
-            self._round_s,
-        )
-        speeds = [zero + s for s in speeds] + [zero] * (SLOTS - len(speeds))
-        return F_m, F_b, speeds, vectors_W
+    def _law(self):
+        """The law and its arguments after c and s."""
+        return self.radial_force, ()
 
-    def _before(self, context):
-        """{feature: C_W} of a round ago."""
-        state = context.get_discrete_state(0).CopyToVector().tolist()
-        oldest = state[-_ROW:]
-        return {
-            _key(oldest[k]): (oldest[k + 1], oldest[k + 2])
-            for k in range(0, _ROW, 3)
-            if oldest[k] > 0.5
-        }
 
-    def _remember(self, context, discrete_state):
-        *_, vectors_W = self._forces.Eval(context)
-        rows = [value for row in vectors_W for value in row]
-        rows += [self._scalar(0.0)] * (_ROW - len(rows))
-        if self._round_ticks > 1:
-            rows += context.get_discrete_state(0).CopyToVector().tolist()[:-_ROW]
-        discrete_state.set_value(np.array(rows))
-
-    def _acceleration(self, context, output):
-        F_m, F_b, *_ = self._forces.Eval(context)
-        mass = self._robot.mass_kg
-        output.SetFromVector([(F_m[0] + F_b[0]) / mass, (F_m[1] + F_b[1]) / mass])
-
-    def _forces_W(self, context, output):
-        F_m, F_b, *_ = self._forces.Eval(context)
-        output.SetFromVector([*F_m, *F_b])
-
-    def _speeds(self, context, output):
-        output.SetFromVector(self._forces.Eval(context)[2])
+_INPUTS = (
+    ("p_WS_estimated", 2),
+    ("target_valid", 1),
+    ("collision_vectors_B", 2 * SLOTS),
+    ("features", SLOTS),
+    ("pose_WB_estimated", 3),
+    ("v_WP", 2),
+)
+_OUTPUTS = ("acceleration_W", 2), ("forces_W", 4), ("obstacle_speeds", SLOTS)
 
 
 def _slot_names(round_ticks: int) -> tuple[str, ...]:

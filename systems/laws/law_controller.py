@@ -73,13 +73,16 @@ def define_law_controller(
             def _construct(self, *, converter=None, **options):
                 super().__init__(converter=converter)
                 self._declare_loop(T, module.rpartition(".")[2], **options)
-                self._arguments = law.arguments(self._repulsion, self._least_range_m)
 
             def _construct_copy(self, other, converter=None):
                 Impl._construct(self, converter=converter, **other._options)
 
+            def _law(self):
+                return law.force, law.arguments(self._repulsion, self._least_range_m)
+
             def radial_force(self, c, s):
-                return law.force(c, s, *self._arguments)
+                numbers = self.step.numbers
+                return numbers.law(c, s, *numbers.arguments)
 
         return Impl
 

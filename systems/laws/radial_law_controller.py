@@ -51,16 +51,21 @@ def RadialLawController_(T):
             self, *, law=no_force, repulsion=None, converter=None, **options
         ):
             super().__init__(converter=converter)
-            self._law = law
+            self._function = law
             repulsion = repulsion or RepulsionParameters()
             name = "radial_law_controller"
             self._declare_loop(T, name, repulsion=repulsion, **options)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(self, law=other._law, converter=converter, **other._options)
+            Impl._construct(
+                self, law=other._function, converter=converter, **other._options
+            )
+
+        def _law(self):
+            return self._function, (self._repulsion,)
 
         def radial_force(self, c, s):
-            return self._law(c, s, self._repulsion)
+            return self._function(c, s, self._repulsion)
 
     return Impl
 

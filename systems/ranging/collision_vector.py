@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal, NamedTuple
 
-import numpy as np
+from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.cache import declare_cache
-from systems.framework.finite import read_lists
 from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
@@ -50,6 +49,7 @@ class CollisionVectorParameters(Parameters):
     """Echoes farther apart than this are taken as two obstacles, m."""
 
 
+@register_jitable
 def echo_point(range_, axis, position):
     """Where an echo is taken to lie: on the sensor's axis.
 
@@ -87,6 +87,7 @@ def echo_points(ranges, echo, sensors: UltrasonicParameters):
     ]
 
 
+@register_jitable
 def carried_point(point, pose_then, pose_now, control_point_m):
     """Where a point that was seen from another pose lies now, if it rests.
 
@@ -99,14 +100,14 @@ def carried_point(point, pose_then, pose_now, control_point_m):
     Returns:
         (x, y) from P in B axes now, m.
     """
-    p_then, p_now = (
-        control_point(pose, control_point_m) for pose in (pose_then, pose_now)
-    )
-    x, y = rotate(pose_then[2], *point)
+    p_then = control_point(pose_then, control_point_m)
+    p_now = control_point(pose_now, control_point_m)
+    x, y = rotate(pose_then[2], point[0], point[1])
     dx, dy = p_then[0] - p_now[0] + x, p_then[1] - p_now[1] + y
     return rotate(-pose_now[2], dx, dy)
 
 
+@register_jitable
 def foot_on_segment(a, b):
     """Point of the segment a-b that is nearest to the origin.
 
@@ -147,77 +148,109 @@ def collision_vectors(points, parameters: CollisionVectorParameters, neighbours=
         motion: 1 to n one sensor (case I, Han 2019, eq. 12), n + k sensor k and its
         right neighbour (case II, eq. 14).
     """
-    heard = [k for k, point in enumerate(points) if point is not None]
-    if not heard:
-        return []
     if neighbours is None:
         neighbours = pairwise(range(len(points)))
+    return _vectors(
+        [(0.0, 0.0) if point is None else point for point in points],
+        [point is not None for point in points],
+        [*neighbours],
+        parameters.aggregation,
+        parameters.pair_separation_m,
+    )
+
+
+@register_jitable
+def _vectors(points, heard, neighbours, aggregation, separation):
+    """``collision_vectors``; points that are not heard may lie anywhere."""
+    nearest = -1
+    for k in range(len(points)):
+        if not heard[k]:
+            continue
+        if nearest < 0 or _squared(points[k]) < _squared(points[nearest]):
+            nearest = k
+    found = [(0.0 * x, x, y) for x, y in points[:0]]
+    if nearest < 0:
+        return found
     pairs = [
-        (left, right)
-        for left, right in neighbours
-        if points[left] is not None
-        and points[right] is not None
-        and _close(points[left], points[right], parameters.pair_separation_m)
+        (int(pair[0]), int(pair[1]))
+        for pair in neighbours
+        if heard[int(pair[0])]
+        and heard[int(pair[1])]
+        and _close(points[int(pair[0])], points[int(pair[1])], separation)
     ]
-    if parameters.aggregation == "sum":
-        return _all_vectors(points, heard, pairs)
-    nearest = min(heard, key=lambda k: _squared(points[k]))
-    if parameters.aggregation == "paper":
+    if aggregation == "sum":
+        return _all_vectors(points, heard, pairs, found)
+    if aggregation == "paper":
         # Of the neighbours that are close enough the nearer to P.
-        mine = [pair for pair in pairs if nearest in pair]
-        if mine:
-            return [_pair(points, *min(mine, key=_other_is_near(points, nearest)))]
-    return [(1.0 + nearest, *points[nearest])]
+        best, least = -1, math.inf
+        for index in range(len(pairs)):
+            left, right = pairs[index]
+            if nearest in (left, right):
+                other = points[right if left == nearest else left]
+                if float_of(_squared(other)) < least:
+                    best, least = index, float_of(_squared(other))
+        if best >= 0:
+            found.append(_pair(points, pairs[best][0], pairs[best][1]))
+            return found
+    x, y = points[nearest]
+    found.append((0.0 * x + (1.0 + nearest), x, y))
+    return found
 
 
+@register_jitable
 def _squared(point):
     return point[0] * point[0] + point[1] * point[1]
 
 
+@register_jitable
 def _close(a, b, separation):
     return _squared((b[0] - a[0], b[1] - a[1])) < separation * separation
 
 
+@register_jitable
 def _pair(points, left, right):
-    feature = 1.0 + len(points) + left
-    return (feature, *foot_on_segment(points[left], points[right]))
+    x, y = foot_on_segment(points[left], points[right])
+    return 0.0 * x + (1.0 + len(points) + left), x, y
 
 
-def _other_is_near(points, sensor):
-    """Key of a pair: the squared distance of its other point."""
+@register_jitable
+def _all_vectors(points, heard, pairs, vectors):
+    """A vector for each pair, and for each echo that is in none; the nearest."""
+    for left, right in pairs:
+        vectors.append(_pair(points, left, right))
+    for k in range(len(points)):
+        alone = heard[k]
+        for left, right in pairs:
+            alone = alone and k not in (left, right)
+        if alone:
+            vectors.append((0.0 * points[k][0] + (1.0 + k), points[k][0], points[k][1]))
+    if len(vectors) <= SLOTS:
+        return vectors
+    nearest = vectors[:0]
+    for _ in range(SLOTS):
+        first = 0
+        for k in range(1, len(vectors)):
+            if _squared(vectors[k][1:]) < _squared(vectors[first][1:]):
+                first = k
+        nearest.append(vectors.pop(first))
+    return nearest
 
-    def key(pair):
-        left, right = pair
-        return _squared(points[right if left == sensor else left])
 
-    return key
-
-
-def _all_vectors(points, heard, pairs):
-    vectors = [_pair(points, left, right) for left, right in pairs]
-    paired = {sensor for pair in pairs for sensor in pair}
-    vectors += [(1.0 + k, *points[k]) for k in heard if k not in paired]
-    if len(vectors) > SLOTS:
-        vectors.sort(key=lambda vector: float_of(_squared(vector[1:])))
-    return vectors[:SLOTS]
-
-
-def fill_slots(vectors, scalar):
-    """(vectors, mask, features) for the ports: 6, 3 and 3 elements.
+@register_jitable
+def fill_slots(vectors, outputs):
+    """Fills the ports of vectors, mask and features: 6, 3 and 3 elements.
 
     Args:
         vectors: At most three (feature, x, y), from P, m.
-        scalar: Makes a number of the ports' type.
-
-    Returns:
-        Vectors, m, mask, 1 or 0, and features; zeros where there is nothing.
+        outputs: Vectors, m, mask, 1 or 0, and features; zeros, which they remain
+            where there is nothing.
     """
-    zero, one, empty = scalar(0.0), scalar(1.0), SLOTS - len(vectors)
-    out = [component for _, x, y in vectors for component in (x, y)]
-    mask = [one] * len(vectors)
-    features = [zero + feature for feature, _, _ in vectors]
-    blank = [zero] * empty
-    return out + blank + blank, mask + blank, features + blank
+    vectors_B, mask, features = outputs
+    for k in range(len(vectors)):
+        feature, x, y = vectors[k]
+        vectors_B[2 * k], vectors_B[2 * k + 1] = x, y
+        mask[k] = mask[k] + 1.0
+        features[k] = feature
 
 
 #: What every block says of itself that obstacle sensing ends in.
@@ -235,31 +268,70 @@ COLLISION_FACTS = BlockFacts(
 )
 
 
-def declare_collision_ports(system, slots):
-    """Declares the three output ports that every obstacle sensing ends in.
+#: Ports that every obstacle sensing ends in.
+COLLISION_PORTS = (
+    ("collision_vectors_B", 2 * SLOTS),
+    ("mask", SLOTS),
+    ("features", SLOTS),
+)
+
+
+class CollisionNumbers(NamedTuple):
+    """What the step of ``CollisionVector`` depends on."""
+
+    parameters: CollisionVectorParameters
+    axes: tuple[float, ...]
+    """Of the sensors in B, rad."""
+    places: tuple[tuple[float, float], ...]
+    """Of the sensors from P, m."""
+    neighbours: Any
+    """(n, 2) pairs of sensors."""
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    tick_s: float
+
+
+def collision_step(tick, state, inputs, outputs, numbers):
+    """Collision vectors of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
-        system: The block.
-        slots: Cache entry of what ``fill_slots`` returns.
+        tick: Not used.
+        state: Poses at the ticks of a round before this one, the last tick first, m
+            and rad; none where every range is new at every tick.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``CollisionNumbers``.
     """
-    for index, (name, size) in enumerate(
-        (("collision_vectors_B", 2 * SLOTS), ("mask", SLOTS), ("features", SLOTS))
-    ):
-
-        def calc(context, output, index=index):
-            output.SetFromVector(slots.Eval(context)[index])
-
-        system.DeclareVectorOutputPort(
-            name=name,
-            size=size,
-            calc=calc,
-            prerequisites_of_calc={slots.ticket()},
-        )
+    ranges, echo, ages, pose = inputs
+    points = [
+        echo_point(ranges[k], numbers.axes[k], numbers.places[k])
+        for k in range(len(ranges))
+    ]
+    if len(state):
+        for k in range(len(points)):
+            ticks = round(float_of(ages[k]) / numbers.tick_s)
+            if ticks > 0:
+                at = 3 * (ticks - 1)
+                then = state[at], state[at + 1], state[at + 2]
+                now = pose[0], pose[1], pose[2]
+                points[k] = carried_point(points[k], then, now, numbers.control_point_m)
+        for k in range(len(state) - 1, 2, -1):
+            state[k] = state[k - 3]
+        for k in range(3):
+            state[k] = pose[k]
+    vectors = _vectors(
+        points,
+        [flag > 0.5 for flag in echo],
+        numbers.neighbours,
+        numbers.parameters.aggregation,
+        numbers.parameters.pair_separation_m,
+    )
+    fill_slots(vectors, outputs)
 
 
 @define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(LeafSystem_[T], StepBlock):
         """Turns echoes into collision vectors from P (cases I and II).
 
         .. pydrake_system::
@@ -315,28 +387,28 @@ def CollisionVector_(T):
             self._tick_s = tick_s
             self.set_name("collision_vector")
             count = self._sensors.count
-            inputs = [
-                self.DeclareVectorInputPort(name=name, size=size)
-                for name, size in (
+            past_poses = self._sensors.round_ticks(tick_s) - 1
+            numbers = CollisionNumbers(
+                self._parameters,
+                self._sensors.axes,
+                self._sensors.places,
+                self._sensors.neighbours,
+                self._robot.control_point_m,
+                tick_s,
+            )
+            self._declare_step(
+                T,
+                Step(collision_step, numbers, [*self._initial_pose] * past_poses),
+                (
                     ("ranges", count),
                     ("echo", count),
                     ("range_ages", count),
                     ("pose_WB_estimated", 3),
-                )
-            ]
-            self._echoes, self._motion = inputs[:2], inputs[2:]
-            sources = {port.ticket() for port in self._echoes}
-            self._past_poses = self._sensors.round_ticks(tick_s) - 1
-            if self._past_poses:
-                past = [T(v) for v in self._initial_pose] * self._past_poses
-                self.DeclareDiscreteState(past)
-                self.DeclarePeriodicDiscreteUpdateEvent(
-                    period_sec=tick_s, offset_sec=0.0, update=self._remember
-                )
-                sources |= {port.ticket() for port in self._motion}
-                sources.add(self.xd_ticket())
-            slots = declare_cache(self, "slots", self._slots, sources)
-            declare_collision_ports(self, slots)
+                ),
+                COLLISION_PORTS,
+                tick_s,
+                unread=() if past_poses else ("range_ages", "pose_WB_estimated"),
+            )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(
@@ -348,38 +420,6 @@ def CollisionVector_(T):
                 tick_s=other._tick_s,
                 converter=converter,
             )
-
-        def _slots(self, context):
-            ranges, echo = read_lists(context, self._echoes)
-            points = echo_points(ranges, echo, self._sensors)
-            if self._past_poses:
-                points = self._carried(context, points)
-            neighbours = self._sensors.neighbours
-            vectors = collision_vectors(points, self._parameters, neighbours)
-            return fill_slots(vectors, T)
-
-        def _carried(self, context, points):
-            """The points as they lie from the present pose."""
-            ages, now = read_lists(context, self._motion)
-            poses = self._poses(context, now)
-            ticks = [round(float_of(age) / self._tick_s) for age in ages]
-            return [
-                carried_point(point, poses[k], poses[0], self._robot.control_point_m)
-                if point is not None and k
-                else point
-                for point, k in zip(points, ticks, strict=True)
-            ]
-
-        def _poses(self, context, now):
-            """The pose now, a tick ago, two ticks ago, as far back as a round."""
-            past = context.get_discrete_state(0).CopyToVector().tolist()
-            starts = range(0, len(past), 3)
-            return [now, *(past[k : k + 3] for k in starts)]
-
-        def _remember(self, context, discrete_state):
-            _, now = read_lists(context, self._motion)
-            poses = self._poses(context, now)[:-1]
-            discrete_state.set_value(np.array(poses).ravel())
 
     return Impl
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
+from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
-from systems.framework.cache import declare_cache
-from systems.framework.finite import check_finite, read_lists
+from systems.framework.finite import check_finite
 from systems.framework.parameters import Positive, Size
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
 from systems.ranging.collision_vector import (
     COLLISION_FACTS,
+    COLLISION_PORTS,
     SLOTS,
-    declare_collision_ports,
     fill_slots,
 )
 from systems.world.geometry import control_point, nearest_point_on_rectangle, rotate
@@ -21,6 +25,7 @@ from systems.world.geometry import control_point, nearest_point_on_rectangle, ro
 __all__ = ["IdealObstacleSensor", "IdealObstacleSensor_", "nearest_vectors"]
 
 
+@register_jitable
 def nearest_vectors(pose_WB, rectangles, control_point_m, maximum_range, slots):
     """Vectors from P to the nearest points of the nearest bodies.
 
@@ -37,20 +42,65 @@ def nearest_vectors(pose_WB, rectangles, control_point_m, maximum_range, slots):
     """
     p_WP = control_point(pose_WB, control_point_m)
     seen = []
-    for index, rectangle in enumerate(rectangles):
-        dx, dy = nearest_point_on_rectangle(p_WP, rectangle)
-        squared = dx * dx + dy * dy
-        if squared <= maximum_range * maximum_range:
-            seen.append((squared, index, dx, dy))
-    seen.sort(key=lambda item: (float_of(item[0]), item[1]))
-    return [
-        (1.0 + index, *rotate(-pose_WB[2], dx, dy)) for _, index, dx, dy in seen[:slots]
-    ]
+    for index in range(len(rectangles)):
+        dx, dy = nearest_point_on_rectangle(p_WP, rectangles[index])
+        if dx * dx + dy * dy <= maximum_range * maximum_range:
+            x, y = rotate(-pose_WB[2], dx, dy)
+            seen.append((float_of(dx * dx + dy * dy), 0.0 * x + (1.0 + index), x, y))
+    nearest = [(feature, x, y) for _, feature, x, y in seen[:0]]
+    while len(nearest) < slots and len(seen) > 0:
+        first = 0
+        for k in range(1, len(seen)):
+            if seen[k][0] < seen[first][0]:
+                first = k
+        _, feature, x, y = seen.pop(first)
+        nearest.append((feature, x, y))
+    return nearest
+
+
+class ObstacleNumbers(NamedTuple):
+    """What the step of ``IdealObstacleSensor`` depends on."""
+
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    maximum_range_m: float
+    """Bodies beyond it are not seen, m."""
+    slots: int
+    """Most vectors."""
+    source_size: tuple[float, float]
+    """Length and width of the master robot, m."""
+
+
+def ideal_obstacle_step(tick, state, inputs, outputs, numbers):
+    """Nearest points of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: None.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``ObstacleNumbers``.
+    """
+    pose_WB, poses, sizes, pose_WS = inputs
+    length, width = numbers.source_size
+    bodies = [(pose_WS[0], pose_WS[1], pose_WS[2], length, width)]
+    for k in range(len(sizes) // 2):
+        x, y, theta = poses[3 * k], poses[3 * k + 1], poses[3 * k + 2]
+        # The master robot is the last one.
+        bodies.insert(k, (x, y, theta, sizes[2 * k], sizes[2 * k + 1]))
+    vectors = nearest_vectors(
+        pose_WB,
+        bodies,
+        numbers.control_point_m,
+        numbers.maximum_range_m,
+        numbers.slots,
+    )
+    fill_slots(vectors, outputs)
 
 
 @define_for_scalars("IdealObstacleSensor_", __name__)
 def IdealObstacleSensor_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(LeafSystem_[T], StepBlock):
         """Gives the exact nearest points of the bodies, in all directions.
 
         .. pydrake_system::
@@ -102,37 +152,27 @@ def IdealObstacleSensor_(T):
             for name in ("maximum_range_m", "source_size"):
                 check_finite(f"IdealObstacleSensor: {name}", self._config[name])
             self.set_name("ideal_obstacle_sensor")
-            self._inputs = [
-                self.DeclareVectorInputPort(name=name, size=size)
-                for name, size in (
+            numbers = ObstacleNumbers(
+                self._config["robot"].control_point_m,
+                maximum_range_m,
+                SLOTS if all_bodies else 1,
+                tuple(source_size),
+            )
+            self._declare_step(
+                T,
+                Step(ideal_obstacle_step, numbers),
+                (
                     ("pose_WB", 3),
                     ("poses_WO", 3 * obstacle_count),
                     ("sizes", 2 * obstacle_count),
                     ("pose_WS", 3),
-                )
-            ]
-            sources = {port.ticket() for port in self._inputs}
-            slots = declare_cache(self, "slots", self._slots, sources)
-            declare_collision_ports(self, slots)
+                ),
+                COLLISION_PORTS,
+                TICK_S,
+            )
 
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, **other._config, converter=converter)
-
-        def _slots(self, context):
-            pose_WB, poses, sizes, pose_WS = read_lists(context, self._inputs)
-            bodies = [
-                (*poses[3 * k : 3 * k + 3], *sizes[2 * k : 2 * k + 2])
-                for k in range(self._config["obstacle_count"])
-            ]
-            bodies.append((*pose_WS, *self._config["source_size"]))
-            vectors = nearest_vectors(
-                pose_WB,
-                bodies,
-                self._config["robot"].control_point_m,
-                self._config["maximum_range_m"],
-                SLOTS if self._config["all_bodies"] else 1,
-            )
-            return fill_slots(vectors, T)
 
     return Impl
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -20,7 +20,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.input_error import InputError, shortened
-from systems.framework.noise import standard_normals
+from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.parameters import (
     Angle,
     Fraction,
@@ -33,6 +33,7 @@ from systems.framework.parameters import (
     SoundSpeed,
 )
 from systems.framework.signals import TICK_S, whole
+from systems.framework.step_block import Step
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
@@ -268,6 +269,60 @@ def _measured_ranges(
     return ranges, echo
 
 
+class UltrasonicNumbers(NamedTuple):
+    """What the step of ``UltrasonicArray`` depends on."""
+
+    axes: NDArray[np.float64]
+    """(n,) directions of the cones in B, rad."""
+    places: NDArray[np.float64]
+    """(n, 2) sensors from P, m."""
+    half_angle: float
+    """Of the cones, rad."""
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    source_size: tuple[float, float]
+    """Length and width of the master robot, m."""
+    errors: tuple[float, float, float, float, float]
+    """Stretch of the ranges, noise, m, luck below which echoes are lost, least and
+    greatest range, m."""
+    noise: TickNoise
+    turns: NDArray[np.int64]
+    """(n,) ticks into the round at which each sensor fires."""
+    round: int
+    """Ticks of a round."""
+    tick_s: float
+
+
+@njit(cache=True)
+def ultrasonic_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """Ranges of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Ranges, m, and echoes, as they were last read.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``UltrasonicNumbers``.
+    """
+    pose_WB, poses_WO, sizes, pose_WS = inputs
+    ranges, echo, ages = outputs
+    bodies = world_rectangles(poses_WO, sizes, pose_WS, numbers.source_size)
+    beams = numbers.axes, numbers.places, numbers.half_angle
+    true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
+    count = len(true)
+    normals = np.empty((2, count), dtype=np.float32)
+    fill_with_tick_noise(numbers.noise, tick, normals)
+    new_ranges, new_echo = _measured_ranges(true, normals, *numbers.errors)
+    for k in range(count):
+        age = (tick - numbers.turns[k]) % numbers.round
+        if age == 0:
+            state[k], state[count + k] = new_ranges[k], new_echo[k]
+        ranges[k], echo[k] = state[k], state[count + k]
+        ages[k] = age * numbers.tick_s
+
+
 class UltrasonicArray(LeafSystem):
     """Ranges of the nearest surfaces in cones, the papers' three or any others.
 
@@ -327,9 +382,7 @@ class UltrasonicArray(LeafSystem):
         self._control_point = (robot or RobotParameters()).control_point_m
         self._sound_speed = (acoustics or AcousticParameters()).c
         self._source_size = source_size
-        self._seed = seed
         self._tick_s = tick_s
-        self._period = self._parameters.period_ticks(tick_s)
         self._round = self._parameters.round_ticks(tick_s)
         check_finite("UltrasonicArray: source_size", source_size)
         self.set_name("ultrasonic_array")
@@ -351,6 +404,7 @@ class UltrasonicArray(LeafSystem):
         farthest = np.full(count, self._parameters.maximum_range_m)
         held: Any = np.concatenate([farthest, np.zeros(count)])
         self.DeclareDiscreteState(held)
+        self.step = Step(ultrasonic_step, self._numbers(seed), held.tolist())
         if self._round > 1:
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=tick_s, offset_sec=0.0, update=self._hold
@@ -358,54 +412,46 @@ class UltrasonicArray(LeafSystem):
         sources = {port.ticket() for port in self._inputs}
         sources |= {self.time_ticket(), self.xd_ticket()}
         self._readings: Any = declare_cache(self, "readings", self._read, sources)
-        for name, calc in (("ranges", self._calc_ranges), ("echo", self._calc_echo)):
+        for port, name in enumerate(("ranges", "echo", "range_ages")):
             self.DeclareVectorOutputPort(
                 name=name,
                 size=count,
-                calc=calc,
+                calc=partial(self._calc, port),
                 prerequisites_of_calc={self._readings.ticket()},
             )
-        self.DeclareVectorOutputPort(
-            name="range_ages",
-            size=count,
-            calc=self._calc_ages,
-            prerequisites_of_calc={self.time_ticket()},
+
+    def _numbers(self, seed: int) -> UltrasonicNumbers:
+        sensors = self._parameters
+        believed = sensors.assumed_sound_speed_m_s or self._sound_speed
+        turns = np.arange(sensors.count) * sensors.period_ticks(self._tick_s)
+        return UltrasonicNumbers(
+            *sensors.beams,
+            self._control_point,
+            self._source_size,
+            (
+                believed / self._sound_speed,
+                sensors.noise_m,
+                sensors.least_luck,
+                sensors.minimum_range_m,
+                sensors.maximum_range_m,
+            ),
+            tick_noise(seed),
+            turns if sensors.firing == "sequential" else 0 * turns,
+            self._round,
+            self._tick_s,
         )
 
-    def _read(self, context: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """(n,) ranges and (n,) echoes as they stand now."""
-        pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
-        tick = self._tick(context)
-        numbers = standard_normals((2, self._parameters.count), self._seed, tick)
-        rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
-        true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
-        ranges, echo = measured_ranges(
-            true, self._parameters, self._sound_speed, numbers
-        )
-        if self._round == 1:
-            return ranges, echo
-        fires = self._ages(tick) == 0
-        held = context.get_discrete_state(0).CopyToVector().reshape(2, -1)
-        return np.where(fires, ranges, held[0]), np.where(fires, echo, held[1])
+    def _read(self, context: Any) -> tuple[Any, Any]:
+        """Outputs as they stand now, and the state of the next tick."""
+        inputs = tuple(read_arrays(context, self._inputs))
+        state = context.get_discrete_state(0).CopyToVector()
+        outputs = tuple(np.zeros((3, self._parameters.count)))
+        tick = round(context.get_time() / self._tick_s)
+        ultrasonic_step(tick, state, inputs, outputs, self.step.numbers)
+        return outputs, state
 
     def _hold(self, context: Any, discrete_state: Any) -> None:
-        discrete_state.set_value(np.concatenate(self._readings.Eval(context)))
+        discrete_state.set_value(self._readings.Eval(context)[1])
 
-    def _calc_ranges(self, context: Any, output: Any) -> None:
-        output.SetFromVector(self._readings.Eval(context)[0])
-
-    def _calc_echo(self, context: Any, output: Any) -> None:
-        output.SetFromVector(self._readings.Eval(context)[1])
-
-    def _calc_ages(self, context: Any, output: Any) -> None:
-        output.SetFromVector(self._ages(self._tick(context)) * self._tick_s)
-
-    def _ages(self, tick: int) -> NDArray[np.int64]:
-        """(n,) ticks since each sensor fired."""
-        turns = np.arange(self._parameters.count)
-        if self._parameters.firing == "simultaneous":
-            turns = np.zeros_like(turns)
-        return (tick - turns * self._period) % self._round
-
-    def _tick(self, context: Any) -> int:
-        return round(context.get_time() / self._tick_s)
+    def _calc(self, port: int, context: Any, output: Any) -> None:
+        output.SetFromVector(self._readings.Eval(context)[0][port])

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numba.extending import register_jitable
+from numba.extending import overload, register_jitable
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.scalar_math import cos, sin, sqrt
@@ -36,6 +36,7 @@ __all__ = [
 _NORM_FLOOR = 1e-12
 
 
+@register_jitable
 def safe_norm(x: Any, y: Any) -> Any:
     """Length of (x, y); at zero its gradient is zero instead of NaN.
 
@@ -52,6 +53,7 @@ def safe_norm(x: Any, y: Any) -> Any:
     return sqrt(x * x + y * y + _NORM_FLOOR**2)
 
 
+@register_jitable
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Components in the outer frame of (x, y) given in a frame turned by theta.
 
@@ -70,6 +72,7 @@ def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     return c * x - s * y, s * x + c * y
 
 
+@register_jitable
 def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
     """Position p_WP of the control point of a body, m.
 
@@ -100,6 +103,7 @@ def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[An
     return vx - turning * np.sin(theta), vy + turning * np.cos(theta)
 
 
+@register_jitable
 def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     """Vector from a point to the nearest point of a filled rectangle.
 
@@ -114,6 +118,7 @@ def nearest_point_on_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     return rotate(rectangle[2], -du, -dv)
 
 
+@register_jitable
 def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     """Vector to a point from the nearest point of a filled rectangle.
 
@@ -126,8 +131,17 @@ def beyond_rectangle(point: Any, rectangle: Any) -> tuple[Any, Any]:
     """
     x, y, theta, length, width = rectangle
     u, v = rotate(-theta, point[0] - x, point[1] - y)
-    outside = beyond_each if isinstance(u, np.ndarray) else beyond
-    return outside(u, length / 2.0), outside(v, width / 2.0)
+    return _outside(u, length / 2.0), _outside(v, width / 2.0)
+
+
+def _outside(u: Any, half: Any) -> Any:
+    """``beyond``, or ``beyond_each`` of an array."""
+    return beyond_each(u, half) if isinstance(u, np.ndarray) else beyond(u, half)
+
+
+@overload(_outside, strict=False)
+def _outside_compiled(u: Any, half: Any) -> Any:
+    return lambda u, half: beyond(u, half)  # noqa: PLW0108  # numba wants its own
 
 
 @register_jitable

@@ -1,0 +1,143 @@
+"""Blocks whose work is one function: Drake calls it, and so do compiled loops."""
+
+from __future__ import annotations
+
+from collections import namedtuple
+from collections.abc import Callable, Sequence
+from functools import cache, cached_property
+from types import FunctionType
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from systems.framework.cache import declare_cache
+from systems.framework.finite import read_lists
+from systems.framework.parameters import Parameters
+from systems.framework.scalar_math import float_of
+
+__all__ = ["Step", "StepBlock", "compiled_numbers"]
+
+
+class Step(NamedTuple):
+    """What a block does in a tick.
+
+    ``step(tick, state, inputs, outputs, numbers)`` reads the inputs, one sequence of
+    numbers a port, fills the outputs element by element, and replaces the state by that
+    of the next tick. The sequences are lists of floats or of AutoDiffXd where Drake
+    calls it, and arrays in compiled code: numba can compile it.
+    """
+
+    step: Callable[..., None]
+    numbers: Any
+    """What the step depends on: a named tuple of numbers, arrays, functions and
+    parameters; see ``compiled_numbers``."""
+    state: Sequence[float] = ()
+    """At the first tick."""
+    publish: Callable[..., None] | None = None
+    """``publish(state, outputs, numbers)`` fills the outputs of a block that has them
+    in its state alone; the step then leaves them."""
+
+
+@cache
+def _tuple_type(model: type[Parameters]) -> Any:
+    derived = [
+        name
+        for each in reversed(model.__mro__)
+        for name, value in vars(each).items()
+        if isinstance(value, cached_property)
+    ]
+    return namedtuple(f"{model.__name__}Numbers", [*model.model_fields, *derived])
+
+
+def compiled_numbers(value: Any) -> Any:
+    """What a step depends on, as compiled code takes it.
+
+    Args:
+        value: Parameters become named tuples of their fields and of what they derive
+            from them, functions compiled ones, lists arrays; what is unset becomes 0.
+
+    Returns:
+        The same, of types that numba knows.
+    """
+    if isinstance(value, Parameters):
+        kind = _tuple_type(type(value))
+        return kind(*(compiled_numbers(getattr(value, name)) for name in kind._fields))
+    if isinstance(value, tuple):
+        parts = [compiled_numbers(part) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if isinstance(value, FunctionType):
+        return njit(value)
+    if isinstance(value, list):
+        return np.array(value)
+    return 0.0 if value is None else value
+
+
+class StepBlock:
+    """Ports, state and events of a block that does a ``Step``.
+
+    A mix-in beside ``LeafSystem_[T]``. Every output is a function of the state and of
+    the present inputs.
+    """
+
+    def _declare_step(
+        self: Any,
+        scalar: Any,
+        done: Step,
+        inputs: Sequence[tuple[str, int]],
+        outputs: Sequence[tuple[str, int]],
+        tick_s: float,
+        *,
+        unread: Sequence[str] = (),
+    ) -> None:
+        """Declares all of it.
+
+        Args:
+            scalar: float or AutoDiffXd.
+            done: What the block does.
+            inputs: Names and sizes of the input ports, in the step's order.
+            outputs: The same of the output ports.
+            tick_s: Period of the update, s.
+            unread: Last input ports that it has no use for, and may be left open.
+        """
+        self.step = done
+        self._zero, self._sizes = scalar(0.0), [size for _, size in outputs]
+        self._tick_s = tick_s
+        self._inputs = [
+            self.DeclareVectorInputPort(name=name, size=size) for name, size in inputs
+        ]
+        self._read = [port for port in self._inputs if port.get_name() not in unread]
+        sources = {port.ticket() for port in self._read}
+        if done.state:
+            self.DeclareDiscreteState([scalar(x) for x in done.state])
+            self.DeclarePeriodicDiscreteUpdateEvent(
+                period_sec=tick_s, offset_sec=0.0, update=self._replace_state
+            )
+            sources.add(self.xd_ticket())
+        self._done = declare_cache(self, "step", self._do_step, sources)
+        for index, (name, size) in enumerate(outputs):
+
+            def calc(context: Any, output: Any, index: int = index) -> None:
+                output.SetFromVector(self._done.Eval(context)[0][index])
+
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=size,
+                calc=calc,
+                prerequisites_of_calc={self._done.ticket()},
+            )
+
+    def _do_step(self: Any, context: Any) -> tuple[Any, Any]:
+        """Outputs, and the state of the next tick."""
+        step, numbers, initial, _ = self.step
+        inputs, state = read_lists(context, self._read), []
+        inputs += [[]] * (len(self._inputs) - len(inputs))
+        if initial:
+            state = context.get_discrete_state(0).CopyToVector().tolist()
+        outputs = [[self._zero] * size for size in self._sizes]
+        tick = round(float_of(context.get_time()) / self._tick_s)
+        step(tick, state, inputs, outputs, numbers)
+        return outputs, state
+
+    def _replace_state(self: Any, context: Any, discrete_state: Any) -> None:
+        discrete_state.set_value(0, np.array(self._done.Eval(context)[1]))
