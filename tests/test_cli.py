@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -254,27 +253,40 @@ def test_a_law_that_gives_nan_is_found_before_the_run(capsys, tmp_path, monkeypa
     assert not out.exists()
 
 
+#: Says when the first simulated second is over: the run is under way.
+TELLING = """
+import sys
+import diagrams
+import phonotaxis
+
+simulate = diagrams.simulate
+
+def telling(scenario, *, follower, progress):
+    def tell(time_s):
+        print("runs", flush=True)
+        progress(time_s)
+    return simulate(scenario, follower=follower, progress=tell)
+
+diagrams.simulate = telling
+sys.exit(phonotaxis.main())
+"""
+
+
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_leaves_nothing_behind(tmp_path, kind):
     out = tmp_path / "results" / "run"
     root = Path(phonotaxis.__file__).parent
+    words = ["simulate", "--set", "duration_s=2000", "--out", str(out)]
     process = subprocess.Popen(
-        [
-            sys.executable,
-            "-m",
-            "phonotaxis",
-            "simulate",
-            "--set",
-            "duration_s=2000",
-            "--out",
-            str(out),
-        ],
+        [sys.executable, "-c", TELLING, *words],
         cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": str(root)},
+        stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
     )
-    time.sleep(6.0)
+    assert process.stdout is not None
+    assert process.stdout.readline() == "runs\n"
     process.send_signal(kind)
     _, complaint = process.communicate(timeout=30)
     assert process.returncode == 1

@@ -137,13 +137,14 @@ def arrival_information(
     travel, weights = np.asarray(travel), np.asarray(weights)
     edges = np.sort(np.concatenate((begin - travel, end - travel)))
     left = energy.before(edges)
-    information = np.zeros((len(travel), len(travel)))
-    for low, high, heard in zip(edges, edges[1:], np.diff(left), strict=False):
-        middle = 0.5 * (low + high) + travel
-        g = np.where((middle >= begin) & (middle < end), weights, 0.0)
-        if g.any():
-            information += heard * (np.diag(g) - np.outer(g, g) / g.sum())
-    return information
+    middle = 0.5 * (edges[:-1] + edges[1:])[:, np.newaxis] + travel
+    g = np.where((middle >= begin) & (middle < end), weights, 0.0)
+    total = g.sum(axis=1)
+    known = total > 0.0
+    g, heard = g[known], np.diff(left)[known]
+    lost = g[:, :, np.newaxis] * g[:, np.newaxis] / total[known, np.newaxis, np.newaxis]
+    each = g[:, :, np.newaxis] * np.eye(len(travel)) - lost
+    return np.asarray((heard[:, np.newaxis, np.newaxis] * each).sum(axis=0))
 
 
 def position_bound(

@@ -164,7 +164,7 @@ def _wheels_late(
     port = ("plant", "wheel_speeds")
     run = loop.runner(state, point.time_s, fixed=(port,))
     sent = deque([np.zeros(2)] * (int(late) + 2), maxlen=int(late) + 2)
-    wheels = loop.indices("command")[2:]
+    wheels, plant = loop.indices("command")[2:], loop.indices("plant")[:3]
     poses = []
     for k in range(start, start + ticks):
         # Ticks are multiples in Drake's arithmetic too: a sum would miss them.
@@ -175,7 +175,7 @@ def _wheels_late(
         sent.append(run.state()[wheels])
         run.fix(port, sent[1])
         run.advance(then)
-        poses.append(run.state()[loop.indices("plant")[:3]])
+        poses.append(run.state()[plant])
     return poses
 
 

@@ -190,7 +190,8 @@ def drive(
     """
     states = np.empty((len(poses) + 1, 7))
     command = np.empty(2)
-    states[0] = state
+    for k in range(7):  # a slice compiles words about its shape
+        states[0, k] = state[k]
     step = TICK_S / _STEPS_A_TICK
     for k in range(len(poses)):
         now = states[k]
@@ -212,7 +213,8 @@ def drive(
             k3 = plant_derivatives(after + 0.5 * step * k2, command, *numbers)
             k4 = plant_derivatives(after + step * k3, command, *numbers)
             after = after + step / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
-        states[k + 1] = after
+        for i in range(7):
+            states[k + 1, i] = after[i]
     return states
 
 

@@ -107,7 +107,9 @@ def _frame_repeats(
             if first < 0 or first + _PROBE > frame.shape[1]:
                 continue
             a = frame[i, first : first + _PROBE]
-            left, power, _ = _difference(a, frame[j, middle : middle + _PROBE], 0)
+            b, none = frame[j, middle : middle + _PROBE], lag - lag
+            # A literal 0 would be compiled anew.
+            left, power, _ = _difference(a, b, none)
             # The middle of the frame speaks for a copy, or against it.
             if left < _PROBE_MARGIN * max(_EXACT_SHARE * power, rounding):
                 left, power, other = _difference(frame[i], frame[j], lag)

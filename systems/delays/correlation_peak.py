@@ -137,7 +137,7 @@ def _refine(
             real, imaginary, weights[p], first, step
         )
         agreement[p] = aligned / max(total, 1e-300)
-        sums[p] = curve, squares, noise
+        sums[p, 0], sums[p, 1], sums[p, 2] = curve, squares, noise
     return tau, plain, agreement, sums
 
 

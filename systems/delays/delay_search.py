@@ -143,8 +143,10 @@ def _gated_peak(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """Lag of the highest peak within the gate, second peak over it, its height."""
     gated = np.empty(2 * gate + 1, dtype=correlation.dtype)
-    gated[:gate] = correlation[correlation.size - gate :]
-    gated[gate:] = correlation[: gate + 1]
+    for k in range(gate):
+        gated[k] = correlation[correlation.size - gate + k]
+    for k in range(gate + 1):
+        gated[gate + k] = correlation[k]
     best, ratio = _peak(gated)
     lag = float(best - gate)
     if 0 < best < 2 * gate:  # vertex of the parabola

@@ -58,7 +58,8 @@ def cut_rows(
     edge = EDGE_SAMPLES if length >= 2 * EDGE_SAMPLES else 0
     for m in range(channels):
         start, late = int(whole[m] - earliest), arrivals[m] - whole[m]
-        cut[m, :length] = frame[m, start : start + length]
+        for k in range(length):
+            cut[m, k] = frame[m, start + k]
         for k in range(edge):
             cut[m, k] *= _ramp(k - late)
             cut[m, length - 1 - k] *= _ramp(k + late)

@@ -252,7 +252,9 @@ def _fill_with_normals(
     if whole < out.size:
         last = np.empty(block, dtype=np.float32)
         _normal_pairs(state, uniform, angle, turn, last)
-        out[whole:] = last[: out.size - whole]
+        # An assignment to a slice compiles words about shapes too: seconds of it.
+        for k in range(whole, out.size):
+            out[k] = last[k - whole]
 
 
 def frame_noise(shape: tuple[int, int], seed: int, tick: int) -> NDArray[np.float32]:

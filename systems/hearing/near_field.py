@@ -90,10 +90,12 @@ def _slopes(
     to_range = np.array([c * (r1 + r3) / gap, -c * r3 / gap])
     to_y = np.array([c * b * r2, -c * a * r3]) / (spacing * gap)
     slopes = np.empty((4, 2))
-    slopes[0] = to_range
-    slopes[1] = (to_y - sine * to_range) / (r2 * max(cosine, _LEAST_COSINE))
-    slopes[2] = cosine * to_range - r2 * sine * slopes[1]
-    slopes[3] = sine * to_range + r2 * cosine * slopes[1]
+    across = r2 * max(cosine, _LEAST_COSINE)
+    for k in range(2):
+        slopes[0, k] = to_range[k]
+        slopes[1, k] = (to_y[k] - sine * to_range[k]) / across
+        slopes[2, k] = cosine * to_range[k] - r2 * sine * slopes[1, k]
+        slopes[3, k] = sine * to_range[k] + r2 * cosine * slopes[1, k]
     return slopes
 
 
@@ -120,7 +122,7 @@ def _locate(
     else:
         turn = c / (2.0 * spacing * max(cosine, _LEAST_COSINE))
         slopes = np.zeros((4, 2))
-        slopes[1:, 1] = turn, -turn * sine, turn * cosine
+        slopes[1, 1], slopes[2, 1], slopes[3, 1] = turn, -turn * sine, turn * cosine
         place = np.array([cosine, sine])
     errors = _spread(slopes, of_delays)
     p_AS = np.zeros(axes.shape[0])

@@ -137,6 +137,13 @@ def _outliers(hypothesis: NDArray[Any]) -> NDArray[Any]:
 
 
 @register_jitable
+def _copy(values: NDArray[Any], out: NDArray[Any]) -> None:
+    """An assignment to a slice compiles words about shapes too: seconds of it."""
+    for k in range(len(out)):
+        out[k] = values[k]
+
+
+@register_jitable
 def _predict(track: NDArray[Any], seconds: Any, fade: float, speed_std: float) -> None:
     """Moves a track on in time; its age stays."""
     variance = speed_std**2
@@ -305,7 +312,7 @@ def _follow(
         _correct(moved, found)
         _learn_scatter(moved, squared, 1.0 + sighting[9])
         moved[0] = settings.measurement_age
-        track[:] = moved
+        _copy(moved, track)
     return counts, 0.5 * (found[5] + found[6])
 
 
@@ -353,7 +360,7 @@ def _inherit(
         counts, added = _follow(_track(parent), candidate, settings)
         if counts and parent[0] + added < cost + step:
             cost, step, history = parent[0], added, k
-            child[:] = parent
+            _copy(parent, child)
     outliers = _outliers(child)
     if step == np.inf:
         if child[1] > 0.0 and _follow(outliers, candidate, settings)[0]:
@@ -363,7 +370,7 @@ def _inherit(
             child[1] = 1.0
         if child[1] < settings.believed_outliers:
             return cost, step, history
-        _track(child)[:] = outliers
+        _copy(outliers, _track(child))
     child[1] = 0.0
     outliers[:] = 0.0
     outliers[0] = NEVER_HEARD_S

@@ -195,9 +195,13 @@ def world_rectangles(
     count = len(sizes) // 2
     rectangles = np.empty((count + 1, 5))
     for k in range(count):
-        rectangles[k, :3] = poses_WO[3 * k : 3 * k + 3]
-        rectangles[k, 3:] = sizes[2 * k : 2 * k + 2]
-    rectangles[count, :3] = pose_WS
+        # An assignment to a slice compiles words about shapes too: seconds of it.
+        for i in range(3):
+            rectangles[k, i] = poses_WO[3 * k + i]
+        for i in range(2):
+            rectangles[k, 3 + i] = sizes[2 * k + i]
+    for i in range(3):
+        rectangles[count, i] = pose_WS[i]
     rectangles[count, 3], rectangles[count, 4] = source_size
     return rectangles
 

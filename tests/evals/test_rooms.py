@@ -2,13 +2,36 @@
 
 from __future__ import annotations
 
-import pytest
+from collections.abc import Iterator
 
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from analysis.hearing import room_trials
 from benchmarks.rooms import ROOMS, SOUNDS, run_task
+from systems.sound.room import room_impulse_responses
 
 pytestmark = pytest.mark.slow
 
 LAYOUTS = 60
+
+
+@pytest.fixture(scope="module", autouse=True)
+def responses_once() -> Iterator[None]:
+    """All sounds are played in the same layouts: most of the time goes to these."""
+    compute = room_impulse_responses
+    known: dict[tuple[object, ...], NDArray[np.float32]] = {}
+
+    def remembered(room, p_WS, p_WM, c, *, images):
+        key = (room.model_dump_json(), p_WS.tobytes(), p_WM.tobytes(), c)
+        if key not in known:
+            known[key] = compute(room, p_WS, p_WM, c, images=images)
+        return known[key]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(room_trials, "room_impulse_responses", remembered)
+        yield
 
 
 @pytest.mark.parametrize("kind", SOUNDS)
