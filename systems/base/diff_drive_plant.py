@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
@@ -18,6 +19,8 @@ from systems.framework.finite import check_finite, check_port
 from systems.framework.parameters import Duration, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step
 
 __all__ = [
     "DiffDrivePlant",
@@ -209,6 +212,75 @@ def _saturate(value, limit):
     return value
 
 
+@register_jitable
+def _velocities(state, numbers):
+    """Velocity in W, m/s and rad/s, and slip of both rims and sideways, m/s."""
+    left, right = numbers.left_rim_m * state[5], numbers.right_rim_m * state[6]
+    v, omega = _rim_twist(left, right, numbers.wheel_separation_m)
+    sideways = 0.0 * v
+    if len(state) > 7:
+        v, sideways, omega = state[7], state[8], state[9]
+    c, s = cos(state[2]), sin(state[2])
+    turn = omega * numbers.wheel_separation_m / 2.0
+    velocity = v * c - sideways * s, v * s + sideways * c, omega
+    radius = numbers.wheel_radius_m
+    slip = radius * state[5] - (v - turn), radius * state[6] - (v + turn), sideways
+    return velocity, slip
+
+
+class PlantStepNumbers(NamedTuple):
+    """What the step of ``DiffDrivePlant`` depends on."""
+
+    derivatives: Any
+    """``derivatives(state, commanded, *of_plant)``."""
+    of_plant: tuple[Any, ...]
+    """``PlantNumbers``, and ``GripNumbers`` with friction."""
+    order: int
+    """Order of the Runge-Kutta steps, 2 or 3."""
+    steps: int
+    """In a tick."""
+    tick_s: float
+    left_rim_m: float
+    right_rim_m: float
+    wheel_radius_m: float
+    wheel_separation_m: float
+
+
+def plant_step(tick, state, inputs, outputs, numbers):
+    """Moves the robot on by one tick, by Drake's explicit Runge-Kutta steps.
+
+    Args:
+        tick: Not used.
+        state: As of ``plant_derivatives`` or ``slipping_derivatives``.
+        inputs: As the input port.
+        outputs: Left as they are: they follow from the state.
+        numbers: ``PlantStepNumbers``.
+    """
+    (commanded,) = inputs
+    h = numbers.tick_s / numbers.steps
+    derivatives, of_plant = numbers.derivatives, numbers.of_plant
+    for _ in range(numbers.steps):
+        k1 = derivatives(state, commanded, *of_plant)
+        if numbers.order == 2:
+            k2 = derivatives(state + h * k1, commanded, *of_plant)
+            change = h * (0.5 * k1 + 0.5 * k2)
+        else:
+            k2 = derivatives(state + 0.5 * h * k1, commanded, *of_plant)
+            k3 = derivatives(state + h * (2.0 * k2 - k1), commanded, *of_plant)
+            change = h * (k1 + 4.0 * k2 + k3) / 6.0
+        for k in range(len(state)):
+            state[k] += change[k]
+
+
+def publish_plant(state, outputs, numbers):
+    """The outputs of ``plant_step``'s state."""
+    pose, velocity, angles, slip = outputs
+    found = _velocities(state, numbers)
+    for k in range(3):
+        pose[k], velocity[k], slip[k] = state[k], found[0][k], found[1][k]
+    angles[0], angles[1] = state[3], state[4]
+
+
 @define_for_scalars("DiffDrivePlant_", __name__)
 def DiffDrivePlant_(T):
     class Impl(LeafSystem_[T]):
@@ -275,6 +347,16 @@ def DiffDrivePlant_(T):
                 self._checked = _checked_slipping
                 self.FACTS = _slipping(self.FACTS)
                 body = 3
+            self._step_numbers = PlantStepNumbers(
+                self._derivatives,
+                tuple(self._numbers),
+                3,
+                1,
+                TICK_S,
+                *self._numbers[:2],
+                self._robot.wheel_radius_m,
+                self._robot.wheel_separation_m,
+            )
             self._initial_pose = tuple(initial_pose)
             check_finite("DiffDrivePlant: initial_pose", self._initial_pose)
             self.set_name("diff_drive_plant")
@@ -324,23 +406,22 @@ def DiffDrivePlant_(T):
 
         def _velocity(self, context, output):
             state = self._state(context).tolist()
-            v, sideways, omega = self._motion(state)
-            c, s = cos(state[2]), sin(state[2])
-            output.SetFromVector([v * c - sideways * s, v * s + sideways * c, omega])
+            output.SetFromVector(_velocities(state, self._step_numbers)[0])
 
-        def _motion(self, state):
-            """Forward and leftward speed, yaw rate."""
-            if self._plant.friction is not None:
-                return state[7:]
-            v, omega = body_twist(state[5:7], self._robot, self._plant.slip)
-            return v, 0.0 * v, omega
+        def step_for(self, run):
+            """What the block does in each tick of a compiled loop, ``Step``."""
+            numbers = self._step_numbers._replace(
+                order=run.order,
+                steps=math.ceil(run.tick_s / run.step_s - 1e-9),
+                tick_s=run.tick_s,
+            )
+            at_rest = [0.0] * (7 if self._plant.friction is not None else 4)
+            state = [*self._initial_pose, *at_rest]
+            return Step(plant_step, numbers, state, publish_plant)
 
         def _slip(self, context, output):
             state = self._state(context).tolist()
-            v, sideways, omega = self._motion(state)
-            turn = omega * self._robot.wheel_separation_m / 2.0
-            left, right = (self._robot.wheel_radius_m * speed for speed in state[5:7])
-            output.SetFromVector([left - (v - turn), right - (v + turn), sideways])
+            output.SetFromVector(_velocities(state, self._step_numbers)[1])
 
         def _angles(self, context, output):
             output.SetFromVector(self._state(context)[3:5])

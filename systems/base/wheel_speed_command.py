@@ -215,6 +215,10 @@ class _WheelCommand:
             period_sec=tick_s, offset_sec=0.0, update=self._update
         )
 
+    def step_for(self, run):
+        """What the block does in each tick of a compiled loop, ``Step``."""
+        return self.step
+
     def _update(self, context, discrete_state):
         inputs, state = read_lists(context, self._inputs), []
         for group in (_V_WP, _WHEEL_SPEEDS):

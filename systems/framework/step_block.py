@@ -16,7 +16,7 @@ from systems.framework.finite import read_lists
 from systems.framework.parameters import Parameters
 from systems.framework.scalar_math import float_of
 
-__all__ = ["Step", "StepBlock", "compiled_numbers"]
+__all__ = ["RunFacts", "Step", "StepBlock", "compiled_numbers"]
 
 
 class Step(NamedTuple):
@@ -37,6 +37,22 @@ class Step(NamedTuple):
     publish: Callable[..., None] | None = None
     """``publish(state, outputs, numbers)`` fills the outputs of a block that has them
     in its state alone; the step then leaves them."""
+
+
+class RunFacts(NamedTuple):
+    """What a compiled loop runs, for blocks whose step depends on it.
+
+    A block joins compiled loops by ``step_for(run)``, which gives its ``Step``.
+    """
+
+    ticks: int
+    tick_s: float
+    initial_pose: tuple[float, float, float]
+    """Of the robot in W, m and rad."""
+    order: int
+    """Of the Runge-Kutta steps, 2 or 3."""
+    step_s: float
+    """Largest step of the integrator, s."""
 
 
 @cache
@@ -126,6 +142,11 @@ class StepBlock:
                 calc=calc,
                 prerequisites_of_calc={self._done.ticket()},
             )
+
+    def step_for(self: Any, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        step: Step = self.step
+        return step
 
     def _do_step(self: Any, context: Any) -> tuple[Any, Any]:
         """Outputs, and the state of the next tick."""

@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
 from pydrake.math import atan2
 from pydrake.systems.framework import LeafSystem_
 
@@ -16,6 +20,7 @@ from systems.framework.parameters import Length, NonNegative, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step
 from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
@@ -40,6 +45,7 @@ class IdealHearingParameters(Parameters):
     """A source beyond it is not heard, m."""
 
 
+@register_jitable
 def relative_position(pose_WB, pose_WS, control_point_m):
     """The source as seen from the robot; floats or AutoDiffXd.
 
@@ -53,6 +59,100 @@ def relative_position(pose_WB, pose_WS, control_point_m):
     """
     x_P, y_P = control_point(pose_WB, control_point_m)
     return rotate(-pose_WB[2], pose_WS[0] - x_P, pose_WS[1] - y_P)
+
+
+@register_jitable
+def disturbed(x, y, numbers, hearing):
+    """A position with the noise of bearing and range.
+
+    Args:
+        x: Of p_PS_B, m.
+        y: The same, m.
+        numbers: Two standard normal numbers.
+        hearing: ``IdealHearingParameters``.
+
+    Returns:
+        x and y, m.
+    """
+    bearing = math.atan2(y, x) + numbers[0] * math.radians(hearing.bearing_noise_deg)
+    factor = 1.0 + numbers[1] * hearing.range_noise_fraction
+    distance = math.hypot(x, y) * max(factor, 0.0)
+    return distance * math.cos(bearing), distance * math.sin(bearing)
+
+
+@register_jitable
+def stated_covariance(x, y, hearing):
+    """Covariance of a position for the noise that is set, row by row, m^2.
+
+    Args:
+        x: Of p_PS_B, m; float or AutoDiffXd.
+        y: The same, m.
+        hearing: ``IdealHearingParameters``.
+
+    Returns:
+        xx, xy, yx, yy, m^2.
+    """
+    bearing = atan2(y, x)
+    across = math.radians(hearing.bearing_noise_deg) ** 2 * (x * x + y * y)
+    along = hearing.range_noise_fraction**2 * (x * x + y * y)
+    c, s = cos(bearing), sin(bearing)
+    mixed = (along - across) * c * s
+    return (
+        along * c * c + across * s * s,
+        mixed,
+        mixed,
+        along * s * s + across * c * c,
+    )
+
+
+class IdealSourceNumbers(NamedTuple):
+    """What the step of ``IdealSourceSensor`` depends on."""
+
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    hearing: IdealHearingParameters
+    frame_ticks: int
+    """Ticks from one measurement to the next."""
+    sounds: NDArray[np.bool_]
+    """(n,) whether there is sound, by number of the measurement."""
+    noise: NDArray[np.float64]
+    """(n, 2) standard normal numbers likewise; (0, 2) without noise."""
+
+
+def ideal_source_step(tick, state, inputs, outputs, numbers):
+    """What is heard at one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: x and y of p_PS_B, m, and whether anything is heard.
+        inputs: As the input ports.
+        outputs: Left as they are: they follow from the state.
+        numbers: ``IdealSourceNumbers``.
+    """
+    if tick % numbers.frame_ticks != 0:
+        return
+    frame = tick // numbers.frame_ticks
+    pose_WB, pose_WS = inputs
+    hearing = numbers.hearing
+    x, y = relative_position(pose_WB, pose_WS, numbers.control_point_m)
+    heard = numbers.sounds[frame] and safe_norm(x, y) <= hearing.maximum_range_m
+    if len(numbers.noise) > 0:
+        x, y = disturbed(x, y, numbers.noise[frame], hearing)
+    state[0], state[1], state[2] = 0.0, 0.0, 0.0
+    if heard:
+        state[0], state[1], state[2] = x, y, 1.0
+
+
+def publish_ideal_source(state, outputs, numbers):
+    """The outputs of ``ideal_source_step``'s state."""
+    bearing, distance, p_PS_B, covariance, detected, range_valid = outputs
+    x, y = state[0], state[1]
+    bearing[0], distance[0] = math.atan2(y, x), safe_norm(x, y)
+    p_PS_B[0], p_PS_B[1] = x, y
+    stated = stated_covariance(x, y, numbers.hearing)
+    for k in range(4):
+        covariance[k] = stated[k]
+    detected[0] = range_valid[0] = state[2]
 
 
 @define_for_scalars("IdealSourceSensor_", __name__)
@@ -187,15 +287,30 @@ def IdealSourceSensor_(T):
             discrete_state.set_value(self._position, [x, y])
             discrete_state.set_value(self._detected, [T(float(heard))])
 
-        def _disturbed(self, x, y, tick):
-            rng = tick_generator(self._config["seed"], tick)
-            bearing_noise, range_noise = rng.standard_normal(2).tolist()
-            bearing = math.atan2(y, x) + bearing_noise * math.radians(
-                self._hearing.bearing_noise_deg
+        def _disturbed(self, x, y, frame):
+            rng = tick_generator(self._config["seed"], frame)
+            return disturbed(x, y, rng.standard_normal(2).tolist(), self._hearing)
+
+        def step_for(self, run):
+            """What the block does in each tick of a compiled loop, ``Step``."""
+            frame_s, seed = self._config["frame_s"], self._config["seed"]
+            frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
+            sounds = np.ones(len(frames), dtype=bool)
+            if self._hearing.burst_gaps:
+                sounds = self._config["sound"].sounds((frames - 0.5) * frame_s)
+            noise = np.empty((0, 2))
+            if self._noisy:
+                noise = np.array(
+                    [tick_generator(seed, k).standard_normal(2) for k in frames]
+                )
+            numbers = IdealSourceNumbers(
+                self._config["robot"].control_point_m,
+                self._hearing,
+                round(frame_s / run.tick_s),
+                sounds,
+                noise,
             )
-            factor = 1.0 + range_noise * self._hearing.range_noise_fraction
-            distance = math.hypot(x, y) * max(factor, 0.0)
-            return distance * math.cos(bearing), distance * math.sin(bearing)
+            return Step(ideal_source_step, numbers, [0.0] * 3, publish_ideal_source)
 
         def _bearing(self, context, output):
             x, y = self._state(context)
@@ -207,21 +322,7 @@ def IdealSourceSensor_(T):
 
         def _covariance(self, context, output):
             x, y = self._state(context)
-            bearing = atan2(y, x)
-            across = math.radians(self._hearing.bearing_noise_deg) ** 2 * (
-                x * x + y * y
-            )
-            along = self._hearing.range_noise_fraction**2 * (x * x + y * y)
-            c, s = cos(bearing), sin(bearing)
-            mixed = (along - across) * c * s
-            output.SetFromVector(
-                [
-                    along * c * c + across * s * s,
-                    mixed,
-                    mixed,
-                    along * s * s + across * c * c,
-                ]
-            )
+            output.SetFromVector(stated_covariance(x, y, self._hearing))
 
     return Impl
 

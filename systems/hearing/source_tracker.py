@@ -161,6 +161,11 @@ def SourceTracker_(T):
         def _construct_copy(self, other, converter=None):
             Impl._construct(self, **other._config, converter=converter)
 
+        def step_for(self, run):
+            """What the block does in each tick of a compiled loop, ``Step``."""
+            pose = run.initial_pose
+            return self._model.step(pose, self._frame_ticks, self._maximum_age)
+
         def _start(self, context, discrete_state):
             track = self._model.start(*read_arrays(context, self._inputs[-1:]))
             discrete_state.set_value(0, track.pack())

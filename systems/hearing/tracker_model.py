@@ -20,6 +20,7 @@ from systems.framework.parameters import (
     Speed,
 )
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step
 from systems.hearing.target_filter import (
     HYPOTHESIS,
     TRACK_NAMES,
@@ -213,6 +214,108 @@ def _sighting(
     return pose, np.array([x, y, xx, xy, yy, x_P + dx, y_P + dy, nx, ny, ranged])
 
 
+@register_jitable
+def _held_position(
+    hold: str, chosen: Any, likely: Any, pose_heard: Any, pose: Any
+) -> tuple[Any, Any]:
+    """x and y of the target in W, by the rule of ``hold``.
+
+    Args:
+        hold: See ``TrackerParameters``.
+        chosen: The chosen track, as it was when last heard.
+        likely: The same as it is expected to be now.
+        pose_heard: Of the robot at the moment of the last estimate.
+        pose: Of the robot now.
+    """
+    if hold == "motion":
+        return likely[1], likely[2]
+    if hold == "world":
+        return chosen[1], chosen[2]
+    dx, dy = rotate(
+        pose[2] - pose_heard[2], chosen[1] - pose_heard[0], chosen[2] - pose_heard[1]
+    )
+    return pose[0] + dx, pose[1] + dy
+
+
+@register_jitable
+def _held_covariance(likely: Any, position: Any) -> tuple[Any, Any, Any]:
+    """xx, xy and yy of a target that is held at a position, m^2."""
+    dx, dy = position[0] - likely[1], position[1] - likely[2]
+    return likely[5] + dx * dx, likely[6] + dx * dy, likely[7] + dy * dy
+
+
+class TrackerNumbers(NamedTuple):
+    """What the step of ``SourceTracker`` depends on."""
+
+    hold: str
+    maximum_age_s: float
+    past_ticks: int
+    """Number of past poses that are remembered."""
+    age_ticks: float
+    """Of an estimate when it arrives."""
+    frame_ticks: int
+    """Ticks from one estimate to the next."""
+    microphones: _Microphones
+    settings: FilterSettings
+    older: NDArray[np.float64]
+    """By what the filter's memory grows in a tick."""
+
+
+@njit(cache=True)
+def track_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrackerNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """The target of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: ``Track``.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``TrackerNumbers``.
+    """
+    p_PS_B, covariance, detected, range_valid, pose = inputs
+    position, velocity, covariance_W, age, valid = outputs
+    past, start = 3 * numbers.past_ticks, 3 * numbers.past_ticks + 3
+    pose_heard, memory = state[past:start], state[start:]
+    # An estimate counts once, at the tick after its frame's end.
+    is_new = (tick - 1) % numbers.frame_ticks == 0
+    if detected[0] > 0.5 and is_new:
+        poses = np.empty((numbers.past_ticks + 1, 3))
+        # Element by element: slices would compile words about their shapes.
+        for j in range(3):
+            poses[0, j] = pose[j]
+            for k in range(numbers.past_ticks):
+                poses[k + 1, j] = state[3 * k + j]
+        then, sighting = _sighting(
+            p_PS_B,
+            covariance,
+            range_valid[0],
+            poses,
+            numbers.age_ticks,
+            numbers.microphones,
+        )
+        if fold(memory, sighting, numbers.settings):
+            for j in range(3):
+                pose_heard[j] = then[j]
+    settings = numbers.settings
+    chosen = chosen_track(memory)
+    likely = expected(memory, settings.velocity_fade, settings.speed_std)
+    held = _held_position(numbers.hold, chosen, likely, pose_heard, pose)
+    xx, xy, yy = _held_covariance(likely, held)
+    position[0], position[1] = held
+    velocity[0], velocity[1] = likely[3], likely[4]
+    covariance_W[0], covariance_W[1], covariance_W[2], covariance_W[3] = xx, xy, xy, yy
+    age[0] = chosen[0]
+    valid[0] = 1.0 if chosen[0] <= numbers.maximum_age_s else 0.0
+    for k in range(past - 1, 2, -1):
+        state[k] = state[k - 3]
+    for k in range(3):
+        state[k] = pose[k]
+    for k in range(len(memory)):
+        memory[k] += numbers.older[k]
+
+
 def _of_scalars(memory: NDArray[Any], function: Any) -> Any:
     """A compiled function as it serves the memory's scalars, floats or AutoDiffXd."""
     return function.py_func if memory.dtype.hasobject else function
@@ -309,14 +412,8 @@ class TrackerModel:
         Returns:
             x and y in W, m, by the rule of ``hold``.
         """
-        if self._hold == "motion":
-            return self._expected(track)[1:3]
-        held = chosen_track(track.memory)[1:3]
-        if self._hold == "world":
-            return held
-        x_B, y_B, theta = track.pose_heard
-        dx, dy = rotate(pose[2] - theta, held[0] - x_B, held[1] - y_B)
-        return [pose[0] + dx, pose[1] + dy]
+        chosen, likely = chosen_track(track.memory), self._expected(track)
+        return _held_position(self._hold, chosen, likely, track.pose_heard, pose)
 
     def velocity(self, track: Track) -> Any:
         """Expected velocity of the source in W, (2,) m/s."""
@@ -336,10 +433,31 @@ class TrackerModel:
             xx, xy, yx, yy in W, m^2.
         """
         held = self.position(track, pose)
-        _, x, y, _, _, xx, xy, yy = self._expected(track)[:8]
-        dx, dy = held[0] - x, held[1] - y
-        mixed = xy + dx * dy
-        return [xx + dx * dx, mixed, mixed, yy + dy * dy]
+        xx, xy, yy = _held_covariance(self._expected(track), held)
+        return [xx, xy, xy, yy]
+
+    def step(self, pose: Any, frame_ticks: int, maximum_age_s: float) -> Step:
+        """What ``SourceTracker`` does in a tick, for compiled loops.
+
+        Args:
+            pose: (3,) odometry pose of the robot at the start, m and rad.
+            frame_ticks: Ticks from one estimate to the next.
+            maximum_age_s: An older target is lost, s.
+
+        Returns:
+            The step.
+        """
+        numbers = TrackerNumbers(
+            self._hold,
+            maximum_age_s,
+            self.past_ticks,
+            self._age_ticks,
+            frame_ticks,
+            self._microphones,
+            self._settings,
+            self._tick,
+        )
+        return Step(track_step, numbers, self.start(pose).pack().tolist())
 
     def _expected(self, track: Track) -> Any:
         """The chosen track as it is expected to be now."""

@@ -33,7 +33,7 @@ from systems.framework.parameters import (
     SoundSpeed,
 )
 from systems.framework.signals import TICK_S, whole
-from systems.framework.step_block import Step
+from systems.framework.step_block import RunFacts, Step
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
@@ -444,6 +444,10 @@ class UltrasonicArray(LeafSystem):
             self._round,
             self._tick_s,
         )
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        return self.step
 
     def _read(self, context: Any) -> tuple[Any, Any]:
         """Outputs as they stand now, and the state of the next tick."""
