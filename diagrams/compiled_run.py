@@ -18,7 +18,6 @@ from typing import Any
 
 import numpy as np
 from numba import njit
-from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from diagrams.robot import Parts
@@ -208,7 +207,7 @@ def _loop(steps: Sequence[Step]) -> Any:
     for k, step in enumerate(steps):
         names[f"step_{k}"] = _compilable(step.step)
         names[f"publish_{k}"] = step.publish and _compilable(step.publish)
-    exec("\n".join(lines), names)  # noqa: S102  # of our own making
+    exec("\n".join(lines), names)
     return njit(names["loop"])
 
 

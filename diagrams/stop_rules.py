@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,7 @@ from pydrake.systems.framework import EventStatus
 from diagrams.bodies import Body, LivePath, Surroundings, robot_rectangle
 from diagrams.builder import SoundFollower
 from diagrams.robot import Parts
+from diagrams.run_parameters import StopParameters
 from diagrams.scenario import Scenario
 from systems.world.geometry import (
     control_point,
@@ -141,6 +142,74 @@ class StopRules:
             rules.cause = rules.cause or INTERRUPTED
 
 
+class RuleNumbers(NamedTuple):
+    """What ends a robot's run, but for contacts."""
+
+    stop: StopParameters
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    follow_distance_m: float
+    goal_radius_m: float
+    source_rests: bool
+
+
+#: Causes that ``judge_tick`` finds, by their numbers.
+FOUND = ("", "diverged", "reached", "lost", "stuck")
+
+#: State of ``judge_tick`` before the first tick: time and place of P from which it has
+#: stayed, time of the last valid target, since when P rests in the goal, whether it was
+#: there, ticks since the first detection, and those of them in which P followed.
+UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
+
+
+def judge_tick(time, state, pose, velocity, p_WS, valid, numbers):
+    """Why a run ends at a tick, contacts apart.
+
+    Args:
+        time: s.
+        state: As ``UNJUDGED``, changed.
+        pose: (x, y, theta) of the robot, m and rad.
+        velocity: (vx, vy, omega) of it in W, m/s and rad/s.
+        p_WS: What it follows, m.
+        valid: Whether it has a target.
+        numbers: ``RuleNumbers``.
+
+    Returns:
+        Place of the cause in ``FOUND``; 0 where the run goes on.
+    """
+    stop = numbers.stop
+    x_P, y_P = control_point(pose, numbers.control_point_m)
+    distance = math.hypot(p_WS[0] - x_P, p_WS[1] - y_P)
+    if not distance <= stop.diverged_range_m:
+        return 1
+    in_goal = distance <= numbers.goal_radius_m
+    # What the end of the time is judged by.
+    if in_goal:
+        state[5] = 1.0
+    if valid or state[6] > 0.0:
+        error = abs(distance - numbers.follow_distance_m)
+        state[6] += 1.0
+        if error <= stop.following_band_m:
+            state[7] += 1.0
+    there = numbers.source_rests and in_goal and valid
+    if there:
+        vx, vy = control_point_velocity(pose[2], velocity, numbers.control_point_m)
+        there = math.hypot(vx, vy) < stop.rest_speed_m_s
+    state[4] = min(state[4], time) if there else math.inf
+    if time - state[4] >= stop.rest_time_s - ROUNDING_S:
+        return 2
+    if valid:
+        state[3] = time
+    elif time - state[3] > stop.lost_after_s:
+        return 3
+    # Stuck: P goes nowhere though there is a target, and the goal is elsewhere.
+    moved = math.hypot(x_P - state[1], y_P - state[2]) > stop.stuck_radius_m
+    if not valid or in_goal or moved:
+        state[0], state[1], state[2] = time, x_P, y_P
+        return 0
+    return 4 if time - state[0] >= stop.stuck_after_s else 0
+
+
 @dataclass
 class RobotRules:
     """Why one robot's run ends."""
@@ -155,14 +224,10 @@ class RobotRules:
     _root: Any = None
     _contexts: tuple[Any, Any] = (None, None)
     _now: list[float] = field(default_factory=list)
+    _velocity: list[float] = field(default_factory=list)
     _pose: list[float] | None = None
-    _anchor: tuple[float, float, float] = (0.0, math.inf, math.inf)
     _valid: bool = False
-    _valid_time: float = 0.0
-    _rest_since: float = math.inf
-    _was_in_goal: bool = False
-    _ticks_since_heard: int = 0
-    _following_ticks: int = 0
+    _state: list[float] = field(default_factory=lambda: [*UNJUDGED])
     _time: float = 0.0
 
     def __post_init__(self) -> None:
@@ -173,9 +238,13 @@ class RobotRules:
         self._pose_port = self.parts.port("plant", "pose_WB")
         self._velocity_port = self.parts.port("plant", "velocity_WB")
         self._valid_port = self.parts.port("tracker", "target_valid")
-        self._goal_radius = scenario.goal_radius(moves=not self._source_rests)
-        self._follow_distance = scenario.attraction.follow_distance_m
-        self._offset = scenario.robot.control_point_m
+        self.numbers = RuleNumbers(
+            scenario.stop,
+            scenario.robot.control_point_m,
+            scenario.attraction.follow_distance_m,
+            scenario.goal_radius(moves=not self._source_rests),
+            self._source_rests,
+        )
         # Farther than this from the robot's centre, a body does not touch it.
         size = scenario.size
         self._reach = [
@@ -193,6 +262,7 @@ class RobotRules:
             )
         plant, tracker = self._contexts
         self._now = self._pose_port.Eval(plant).tolist()
+        self._velocity = self._velocity_port.Eval(plant).tolist()
         self._valid = self._valid_port.Eval(tracker)[0] > 0.5
         return self._now
 
@@ -206,7 +276,16 @@ class RobotRules:
         if self.collision is not None:
             self.cause = "collision"
         elif not ended:
-            self.cause = self._judge(time, self._now, places)
+            found = judge_tick(
+                time,
+                self._state,
+                self._now,
+                self._velocity,
+                places[self.surroundings.target],
+                self._valid,
+                self.numbers,
+            )
+            self.cause = FOUND[found]
         self._pose, self._time = self._now, time
 
     def final_cause(self) -> str:
@@ -219,59 +298,12 @@ class RobotRules:
             return "lost"
         if not self._source_rests:
             return "astray"
-        return "unsettled" if self._was_in_goal else "timeout"
+        return "unsettled" if self._state[5] > 0.0 else "timeout"
 
     def _has_followed(self) -> bool:
         share = self.scenario.stop.following_share
-        ticks = self._ticks_since_heard
-        return ticks > 0 and self._following_ticks >= share * ticks
-
-    def _judge(self, time: float, pose: list[float], places: _Places) -> str:
-        stop = self.scenario.stop
-        x_P, y_P = control_point(pose, self._offset)
-        x_S, y_S, _ = places[self.surroundings.target]
-        distance = math.hypot(x_S - x_P, y_S - y_P)
-        if not distance <= stop.diverged_range_m:
-            return "diverged"
-        in_goal = distance <= self._goal_radius
-        self._count(distance, in_goal=in_goal)
-        there = self._source_rests and in_goal and self._valid
-        if self._has_rested(time, pose[2], there=there):
-            return "reached"
-        if self._valid:
-            self._valid_time = time
-        elif time - self._valid_time > stop.lost_after_s:
-            return "lost"
-        away = self._valid and not in_goal
-        return self._find_stuck(time, x_P, y_P, away=away)
-
-    def _has_rested(self, time: float, heading: float, *, there: bool) -> bool:
-        """Whether P has been slow in the goal for long enough."""
-        stop = self.scenario.stop
-        if there:
-            velocity = self._velocity_port.Eval(self._contexts[0]).tolist()
-            v_WP = control_point_velocity(heading, velocity, self._offset)
-            there = math.hypot(*v_WP) < stop.rest_speed_m_s
-        self._rest_since = min(self._rest_since, time) if there else math.inf
-        return time - self._rest_since >= stop.rest_time_s - ROUNDING_S
-
-    def _count(self, distance: float, *, in_goal: bool) -> None:
-        """What the end of the time is judged by."""
-        self._was_in_goal |= in_goal
-        if self._valid or self._ticks_since_heard:
-            error = abs(distance - self._follow_distance)
-            following = error <= self.scenario.stop.following_band_m
-            self._ticks_since_heard += 1
-            self._following_ticks += following
-
-    def _find_stuck(self, time: float, x_P: float, y_P: float, *, away: bool) -> str:
-        """Stuck: P goes nowhere though there is a target, and the goal is elsewhere."""
-        stop = self.scenario.stop
-        then, x, y = self._anchor
-        if not away or math.hypot(x_P - x, y_P - y) > stop.stuck_radius_m:
-            self._anchor = (time, x_P, y_P)
-            return ""
-        return "stuck" if time - then >= stop.stuck_after_s else ""
+        *_, ticks, following_ticks = self._state
+        return ticks > 0.0 and following_ticks >= share * ticks
 
     def _find_collision(self, time: float, places: _Places) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""

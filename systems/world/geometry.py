@@ -87,6 +87,7 @@ def control_point(pose: Any, offset: float) -> tuple[Any, Any]:
     return x + offset * cos(theta), y + offset * sin(theta)
 
 
+@register_jitable
 def control_point_velocity(theta: Any, velocity: Any, offset: float) -> tuple[Any, Any]:
     """Velocity v_WP of the control point of a body, m/s.
 
