@@ -25,8 +25,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import binary_propagation
 
-from analysis.certificates.escape_levels import border_cells, cell_bounds, climb, flood
+from analysis.certificates.escape_levels import border_cells, cell_bounds, climb
 from analysis.models.point_mass import PointMass, VelocityTermModel, point_mass
 from analysis.nonlinear.velocity_passivity import (
     VelocityTermPassivity,
@@ -206,8 +207,8 @@ def certify_energy(
     escape = np.array([climb(lower, seed, blocked) for seed in seeds]) - 1e-6
     strong = (escape - upper > model.top_kinetic_energy_j) & ~border
     reached = [
-        flood(np.isfinite(seed), wall | blocked)
-        for seed, wall in zip(seeds, strong, strict=True)
+        binary_propagation(np.isfinite(seed) & way, np.ones((3, 3)), mask=way)
+        for seed, way in zip(seeds, ~(strong | blocked), strict=True)
     ]
     return EnergyCertificate(
         scenario=scenario,

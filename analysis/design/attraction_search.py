@@ -15,7 +15,7 @@ from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.linear.contact_mode import contact_matrix
-from analysis.models.ideal_loop import ideal_scenario
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulate
 from systems.framework.input_error import InputError
@@ -127,19 +127,15 @@ def braking_overshoot(scenario: Scenario) -> float:
 
     P comes at top speed; no obstacle, exact hearing, no avoidance.
     """
-    attraction = scenario.attraction.model_copy(
-        update={"follow_distance_m": _STAND_OFF_M}
-    )
     changes = {
         "law": "none",
         "duration_s": 15.0,
         "obstacles": (),
-        "start": {},
-        "attraction": attraction.model_dump(),
-        "source": scenario.source.model_dump() | {"waypoints_m": [[_APPROACH_M, 0.0]]},
+        "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
+        "attraction": {"follow_distance_m": _STAND_OFF_M},
+        "source": {"waypoints_m": [[_APPROACH_M, 0.0]]},
     }
-    data = ideal_scenario(scenario).model_dump() | changes
-    run = simulate(Scenario.model_validate(data))
+    run = simulate(changed(ideal_scenario(scenario), changes))
     return max(0.0, _STAND_OFF_M - float(run.columns["source_range_true"].min()))
 
 

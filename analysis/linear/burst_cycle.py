@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
+from analysis.models.ideal_scenarios import changed
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
@@ -153,11 +154,12 @@ def burst_cycle(
 
 
 def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Scenario:
-    data = scenario.model_dump()
-    data["tracker"] |= {"hold": hold, "maximum_age_s": max(6.0, 3.0 * period)}
-    data["ideal_hearing"] |= {"burst_gaps": True}
-    data["sound"] |= {"on_s": on, "period_s": period, "start_s": 0.0}
-    return Scenario.model_validate(data)
+    changes = {
+        "tracker": {"hold": hold, "maximum_age_s": max(6.0, 3.0 * period)},
+        "ideal_hearing": {"burst_gaps": True},
+        "sound": {"on_s": on, "period_s": period, "start_s": 0.0},
+    }
+    return changed(scenario, changes)
 
 
 def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.float64]:

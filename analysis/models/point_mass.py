@@ -126,7 +126,7 @@ class PointMass:
             (n, 2) in W, N.
         """
         states = np.ascontiguousarray(states, dtype=float)
-        return kernels.forces(states, *self._numbers(term))
+        return kernels.forces(states, self._world(term))
 
     def run(
         self,
@@ -153,7 +153,7 @@ class PointMass:
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
         times, closest, rises, ends = kernels.run(
-            starts, steps, STEP_S, contact_m, *self._numbers(term)
+            starts, steps, STEP_S, contact_m, self._world(term)
         )
         return PointMassRuns(starts, times, closest, rises, ends)
 
@@ -172,9 +172,9 @@ class PointMass:
         """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
-        return kernels.trajectory(start, steps, STEP_S, *self._numbers(term))
+        return kernels.trajectory(start, steps, STEP_S, self._world(term))
 
-    def _numbers(self, term: VelocityTermModel) -> tuple[Any, ...]:
+    def _world(self, term: VelocityTermModel) -> tuple[Any, ...]:
         gains = (
             self.stiffness_n_m,
             self.damping_n_s_m,
