@@ -26,9 +26,9 @@ from analysis.hearing.free_field import Loudspeaker
 from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from systems.base.robot import RobotParameters
+from systems.framework.signals import FRAME_SAMPLES
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.sound.array_shape import ArrayShape
-from systems.sound.mic_array import FRAME_SAMPLES
 
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)

@@ -26,7 +26,7 @@ from analysis.hearing.paper_tables import PAPER_CELLS
 from analysis.reporting.markdown import markdown_table
 from benchmarks.figures import stay_on_one_core
 from benchmarks.peer_estimators import SHAPE, C, Frame, estimators
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S
 
 SNR_DB = 20.0
 
@@ -73,7 +73,7 @@ def frames(
         bound = position_bound(
             loudspeaker.energy,
             begin,
-            begin + FRAME_PERIOD_S,
+            begin + TICK_S,
             p_AS,
             SHAPE.p_AM,
             noise_pa,

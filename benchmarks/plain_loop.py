@@ -22,7 +22,7 @@ from systems.base.wheel_speed_command import (
     limited_wheel_speeds,
 )
 from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_generator
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
 from systems.hearing.tracker_model import Measurement, Track, TrackerModel
@@ -42,7 +42,7 @@ from systems.world.geometry import control_point, rotate
 
 __all__ = ["PlainLoop"]
 
-T = FRAME_PERIOD_S
+T = TICK_S
 
 
 class PlainLoop:

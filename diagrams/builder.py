@@ -121,6 +121,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
             name,
             bodies=len(scenario.surroundings(name).obstacles),
             others=[each for each in scenario.sounds() if each != target],
+            listeners_frame_s=scenario.longest_frame_s,
             log=log,
         )
     for name, system in (

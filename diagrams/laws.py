@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_code import import_own
+from diagrams.own_code import asked_for, import_own, why
 from diagrams.own_laws import checked_law, try_law
 from diagrams.scenario import Scenario
 from systems import (
@@ -19,6 +19,7 @@ from systems import (
 )
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
+from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Law
 from systems.ranging.collision_vector import SLOTS
@@ -40,10 +41,10 @@ def make_controller(scenario: Scenario) -> Any:
 
     ``package.module:Name`` or ``path/to/file.py:Name`` is a function
     ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
-    a LeafSystem class that takes ``robot``, ``attraction`` and ``repulsion``. Its
-    inputs are output ports of the diagram, by name; it has one of the outputs that
-    ``make_command`` knows. Either is looked up in the working directory, too. A
-    function is tried at a few distances and speeds.
+    a LeafSystem class that may ask for ``robot``, ``attraction``, ``repulsion``,
+    ``sensors`` and ``tick_s``. Its inputs are output ports of the diagram, by name;
+    it has one of the outputs that ``make_command`` knows. Either is looked up in the
+    working directory, too. A function is tried at a few distances and speeds.
 
     Args:
         scenario: Its law, and the parameters of the law's block.
@@ -58,10 +59,12 @@ def make_controller(scenario: Scenario) -> Any:
         "robot": scenario.robot,
         "attraction": scenario.attraction,
         "repulsion": scenario.repulsion,
+        "tick_s": scenario.tick_s,
     }
     sensors = scenario.ultrasonic
     if scenario.obstacle_sensing == "ideal":
-        sensors = sensors.model_copy(update={"firing": "simultaneous"})
+        at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
+        sensors = sensors.model_copy(update=at_once)
     name = scenario.law
     if name in LAWS:
         return _block(LAWS[name], parts | {"sensors": sensors})
@@ -73,7 +76,7 @@ def make_controller(scenario: Scenario) -> Any:
         )
     law = import_own(name, "law")
     if inspect.isclass(law):
-        return _own_block(name, law, parts)
+        return _own_block(name, law, parts | {"sensors": sensors})
     function = checked_law(name, law)
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)
@@ -99,12 +102,12 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
             "law(c, s, repulsion), or derive it from a controller of ours",
         )
     try:
-        block = law(**parts)
+        block = law(**asked_for(law, parts))
     except (Exception, SystemExit) as error:  # whatever it raises
         raise InputError(
             "law",
-            f"{name!r} cannot be built with robot, attraction and repulsion "
-            f"({type(error).__name__}: {error}); mend it",
+            f"{name!r} cannot be made ({why(error)}); it may ask for "
+            f"{', '.join(parts)}",
         ) from error
     _commanded(block, name)
     sizes = _output_sizes(block)
@@ -118,7 +121,9 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
     return block
 
 
-def make_command(controller: Any, robot: RobotParameters) -> Any:
+def make_command(
+    controller: Any, robot: RobotParameters, tick_s: float = TICK_S
+) -> Any:
     """Builds the block that drives the wheels as a controller commands.
 
     Args:
@@ -126,6 +131,7 @@ def make_command(controller: Any, robot: RobotParameters) -> Any:
             P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
             yaw rate, m/s and rad/s).
         robot: Dimensions and limits.
+        tick_s: Period of the command, s.
 
     Returns:
         The block, with an input of that name.
@@ -133,7 +139,8 @@ def make_command(controller: Any, robot: RobotParameters) -> Any:
     Raises:
         InputError: The controller has none of them, or several.
     """
-    return _COMMANDS[_commanded(controller, controller.get_name())](robot=robot)
+    command = _COMMANDS[_commanded(controller, controller.get_name())]
+    return command(robot=robot, tick_s=tick_s)
 
 
 def _commanded(controller: Any, name: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_code import import_own, why
+from diagrams.own_code import asked_for, import_own, why
 from systems.framework.block_facts import BlockFacts
 from systems.framework.input_error import InputError
 
@@ -68,8 +68,7 @@ def make_own_block(name: str, parts: Mapping[str, Any]) -> Any:
             "BlockFacts(part, stage)",
         )
     try:
-        asked = inspect.signature(found).parameters
-        block = found(**{key: parts[key] for key in asked if key in parts})
+        block = found(**asked_for(found, parts))
     except (Exception, SystemExit) as error:
         raise InputError(
             "blocks",

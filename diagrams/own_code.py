@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import importlib
 import importlib.util
+import inspect
 import sys
 import traceback
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from systems.framework.input_error import InputError
 
-__all__ = ["import_own", "own_files", "why"]
+__all__ = ["asked_for", "import_own", "own_files", "why"]
 
 _OURS = ("analysis", "diagrams", "systems")
 
@@ -99,6 +101,22 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
             if isinstance(used, ModuleType):
                 waiting.append(used)
     return tuple(sorted(found.values()))
+
+
+def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Of what a user's class may ask for, that which its arguments name.
+
+    Args:
+        maker: The class; of a scalar-templated one its ``_construct`` tells.
+        parts: What it may ask for, by name.
+
+    Returns:
+        Some of the parts; all, where it takes any keyword.
+    """
+    asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
+    if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
+        return dict(parts)
+    return {key: parts[key] for key in asked if key in parts}
 
 
 def _is_users(module: ModuleType, file: str) -> bool:

@@ -30,7 +30,7 @@ from systems import (
 )
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.laws.impedance import ImpedanceLoop
 from systems.sound.mic_array import microphone_reach
 from systems.sound.waveforms import SoundParameters
@@ -116,6 +116,7 @@ def make_robot(
     *,
     bodies: int = 0,
     others: Sequence[str] = (),
+    listeners_frame_s: float = TICK_S,
     log: bool = False,
 ) -> Diagram:
     """A robot that follows a sound, as a diagram with ports of its own.
@@ -135,6 +136,7 @@ def make_robot(
         name: Of the robot; its random numbers depend on it.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
         others: Names of the sources that are not followed.
+        listeners_frame_s: Longest frame of those that hear its loudspeaker, s.
         log: Whether to log what its blocks name columns for, at every tick.
 
     Returns:
@@ -154,12 +156,13 @@ def make_robot(
             robot=scenario.robot,
             odometry=scenario.odometry,
             initial_pose=scenario.start.pose,
+            tick_s=scenario.tick_s,
         ),
         *_hearing(scenario, name, others),
         _tracker(scenario),
         *_obstacle_sensing(scenario, name, bodies),
         controller,
-        make_command(controller, scenario.robot),
+        make_command(controller, scenario.robot, scenario.tick_s),
     ]
     by_part = with_own_blocks(
         {block_facts(block).part: block for block in ours},
@@ -168,6 +171,7 @@ def make_robot(
             "scenario": scenario,
             "robot": scenario.robot,
             "bodies": bodies,
+            "tick_s": scenario.tick_s,
             "seed": _seed(scenario, "own_block", name),
         },
     )
@@ -179,9 +183,10 @@ def make_robot(
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
     if scenario.loudspeaker is not None:
-        _carry_loudspeaker(builder, scenario, name, plant)
+        emitter = _emitter(scenario, name, scenario.loudspeaker, listeners_frame_s)
+        _carry_loudspeaker(builder, emitter, plant)
     if log:
-        _add_log(builder, blocks)
+        _add_log(builder, blocks, scenario.tick_s)
     diagram = builder.Build()
     diagram.set_name(name)
     return diagram
@@ -209,7 +214,7 @@ def make_source(
     robot = SourceRobot(source=source)
     blocks: list[Any] = [robot]
     if audible:
-        blocks.append(_emitter(scenario, name, source.sound))
+        blocks.append(_emitter(scenario, name, source.sound, scenario.longest_frame_s))
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
@@ -223,12 +228,16 @@ def make_source(
     return diagram
 
 
-def _emitter(scenario: Scenario, name: str, sound: SoundParameters) -> SoundEmitter:
+def _emitter(
+    scenario: Scenario, name: str, sound: SoundParameters, frame_s: float
+) -> SoundEmitter:
     try:
         return SoundEmitter(
             sound=sound,
             acoustics=scenario.acoustics,
             maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
+            frame_s=frame_s,
+            tick_s=scenario.tick_s,
             seed=_seed(scenario, "sound_emitter", name),
         )
     except InputError as error:
@@ -244,12 +253,8 @@ def _emitter(scenario: Scenario, name: str, sound: SoundParameters) -> SoundEmit
         raise InputError(f"{group}{field}", error.message) from None
 
 
-def _carry_loudspeaker(
-    builder: DiagramBuilder, scenario: Scenario, name: str, plant: Any
-) -> None:
+def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> None:
     """The robot's own loudspeaker stands where the robot is: W's S is its B."""
-    assert scenario.loudspeaker is not None
-    emitter = _emitter(scenario, name, scenario.loudspeaker)
     builder.AddNamedSystem(emitter.get_name(), emitter)
     for output, entry in (("pose_WB", "pose_WS"), ("velocity_WB", "v_WS")):
         builder.Connect(plant.GetOutputPort(output), emitter.GetInputPort(entry))
@@ -263,6 +268,7 @@ def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
                 robot=scenario.robot,
                 hearing=scenario.ideal_hearing,
                 sound=scenario.sound,
+                frame_s=scenario.microphones.frame_s,
                 seed=_seed(scenario, "ideal_source_sensor", name),
             )
         ]
@@ -280,6 +286,7 @@ def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
             robot=scenario.robot,
             acoustics=scenario.acoustics,
             sound=scenario.sound,
+            microphones=scenario.microphones,
         ),
     ]
 
@@ -289,12 +296,19 @@ def _tracker(scenario: Scenario) -> Any:
 
     It also is what its covariance says, and tells front from back.
     """
-    tracker, age = scenario.tracker, 1.5 * FRAME_PERIOD_S
+    tick, frame = scenario.tick_s, scenario.microphones.frame_s
+    tracker, age = scenario.tracker, tick + 0.5 * frame
     if scenario.hearing == "ideal":
         exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
         tracker = tracker.model_copy(update=exact)
-        age = FRAME_PERIOD_S
-    return SourceTracker(robot=scenario.robot, tracker=tracker, measurement_age_s=age)
+        age = tick
+    return SourceTracker(
+        robot=scenario.robot,
+        tracker=tracker,
+        measurement_age_s=age,
+        frame_s=frame,
+        tick_s=tick,
+    )
 
 
 def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
@@ -316,6 +330,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             parameters=scenario.ultrasonic,
             acoustics=scenario.acoustics,
             seed=_seed(scenario, "ultrasonic_array", name),
+            tick_s=scenario.tick_s,
             **seen,
         ),
         CollisionVector(
@@ -323,6 +338,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             sensors=scenario.ultrasonic,
             robot=scenario.robot,
             initial_pose=scenario.start.pose,
+            tick_s=scenario.tick_s,
         ),
     ]
 
@@ -383,7 +399,7 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
     }
 
 
-def _add_log(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
+def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> None:
     """One sink behind a multiplexer: a third cheaper than a sink a port."""
     ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
     multiplexer = builder.AddNamedSystem(
@@ -392,6 +408,6 @@ def _add_log(builder: DiagramBuilder, blocks: Sequence[Any]) -> None:
     for index, port in enumerate(ports):
         builder.Connect(port, multiplexer.get_input_port(index))
     sink = LogVectorOutput(
-        multiplexer.get_output_port(0), builder, publish_period=FRAME_PERIOD_S
+        multiplexer.get_output_port(0), builder, publish_period=tick_s
     )
     sink.set_name("log")

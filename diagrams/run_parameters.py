@@ -71,7 +71,7 @@ class RunParameters(Parameters):
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""
     tick_s: Period = TICK_S
-    """Period of control, odometry, sources and log, s; hearing and range sensors have
+    """Period of control, odometry, emitters and log, s; hearing and range sensors have
     periods of their own, multiples of it."""
     duration_s: float = Field(default=40.0, ge=1e-9, le=3_600.0)
     """Longest simulated time, s; an hour at most."""

@@ -23,7 +23,7 @@ __all__ = ["RunResult", "gather_result"]
 
 @dataclass(frozen=True)
 class RunResult:
-    """What a robot did, at every 25 ms tick, and why its run ended.
+    """What a robot did, at every tick, and why its run ended.
 
     Of several robots, what all did: ``robots`` has one of each, the names of
     columns begin with that of the robot and a dot, and the cause is that of the

@@ -73,6 +73,11 @@ class Scenario(FollowerParameters, RunParameters):
                 played[name] = robot.loudspeaker
         return played
 
+    @property
+    def longest_frame_s(self) -> float:
+        """Of all robots' microphones, s."""
+        return max(robot.microphones.frame_s for robot in self.all_robots.values())
+
     def target(self, robot: str) -> str:
         """Name of what a robot follows."""
         return self.all_robots[robot].follows or next(iter(self.all_sources))
@@ -253,21 +258,16 @@ class Scenario(FollowerParameters, RunParameters):
                 f"{tick:g} s is no multiple of {1.0 / SAMPLE_RATE_HZ:g} s, a sample of "
                 "sound; round it",
             )
-        periods = [("room.update_period_s", self.room and self.room.update_period_s)]
+        periods = []
         for prefix, robot in self._robot_fields():
-            frame, rate = robot.microphones.frame_s, robot.microphones.sample_rate_hz
             periods += [
-                (f"{prefix}microphones.frame_s", frame),
+                (f"{prefix}microphones.frame_s", robot.microphones.frame_s),
                 (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
             ]
-            if not whole(frame * rate):
-                raise InputError(
-                    f"{prefix}microphones.sample_rate_hz",
-                    f"{rate:g} Hz gives {frame * rate:.4f} samples in a frame of "
-                    f"{frame:g} s; use {round(frame * rate) / frame:g}",
-                )
+            if self.room and robot.hearing == "audio":
+                self.room.update_frames(robot.microphones.frame_s)
         for field, period in periods:
-            if period and not whole(period / tick):
+            if not whole(period / tick):
                 ticks = max(1, round(period / tick))
                 raise InputError(
                     field,

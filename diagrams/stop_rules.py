@@ -15,7 +15,6 @@ from diagrams.bodies import Body, LivePath, Surroundings, robot_rectangle
 from diagrams.builder import SoundFollower
 from diagrams.robot import Parts
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.world.geometry import (
     control_point,
     control_point_velocity,
@@ -105,7 +104,7 @@ class StopRules:
             )
             for name, parts in follower.robots.items()
         }
-        self._tick = -1
+        self._tick, self._tick_s = -1, scenario.tick_s
 
     @property
     def cause(self) -> str:
@@ -123,8 +122,8 @@ class StopRules:
     def __call__(self, context: Any) -> EventStatus:
         """Called after every step of the simulator, which may be finer than ticks."""
         time = context.get_time()
-        tick = round(time / FRAME_PERIOD_S)
-        if tick == self._tick or abs(time - tick * FRAME_PERIOD_S) > ROUNDING_S:
+        tick = round(time / self._tick_s)
+        if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
             return _GO_ON
         self._tick = tick
         poses = {n: rules.look(context) for n, rules in self.robots.items()}
@@ -312,5 +311,5 @@ class RobotRules:
         """The robot's rectangle between the last tick and this one."""
         now = np.array(pose)
         before = now if self._pose is None else np.array(self._pose)
-        part = (instant - self._time) / max(time - self._time, FRAME_PERIOD_S)
+        part = (instant - self._time) / max(time - self._time, self.scenario.tick_s)
         return robot_rectangle(before + part * (now - before), self.scenario.robot)

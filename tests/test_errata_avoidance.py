@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from systems.base.robot import RobotParameters
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.laws.active_impedance_2017_controller import (
     Active2017Parameters,
     active_2017_force,
@@ -172,7 +172,7 @@ def test_han_eq_16_measures_from_the_origin_of_the_world() -> None:
         {},
         lambda c, s: conventional_force(c, s, CONVENTIONAL),
         "printed",
-        FRAME_PERIOD_S,
+        TICK_S,
     )
     assert force == pytest.approx((-4.8, 0.0))
 

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from systems.delays.delay_search import amdf
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission
 from systems.hearing.near_field import source_from_delays
 from systems.sound.propagation import propagate
 
@@ -49,13 +49,13 @@ def test_han_pressure_falls_with_the_distance_not_its_square() -> None:
         samples=np.sin(2.0 * np.pi * 1000.0 * time).astype(np.float32),
         start_time=time[0],
         sample_rate_hz=SAMPLE_RATE_HZ,
-        knot_times=np.array([time[0], FRAME_PERIOD_S]),
+        knot_times=np.array([time[0], TICK_S]),
         p_WS=np.zeros((2, 2)),
         v_WS=np.zeros((2, 2)),
         level_pa=math.sqrt(0.5),
         sounding=True,
     )
-    instants = np.tile(np.linspace(0.0, FRAME_PERIOD_S, 11), (2, 1))
+    instants = np.tile(np.linspace(0.0, TICK_S, 11), (2, 1))
     p_WM = np.zeros((2, 11, 2))
     p_WM[0, :, 0], p_WM[1, :, 0] = 1.0, 2.0
     heard = propagate(emission, instants, p_WM, 0.0 * p_WM, 2500, SPEED)

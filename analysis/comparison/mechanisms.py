@@ -7,13 +7,13 @@ import pandas as pd
 
 from analysis.runs.run_table import column
 from diagrams.stop_rules import SUCCESSFUL
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 __all__ = ["failure_mechanisms"]
 
 #: A body without an echo for so long before the contact was out of sight, s: none
 #: at the last tick.
-OUT_OF_SIGHT_S = 1.5 * FRAME_PERIOD_S
+OUT_OF_SIGHT_S = 1.5 * TICK_S
 #: A body first heard of so shortly before the contact was heard late, s: from top
 #: speed at 0.72 m/s, less than 0.72 m.
 LATE_S = 1.0

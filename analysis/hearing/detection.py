@@ -10,10 +10,9 @@ import numpy as np
 
 from analysis.hearing.free_field import Loudspeaker
 from systems.framework.noise import tick_generator
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import FRAME_SAMPLES, TICK_S
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.sound.array_shape import ArrayShape
-from systems.sound.mic_array import FRAME_SAMPLES
 
 __all__ = ["DetectionPoint", "FalseAlarms", "detection_curve", "false_alarms"]
 
@@ -123,7 +122,7 @@ def detection_curve(
             rng = tick_generator(seed, trial)
             bearing = rng.uniform(-math.pi / 3.0, math.pi / 3.0)
             p_AS = range_m * np.array([math.cos(bearing), math.sin(bearing)])
-            begin = rng.uniform(0.1, loudspeaker.seconds - 2.0 * FRAME_PERIOD_S)
+            begin = rng.uniform(0.1, loudspeaker.seconds - 2.0 * TICK_S)
             frame = loudspeaker.pressure(begin, p_AS, shape.p_AM, c)
             frame += noise_pa * rng.standard_normal(frame.shape, dtype=np.float32)
             fix, _ = localiser.localise(frame, memory)

@@ -22,12 +22,16 @@ from analysis.hearing.estimation_errors import (
     rms_ratio,
     stated_ratio,
 )
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, Emission
+from systems.framework.signals import (
+    FRAME_SAMPLES,
+    SAMPLE_RATE_HZ,
+    TICK_S,
+    Emission,
+)
 from systems.hearing.localise import Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.array_shape import ArrayShape
-from systems.sound.mic_array import FRAME_SAMPLES
 from systems.sound.propagation import propagate
 from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
 
@@ -134,7 +138,7 @@ class Loudspeaker:
             sounding=True,
         )
         begins = np.broadcast_to(begin, len(p_AM))
-        times = np.stack((begins, begins + FRAME_PERIOD_S), axis=1)
+        times = np.stack((begins, begins + TICK_S), axis=1)
         p_WM = np.repeat(p_AM[:, None, :], 2, axis=1)
         return propagate(emission, times, p_WM, np.zeros(p_WM.shape), FRAME_SAMPLES, c)
 
@@ -263,7 +267,7 @@ def run_cell(
             position_bound(
                 loudspeaker.energy,
                 begin,
-                begin + FRAME_PERIOD_S,
+                begin + TICK_S,
                 p_AS,
                 shape.p_AM,
                 math.hypot(noise_pa, rounding_pa),

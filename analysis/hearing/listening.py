@@ -14,7 +14,7 @@ from diagrams import Scenario, build_sound_follower, make_simulator
 from diagrams.robot import block_seed
 from systems import MicArray
 from systems.framework.noise import tick_generator
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.array_shape import ArrayShape
 from systems.sound.array_tolerances import draw_tolerances
 from systems.sound.mic_array import microphones_B
@@ -60,6 +60,7 @@ class Listener:
 
     def __init__(self, scenario: Scenario) -> None:
         self._scenario = scenario
+        self._frame_s = scenario.microphones.frame_s
         self._follower = build_sound_follower(scenario)
         seed = block_seed(scenario.seed, "sound_emitter")
         self._waveform = make_waveform(scenario.sound, seed)
@@ -93,25 +94,25 @@ class Listener:
         start = session * (trials + 4 * _LEAD)
         simulator = make_simulator(self._follower)
         root = simulator.get_mutable_context()
-        root.SetTime(start * FRAME_PERIOD_S)
+        root.SetTime(start * self._frame_s)
         self._place_robot(root, p_AS)
         simulator.Initialize()
         rows = []
-        for tick in range(start, start + _LEAD + trials):
-            self._redraw_errors(root, tick, sound_speed_tolerance)
-            # The update at this tick, of the frame that ends now, comes first.
-            simulator.AdvanceTo((tick + 1) * FRAME_PERIOD_S)
+        for frame in range(start, start + _LEAD + trials):
+            self._redraw_errors(root, frame, sound_speed_tolerance)
+            # The update at this instant, of the frame that ends now, comes first.
+            simulator.AdvanceTo((frame + 1) * self._frame_s)
             rows.append(self._read(root))
         heard, ranged, bearings, ranges = np.asarray(rows[_LEAD:]).T
         heard, ranged = heard > 0.5, ranged > 0.5
         directions = np.stack((np.cos(bearings), np.sin(bearings)), axis=1)
-        ticks = start + _LEAD + np.arange(trials, dtype=float)
+        frames = start + _LEAD + np.arange(trials, dtype=float)
         return Heard(
             p_AS=p_AS,
             bearings=bearings[heard],
             ranges=ranges[ranged],
             positions=(ranges[:, None] * directions)[ranged],
-            bound=self._bound(p_AS, ticks * FRAME_PERIOD_S),
+            bound=self._bound(p_AS, frames * self._frame_s),
         )
 
     def _place_robot(self, root: Any, p_AS: NDArray[np.float64]) -> None:
@@ -123,9 +124,9 @@ class Listener:
         at_rest = np.zeros(plant.num_continuous_states() - len(p_WB))
         plant.SetContinuousState([*p_WB, *at_rest])
 
-    def _redraw_errors(self, root: Any, tick: int, speed_tolerance: float) -> None:
+    def _redraw_errors(self, root: Any, frame: int, speed_tolerance: float) -> None:
         scenario = self._scenario
-        rng = tick_generator(block_seed(scenario.seed, "array_errors"), tick)
+        rng = tick_generator(block_seed(scenario.seed, "array_errors"), frame)
         errors = draw_tolerances(scenario.microphones, self.shape.count, rng)
         speed = 1.0 + speed_tolerance * rng.uniform(-1.0, 1.0)
         microphones = self._follower.blocks["microphones"]
@@ -153,7 +154,7 @@ class Listener:
         """Of the frames that end then, rms."""
         scenario = self._scenario
         microphones = scenario.microphones
-        first = round((ends[0] - 3 * FRAME_PERIOD_S) * SAMPLE_RATE_HZ)
+        first = round((ends[0] - 3 * self._frame_s) * SAMPLE_RATE_HZ)
         count = round(ends[-1] * SAMPLE_RATE_HZ) - first
         samples = emitted_samples(self._waveform, scenario.sound, first, count)
         assert samples is not None
@@ -163,12 +164,12 @@ class Listener:
         bounds = [
             position_bound(
                 energy,
-                end - FRAME_PERIOD_S,
+                end - self._frame_s,
                 end,
                 p_AS,
                 self.shape.p_AM,
                 math.hypot(noise_pa, rounding_pa),
-                sample_rate_hz=SAMPLE_RATE_HZ,
+                sample_rate_hz=microphones.sample_rate_hz,
                 c=scenario.acoustics.c,
             )
             for end in ends

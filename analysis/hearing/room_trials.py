@@ -19,13 +19,13 @@ from numpy.typing import NDArray
 from analysis.reporting.intervals import Interval, wilson_interval
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S
 from systems.hearing.localise import Localiser
 from systems.hearing.tdoa_estimator import TDOAParameters, port_values, robot_localiser
 from systems.hearing.tracker_model import Measurement, TrackerModel, TrackerParameters
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import MicArrayParameters, convert
-from systems.sound.mic_array import FRAME_SAMPLES, microphones_B
+from systems.sound.mic_array import microphones_B
 from systems.sound.room import RoomParameters, room_images, room_impulse_responses
 from systems.sound.waveforms import SoundParameters, make_waveform
 from systems.world.geometry import rotate
@@ -161,7 +161,7 @@ def locate_bursts(
     tracking = (tracking or TrackerParameters()).model_copy(
         update={"resolve_front_back": False}
     )
-    tracker = TrackerModel(tracking, robot, 1.5 * FRAME_PERIOD_S)
+    tracker = TrackerModel(tracking, robot, 1.5 * TICK_S)
     errors = []
     for k, layout in enumerate(layouts):
         p_WM = _microphones_W(layout.pose_WB, robot)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from analysis.hearing.cramer_rao import polar_gradients
 from analysis.hearing.free_field import Estimator, Loudspeaker
 from analysis.hearing.paper_tables import PaperCell
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.sound.array_shape import ArrayShape
 
 __all__ = [
@@ -140,7 +140,7 @@ def measured_std(
         late = errors.delay_s * rng.standard_normal(shape.count)
         speed = c * (1.0 + errors.sound_speed_share * rng.standard_normal())
         gains = 10.0 ** (errors.gain_db * rng.standard_normal(shape.count) / 20.0)
-        begin = rng.uniform(0.1, loudspeaker.seconds - 0.1 - FRAME_PERIOD_S)
+        begin = rng.uniform(0.1, loudspeaker.seconds - 0.1 - TICK_S)
         pressure = loudspeaker.pressure(begin + late, p_AS, p_AM, speed)
         fix = estimate(pressure * gains[:, None].astype(np.float32))
         if fix is None:

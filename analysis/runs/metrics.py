@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -20,15 +19,14 @@ from analysis.runs.smoothness import (
 )
 from diagrams.simulation import RunResult
 from diagrams.stop_rules import ROUNDING_S
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.world.geometry import control_point_velocity
 
 __all__ = ["following_error", "frames_with_sound", "run_metrics"]
 
 #: A detection is off when it is farther from the source than this, m.
 OUTLIER_M = 0.5
-#: Movements of this many ticks (4 s) have their smoothness measured.
-WINDOW_TICKS = 160
+#: Movements of so long have their smoothness measured, s.
+WINDOW_S = 4.0
 #: A window that is never faster is a rest, not a movement, m/s.
 MOVING_M_S = 0.05
 #: Slower turning is no turning, rad/s.
@@ -168,17 +166,17 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
 
 def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
     """Of the origin of B and of the heading."""
-    columns, rate = result.columns, 1.0 / FRAME_PERIOD_S
+    columns, tick_s = result.columns, result.scenario.tick_s
     velocity = np.stack([columns["v_WB_x"], columns["v_WB_y"]], axis=1)
-    linear = np.hypot(*jerk(velocity, FRAME_PERIOD_S).T)
-    angular = jerk(columns["omega_WB"], FRAME_PERIOD_S)
+    linear = np.hypot(*jerk(velocity, tick_s).T)
+    angular = jerk(columns["omega_WB"], tick_s)
     speed = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
-    movements = windows(speed, WINDOW_TICKS)
+    movements = windows(speed, round(WINDOW_S / tick_s))
     moving = np.max(movements, axis=1, initial=0.0) >= MOVING_M_S
     movements = movements[moving & np.any(np.diff(movements, 2) != 0.0, axis=1)]
-    sparc = spectral_arc_length(movements, rate)
-    ldlj = log_dimensionless_jerk(movements, rate)
-    path = float(np.sum(speed)) * FRAME_PERIOD_S
+    sparc = spectral_arc_length(movements, 1.0 / tick_s)
+    ldlj = log_dimensionless_jerk(movements, 1.0 / tick_s)
+    path = float(np.sum(speed)) * tick_s
     turned = float(np.sum(np.abs(np.diff(columns["theta_WB"]))))
     reversals = turn_reversals(columns["omega_WB"], TURNING_RAD_S)
     duration = result.simulated_s
@@ -205,19 +203,18 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     saturated = np.max(np.abs(wheels), axis=0) >= full * robot.top_wheel_speed
     saturated |= pulling >= full * robot.top_speed_m_s
     return {
-        **_force_metrics(columns),
+        **_force_metrics(result),
         "wheel_variation_m_s2": float(variation)
         * robot.wheel_radius_m
-        / FRAME_PERIOD_S,
+        / result.scenario.tick_s,
         "saturated_fraction": float(np.mean(saturated)),
         "impossible_obstacle_speed_ticks": _impossible_speeds(result),
     }
 
 
-def _force_metrics(
-    columns: Mapping[str, NDArray[np.float64]],
-) -> dict[str, float | None]:
+def _force_metrics(result: RunResult) -> dict[str, float | None]:
     """Of a law that says its forces."""
+    columns = result.columns
     if "repulsion_x" not in columns:
         return {"control_effort_rms_n": None, "push_work_j": None}
     force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
@@ -225,7 +222,7 @@ def _force_metrics(
     push = push + columns["repulsion_y"] * columns["v_WP_y"]
     return {
         "control_effort_rms_n": _rms(np.hypot(*force)),
-        "push_work_j": float(np.sum(push)) * FRAME_PERIOD_S,
+        "push_work_j": float(np.sum(push)) * result.scenario.tick_s,
     }
 
 
@@ -250,7 +247,7 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
     if result.scenario.plant.friction is not None:
         wheels = np.stack([columns["slip_left"], columns["slip_right"]])
         speeds = np.hypot(wheels, columns["slip_sideways"])
-        slip = float(np.sum(np.mean(speeds, axis=0))) * FRAME_PERIOD_S
+        slip = float(np.sum(np.mean(speeds, axis=0))) * result.scenario.tick_s
     return {
         "odometry_error_rms_m": _rms(error),
         "odometry_error_final_m": float(error[-1]),
@@ -294,7 +291,7 @@ def _collision_metrics(result: RunResult) -> dict[str, float | None]:
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:
     """How many frames with sound were heard, and how good the fresh estimates were."""
     columns, sounding = result.columns, frames_with_sound(result)
-    heard = columns["detected"] > 0.5
+    heard = (columns["detected"] > 0.5) & _new_frames(result)
     ranged = heard & (columns["range_valid"] > 0.5)
     error = np.hypot(
         columns["p_WS_estimated_x"] - columns["p_WS_x"],
@@ -313,7 +310,7 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
 
 
 def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether the frame that a tick's estimate is of held sound for half or more.
+    """(n,) whether a tick's estimate is new, and its frame held sound for half or more.
 
     The sound arrives by what it takes for the way, but with ideal hearing, and the
     estimate a tick after the frame's end. The gate tells: a recording's own pauses
@@ -325,11 +322,19 @@ def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
         # The distance as it was at the frame's end, half a frame too late.
         travel[1:] = result.columns["source_range_true"][:-1] / scenario.acoustics.c
     elif not scenario.ideal_hearing.burst_gaps:
-        return time >= 0.5 * FRAME_PERIOD_S
-    sounds: NDArray[np.bool_] = scenario.sound.sounds(
-        time - 1.5 * FRAME_PERIOD_S - travel
-    )
-    return sounds
+        return _new_frames(result) & (time >= 0.5 * scenario.tick_s)
+    middle = scenario.tick_s + 0.5 * scenario.microphones.frame_s
+    sounds: NDArray[np.bool_] = scenario.sound.sounds(time - middle - travel)
+    return _new_frames(result) & sounds
+
+
+def _new_frames(result: RunResult) -> NDArray[np.bool_]:
+    """(n,) whether a tick is the first with the estimate of its frame."""
+    tick_s = result.scenario.tick_s
+    ticks_a_frame = round(result.scenario.microphones.frame_s / tick_s)
+    ticks = np.rint(result.time / tick_s)
+    fresh: NDArray[np.bool_] = (ticks - 1.0) % ticks_a_frame == 0.0
+    return fresh
 
 
 def _least(values: NDArray[np.float64]) -> float | None:

@@ -19,7 +19,6 @@ from analysis.runs import replay_scene
 from analysis.runs.replay_scene import upright
 from analysis.runs.scene import looks, moving_and_static, run_title, sound_bursts
 from diagrams import RunResult, Scenario
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.sound.waveforms import SoundParameters
 
 __all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
@@ -296,7 +295,7 @@ def _record_trail(
     colour: str,
 ) -> None:
     """Pieces that are there from the start and seen once they are driven."""
-    step = round(TRAIL_PIECE_S / FRAME_PERIOD_S)
+    step = max(1, round(TRAIL_PIECE_S / result.scenario.tick_s))
     for number, start in enumerate(range(0, len(points) - 1, step)):
         piece = points[start : start + step + 1]
         if not np.ptp(piece, axis=0).any():

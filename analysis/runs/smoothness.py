@@ -16,8 +16,8 @@ __all__ = [
     "windows",
 ]
 
-#: Samples of the cubic that ``jerk`` fits: 0.25 s at 25 ms.
-JERK_WINDOW = 11
+#: Half of the time over which ``jerk`` fits a cubic, s: 5 samples at 25 ms.
+JERK_HALF_WINDOW_S = 0.125
 #: ``spectral_arc_length``: highest frequency, Hz, and least relative magnitude.
 CUTOFF_HZ = 10.0
 THRESHOLD = 0.05
@@ -26,7 +26,7 @@ PADDING = 4
 
 
 def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
-    """Second derivative of a velocity, of a cubic fitted to 11 samples.
+    """Second derivative of a velocity, of a cubic fitted over 0.25 s.
 
     A least-squares cubic over 0.25 s (a Savitzky-Golay filter) resamples
     nothing and passes slow motion: a sine of 1 Hz comes out 5 % low, of 2 Hz
@@ -37,17 +37,18 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
         period: Interval, s.
 
     Returns:
-        (n - 10,) or (n - 10, k), m/s^3: samples whose window is whole; empty
-        where there are fewer than 11.
+        (m,) or (m, k), m/s^3: samples whose window is whole, 10 fewer than n at 25 ms;
+        empty where there is none.
     """
     velocity = np.asarray(velocity, dtype=float)
-    if len(velocity) < JERK_WINDOW:
+    half = max(2, round(JERK_HALF_WINDOW_S / period))
+    width = 2 * half + 1
+    if len(velocity) < width:
         return np.empty((0, *velocity.shape[1:]))
-    half = JERK_WINDOW // 2
     offsets = np.arange(-half, half + 1) * period
     # The even part of the cubic is a + c t^2, and its second derivative 2 c.
-    c = np.linalg.pinv(np.stack([np.ones(JERK_WINDOW), offsets**2], axis=1))[1]
-    return 2.0 * sliding_window_view(velocity, JERK_WINDOW, axis=0) @ c
+    c = np.linalg.pinv(np.stack([np.ones(width), offsets**2], axis=1))[1]
+    return 2.0 * sliding_window_view(velocity, width, axis=0) @ c
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:

@@ -25,7 +25,7 @@ from analysis.models.operating_points import OperatingPoint, moving_equilibrium
 from analysis.reporting.markdown import markdown_table
 from diagrams import load_scenario
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 __all__ = [
     "contact_rows",
@@ -113,7 +113,7 @@ def _delays(duration_s: float) -> Iterator[Sequence[str]]:
             check = check_delay_margin(point, at, duration_s=duration_s)
             loop, cells = DelayedLoop(point, at), []
             for run in (check.below, check.above):
-                growth = math.log(loop.spectral_radius(run.delay_s)) / FRAME_PERIOD_S
+                growth = math.log(loop.spectral_radius(run.delay_s)) / TICK_S
                 cells.append(f"{growth:+.5f}, {run.growth_per_s:+.5f}")
             yield (
                 law,

@@ -16,7 +16,7 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 __all__ = [
     "OdometryParameters",
@@ -85,15 +85,16 @@ def WheelOdometry_(T):
             - pose_WB_estimated [m, m, rad]
             - velocity_WB_estimated [m/s, m/s, rad/s]
 
-        Discrete state, 25 ms: pose and encoder angles at the last tick. The
+        Discrete state, every tick: pose and encoder angles at the last tick. The
         outputs continue it to the present angles: no latency. The velocity
-        is the mean over the tick in progress (at a tick: the last 25 ms).
+        is the mean over the tick in progress (at a tick: over the last one).
         Slip goes unseen.
 
         Args:
             robot: Wheel radius and separation.
             odometry: ``OdometryParameters``.
             initial_pose: (x, y, theta) at time zero, known.
+            tick_s: Period of the update, s.
 
         Raises:
             InputError: Rounding is on in an AutoDiffXd system.
@@ -119,9 +120,11 @@ def WheelOdometry_(T):
             robot=None,
             odometry=None,
             initial_pose=(0.0, 0.0, 0.0),
+            tick_s=TICK_S,
             converter=None,
         ):
             super().__init__(converter=converter)
+            self._tick_s = tick_s
             self._robot = robot or RobotParameters()
             self._odometry = odometry or OdometryParameters()
             self._initial_pose = tuple(initial_pose)
@@ -136,7 +139,7 @@ def WheelOdometry_(T):
             self._angles = self.DeclareVectorInputPort(name="wheel_angles", size=2)
             self.DeclareDiscreteState([T(v) for v in (*self._initial_pose, 0, 0)])
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+                period_sec=tick_s, offset_sec=0.0, update=self._update
             )
             self._pose, _ = (
                 self.DeclareVectorOutputPort(
@@ -157,6 +160,7 @@ def WheelOdometry_(T):
                 robot=other._robot,
                 odometry=other._odometry,
                 initial_pose=other._initial_pose,
+                tick_s=other._tick_s,
                 converter=converter,
             )
 
@@ -183,9 +187,7 @@ def WheelOdometry_(T):
 
         def _velocity(self, context, output):
             now, held = self._pose.Eval(context), self._held(context)
-            output.SetFromVector(
-                [(now[k] - held[k]) / FRAME_PERIOD_S for k in range(3)]
-            )
+            output.SetFromVector([(now[k] - held[k]) / self._tick_s for k in range(3)])
 
     return Impl
 

@@ -9,7 +9,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
 from systems.framework.scalar_types import define_for_scalars
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.world.geometry import rotate, safe_norm
 
 __all__ = [
@@ -141,7 +141,8 @@ class _WheelCommand:
         states=("v_WP_x", "v_WP_y", "wheel_left", "wheel_right"),
     )
 
-    def _declare_command(self, name, port, robot):
+    def _declare_command(self, name, port, robot, tick_s):
+        self._tick_s = tick_s
         self._robot = robot or RobotParameters()
         self.set_name(name)
         self._inputs = [
@@ -153,7 +154,7 @@ class _WheelCommand:
         self.DeclareStateOutputPort("wheel_speeds", wheel_speeds)
         self.DeclareStateOutputPort("v_WP", v_WP)
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+            period_sec=tick_s, offset_sec=0.0, update=self._update
         )
 
     def _update(self, context, discrete_state):
@@ -182,28 +183,33 @@ def WheelSpeedCommand_(T):
             - wheel_speeds [rad/s, left and right]
             - v_WP [m/s]
 
-        Discrete state, 25 ms: the outputs, a group each.
+        Discrete state, every tick: the outputs, a group each.
         An update at t uses the acceleration at t and acts from t on: from
         echo to wheels 0 ms, from the end of an audio frame to the wheels
-        25 ms (the estimator's tick). Outputs are state; no feedthrough.
+        one tick (the estimator's). Outputs are state; no feedthrough.
 
         Args:
             robot: Dimensions and top speed.
+            tick_s: Period of the command, s.
 
         Reference: ours; the papers do not say how an acceleration becomes
         wheel speeds.
         """
 
-        def _construct(self, *, robot=None, converter=None):
+        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
-            self._declare_command("wheel_speed_command", "acceleration_W", robot)
+            self._declare_command(
+                "wheel_speed_command", "acceleration_W", robot, tick_s
+            )
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(self, robot=other._robot, converter=converter)
+            Impl._construct(
+                self, robot=other._robot, tick_s=other._tick_s, converter=converter
+            )
 
         def _velocity(self, v_WP, acceleration_W, theta):
             top_speed = self._robot.top_speed_m_s
-            return integrate_velocity(v_WP, acceleration_W, FRAME_PERIOD_S, top_speed)
+            return integrate_velocity(v_WP, acceleration_W, self._tick_s, top_speed)
 
     return Impl
 
@@ -229,14 +235,17 @@ def VelocityWheelCommand_(T):
 
         Args:
             robot: Dimensions and top speed.
+            tick_s: Period of the command, s.
         """
 
-        def _construct(self, *, robot=None, converter=None):
+        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
-            self._declare_command("velocity_wheel_command", "velocity_W", robot)
+            self._declare_command("velocity_wheel_command", "velocity_W", robot, tick_s)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(self, robot=other._robot, converter=converter)
+            Impl._construct(
+                self, robot=other._robot, tick_s=other._tick_s, converter=converter
+            )
 
         def _velocity(self, v_WP, velocity_W, theta):
             return clamped_velocity(*velocity_W, self._robot.top_speed_m_s)
@@ -264,14 +273,17 @@ def TwistWheelCommand_(T):
 
         Args:
             robot: Dimensions and top speed.
+            tick_s: Period of the command, s.
         """
 
-        def _construct(self, *, robot=None, converter=None):
+        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
             super().__init__(converter=converter)
-            self._declare_command("twist_wheel_command", "twist_B", robot)
+            self._declare_command("twist_wheel_command", "twist_B", robot, tick_s)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(self, robot=other._robot, converter=converter)
+            Impl._construct(
+                self, robot=other._robot, tick_s=other._tick_s, converter=converter
+            )
 
         def _velocity(self, v_WP, twist_B, theta):
             epsilon = self._robot.control_point_m

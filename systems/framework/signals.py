@@ -18,18 +18,18 @@ __all__ = [
     "whole",
 ]
 
-#: Period of every discrete block (Han 2019, section 4.1; printed "25 m/s").
-FRAME_PERIOD_S = 0.025
-
-#: Period of a robot's control unless a scenario says another, s (Han 2019, section
-#: 4.1; printed "25 m/s").
+#: Period of a robot's control, and of its frames, unless a scenario says another, s
+#: (Han 2019, section 4.1; printed "25 m/s").
 TICK_S = 0.025
 
-#: Rate of the analogue-to-digital converter (Han 2019, section 4.1).
+FRAME_PERIOD_S = TICK_S
+
+#: Rate at which sound is computed, and that of the converter unless its parameters
+#: say another (Han 2019, section 4.1).
 SAMPLE_RATE_HZ = 100_000
 
-#: Samples a channel in a frame.
-FRAME_SAMPLES = round(FRAME_PERIOD_S * SAMPLE_RATE_HZ)
+#: Samples a channel in a frame of a tick at that rate.
+FRAME_SAMPLES = round(TICK_S * SAMPLE_RATE_HZ)
 
 
 def whole(count: float) -> bool:
@@ -74,7 +74,7 @@ class Emission(NamedTuple):
 
 
 class AudioFrame(NamedTuple):
-    """One 25 ms frame of converter counts, covering ``[time - 25 ms, time)``."""
+    """A frame of converter counts, which ends at ``time``."""
 
     counts: NDArray[np.int16]
     """(channels, samples), channels first."""

@@ -15,7 +15,7 @@ from systems.framework.noise import tick_generator
 from systems.framework.parameters import Length, NonNegative, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
@@ -75,7 +75,7 @@ def IdealSourceSensor_(T):
             - range_valid [0 or 1]
 
         Stands in for ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator`` with
-        the outputs of the last. Discrete state, 25 ms: p_PS_B and detected.
+        the outputs of the last. Discrete state, every frame: p_PS_B and detected.
         Latency one tick, like the estimator's, so that both builds have the
         same loop; unlike the estimator it tells front from back.
 
@@ -83,6 +83,7 @@ def IdealSourceSensor_(T):
             robot: Place of P.
             hearing: ``IdealHearingParameters``.
             sound: ``SoundParameters``; its gate says when there is sound.
+            frame_s: Period of the measurements, s.
             seed: Seed of the noise.
 
         Raises:
@@ -106,6 +107,7 @@ def IdealSourceSensor_(T):
             robot=None,
             hearing=None,
             sound=None,
+            frame_s=TICK_S,
             seed=0,
             converter=None,
         ):
@@ -114,6 +116,7 @@ def IdealSourceSensor_(T):
                 "robot": robot or RobotParameters(),
                 "hearing": hearing or IdealHearingParameters(),
                 "sound": sound or SoundParameters(),
+                "frame_s": frame_s,
                 "seed": seed,
             }
             self._hearing = self._config["hearing"]
@@ -135,7 +138,7 @@ def IdealSourceSensor_(T):
             self._position = self.DeclareDiscreteState(2)
             self._detected = self.DeclareDiscreteState(1)
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._measure
+                period_sec=frame_s, offset_sec=0.0, update=self._measure
             )
             self._declare("source_bearing", 1, self._bearing)
             self._declare("source_range", 1, self._range)
@@ -173,11 +176,12 @@ def IdealSourceSensor_(T):
             )
             time = context.get_time()
             time = time if T is float else time.value()
-            heard = self._sounds(time - FRAME_PERIOD_S / 2.0) and bool(
+            frame_s = self._config["frame_s"]
+            heard = self._sounds(time - frame_s / 2.0) and bool(
                 safe_norm(x, y) <= self._hearing.maximum_range_m
             )
             if self._noisy:
-                x, y = self._disturbed(x, y, round(time / FRAME_PERIOD_S))
+                x, y = self._disturbed(x, y, round(time / frame_s))
             if not heard:
                 x = y = T(0.0)
             discrete_state.set_value(self._position, [x, y])

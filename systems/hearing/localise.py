@@ -144,20 +144,31 @@ class Localiser:
         parameters: Method, band and thresholds.
         shape: The microphones.
         c: True speed of sound, m/s.
+        sample_rate_hz: Of the frames, Hz.
+        frame_samples: Of a frame, a channel.
 
     Raises:
         InputError: The array cannot serve at this rate and band.
     """
 
-    def __init__(self, parameters: TDOAParameters, shape: ArrayShape, c: float) -> None:
-        whole = parameters.method == "amdf"
-        self._halved = not whole and parameters.high_hz <= PASSED * SAMPLE_RATE_HZ
+    def __init__(
+        self,
+        parameters: TDOAParameters,
+        shape: ArrayShape,
+        c: float,
+        *,
+        sample_rate_hz: float = SAMPLE_RATE_HZ,
+        frame_samples: int = FRAME_SAMPLES,
+    ) -> None:
+        whole = parameters.method == "amdf" or frame_samples % 2 == 1
+        self._halved = not whole and parameters.high_hz <= PASSED * sample_rate_hz
+        self._sample_rate_hz = sample_rate_hz
         divisor = 2 if self._halved else 1
         plan = DelayPlan(
             shape=shape,
             c=parameters.sound_speed_m_s or c,
-            sample_rate_hz=SAMPLE_RATE_HZ / divisor,
-            frame_samples=FRAME_SAMPLES // divisor,
+            sample_rate_hz=sample_rate_hz / divisor,
+            frame_samples=frame_samples // divisor,
             low_hz=parameters.low_hz,
             high_hz=parameters.high_hz,
         )
@@ -167,15 +178,15 @@ class Localiser:
         band = plan.band.stop - plan.band.start
         self._band_samples = plan.frame_samples * band / plan.length
         channels = plan.shape.count
-        self._frame_shape = (channels, FRAME_SAMPLES)
-        self._scatter = _QUIET * math.sqrt(2.0 / (channels * FRAME_SAMPLES))
+        self._frame_shape = (channels, frame_samples)
+        self._scatter = _QUIET * math.sqrt(2.0 / (channels * frame_samples))
         # Pairs that no source ahead of the centroid is as far from.
         i, j = plan.shape.pairs.T
         from_centre = np.linalg.norm(plan.shape.p_AM, axis=1)
         self._uneven = np.abs(from_centre[i] - from_centre[j]) > _ALIKE_M
         self._all = np.ones(len(i), dtype=bool)
         # Both sides of the spectrum, all channels, all samples.
-        self._frame_share = 2.0 * channels * FRAME_SAMPLES / plan.frame_samples
+        self._frame_share = 2.0 * channels * frame_samples / plan.frame_samples
         # A band that is found may be as narrow as it likes.
         self._weakest = 0.0
         if parameters.band == "set":
@@ -196,7 +207,7 @@ class Localiser:
         """Where the sound of a frame comes from.
 
         Args:
-            frame: (n, FRAME_SAMPLES) channels, any unit; counts will do.
+            frame: (n, samples) channels, any unit; counts will do.
             memory: What the last frame left.
 
         Returns:
@@ -326,7 +337,7 @@ class Localiser:
         """
         shape = self.plan.shape
         # A direction alone may belong to delays that are not its own: none counts too.
-        later = SAMPLE_RATE_HZ * arrival_delays(fix, shape, self.plan.c)
+        later = self._sample_rate_hz * arrival_delays(fix, shape, self.plan.c)
         noisy = memory.energy > 0.0
         at_once = self._all if noisy else self._uneven
         return frame_repeats(frame, shape.pairs, later, at_once, noisy=noisy)

@@ -11,8 +11,9 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
+from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S, whole
 from systems.hearing.tracker_model import (
     Measurement,
     Track,
@@ -21,6 +22,9 @@ from systems.hearing.tracker_model import (
 )
 
 __all__ = ["SourceTracker", "SourceTracker_"]
+
+#: An older estimate would be placed by a pose that nobody remembers, s.
+_OLDEST_S = 2.0
 
 
 @define_for_scalars("SourceTracker_", __name__)
@@ -54,15 +58,23 @@ def SourceTracker_(T):
         or a target older than ``maximum_age_s``: ``target_valid`` is 0, and the
         controllers stop the robot.
 
-        Discrete state, 25 ms: ``Track``. The outputs continue it by the
-        present estimate: no latency.
+        Discrete state, every tick: ``Track``, and where hearing is slower than the
+        tick, ticks since the last frame. The outputs continue it by the present
+        estimate: no latency. A slower hearing's estimate counts once, at the tick
+        after the one at which its frame ends.
 
         Args:
             robot: Place of P, and microphones.
             tracker: ``TrackerParameters``.
             measurement_age_s: From the moment an estimate is valid for to its
-                arrival, s, 0 to 50 ms: a tick for the ideal sensor, a tick
+                arrival, s, at most 2 s: a tick for the ideal sensor, a tick
                 and half a frame for the audio chain.
+            frame_s: Period of the estimates, s.
+            tick_s: Period of the robot, s.
+
+        Raises:
+            InputError: The age cannot be, or the estimates' period is no multiple of
+                the tick.
         """
 
         FACTS = BlockFacts(
@@ -79,22 +91,33 @@ def SourceTracker_(T):
             *,
             robot=None,
             tracker=None,
-            measurement_age_s=FRAME_PERIOD_S,
+            measurement_age_s=TICK_S,
+            frame_s=TICK_S,
+            tick_s=TICK_S,
             converter=None,
         ):
             super().__init__(converter=converter)
-            if not 0.0 <= measurement_age_s <= 2.0 * FRAME_PERIOD_S:
+            if not 0.0 <= measurement_age_s <= _OLDEST_S:
                 raise InputError(
                     "SourceTracker",
                     f"measurement_age_s is {measurement_age_s}; it "
-                    f"must lie between 0 and {2.0 * FRAME_PERIOD_S}",
+                    f"must lie between 0 and {_OLDEST_S}",
+                )
+            if not whole(frame_s / tick_s):
+                raise InputError(
+                    "SourceTracker",
+                    f"frame_s is {frame_s:g}, no multiple of tick_s {tick_s:g}; give "
+                    "one",
                 )
             self._config = {
                 "robot": robot or RobotParameters(),
                 "tracker": tracker or TrackerParameters(),
                 "measurement_age_s": measurement_age_s,
+                "tick_s": tick_s,
             }
             self._model = TrackerModel(**self._config)
+            self._config["frame_s"] = frame_s
+            self._frame_ticks = round(frame_s / tick_s)
             self._maximum_age = self._config["tracker"].maximum_age_s
             self.set_name("source_tracker")
             self._inputs = [
@@ -109,10 +132,14 @@ def SourceTracker_(T):
             ]
             blank = self._model.start([0.0] * 3)
             self.DeclareDiscreteState([T(value) for value in blank.pack()])
-            self.FACTS = replace(self.FACTS, states=blank.names())
+            states = blank.names()
+            if self._frame_ticks > 1:
+                self.DeclareDiscreteState([T(0.0)])
+                states += ("ticks_of_frame",)
+            self.FACTS = replace(self.FACTS, states=states)
             self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._update
+                period_sec=tick_s, offset_sec=0.0, update=self._update
             )
             sources = {port.ticket() for port in self._inputs}
             sources.add(self.xd_ticket())
@@ -136,14 +163,21 @@ def SourceTracker_(T):
 
         def _start(self, context, discrete_state):
             track = self._model.start(*read_arrays(context, self._inputs[-1:]))
-            discrete_state.set_value(track.pack())
+            discrete_state.set_value(0, track.pack())
+
+        def _is_new(self, context):
+            """Whether the estimate is that of a frame that ended at the last tick."""
+            if self._frame_ticks == 1:
+                return True
+            return float_of(context.get_discrete_state(1)[0]) == 1.0
 
         def _track(self, context):
             """The track with the present estimate folded in, and the robot's pose."""
             values = read_arrays(context, self._inputs)
             p_PS_B, covariance, detected, range_valid, pose = values
-            track = Track.unpack(context.get_discrete_state(0).CopyToVector())
-            if detected[0] > 0.5:
+            state = context.get_discrete_state(0).CopyToVector()
+            track = Track.unpack(state, self._model.past_ticks)
+            if detected[0] > 0.5 and self._is_new(context):
                 ranged = bool(range_valid[0] > 0.5)
                 estimate = Measurement(p_PS_B, covariance, ranged)
                 track = self._model.hear(track, estimate, pose)
@@ -151,7 +185,12 @@ def SourceTracker_(T):
 
         def _update(self, context, discrete_state):
             track = self._model.older(*self._now.Eval(context))
-            discrete_state.set_value(track.pack())
+            discrete_state.set_value(0, track.pack())
+            if self._frame_ticks > 1:
+                ticks = context.get_discrete_state(1)[0] + 1.0
+                if float_of(ticks) > self._frame_ticks:
+                    ticks -= self._frame_ticks
+                discrete_state.set_value(1, [ticks])
 
         def _target(self, context, output):
             output.SetFromVector(self._model.position(*self._now.Eval(context)))

@@ -14,10 +14,11 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_record
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ, AudioFrame
+from systems.framework.signals import AudioFrame
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
+from systems.sound.adc import MicArrayParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 from systems.sound.waveforms import SoundParameters
@@ -32,7 +33,10 @@ __all__ = [
 
 
 def robot_localiser(
-    parameters: TDOAParameters, robot: RobotParameters, acoustics: AcousticParameters
+    parameters: TDOAParameters,
+    robot: RobotParameters,
+    acoustics: AcousticParameters,
+    microphones: MicArrayParameters | None = None,
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """The localiser of the robot's own microphones.
 
@@ -40,22 +44,33 @@ def robot_localiser(
         parameters: Of the estimator.
         robot: Places of the microphones.
         acoustics: Speed of sound.
+        microphones: Sample rate and length of the frames.
 
     Returns:
         The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
-    localiser = Localiser(parameters, shape, acoustics.c)
+    microphones = microphones or MicArrayParameters()
+    localiser = Localiser(
+        parameters,
+        shape,
+        acoustics.c,
+        sample_rate_hz=microphones.sample_rate_hz,
+        frame_samples=microphones.frame_samples,
+    )
     return localiser, np.mean(robot.microphones_m, axis=0)
 
 
-def may_sound(sound: SoundParameters, time: float, longest_way: float) -> bool:
+def may_sound(
+    sound: SoundParameters, time: float, longest_way: float, frame_s: float
+) -> bool:
     """Whether a frame can hold direct sound of a source, by its schedule.
 
     Args:
         sound: Its gate.
         time: End of the frame, s.
         longest_way: Longest that sound can take to the microphones, s.
+        frame_s: Length of the frame, s.
 
     Returns:
         False where the frame can only hold noise and reverberation.
@@ -63,7 +78,7 @@ def may_sound(sound: SoundParameters, time: float, longest_way: float) -> bool:
     phase = time - sound.start_s
     # A frame that ends as a burst begins holds none of it.
     since_burst = phase % sound.period_s or sound.period_s
-    open_for = sound.on_s + longest_way + FRAME_PERIOD_S
+    open_for = sound.on_s + longest_way + frame_s
     return phase > 0.0 and since_burst < open_for
 
 
@@ -94,14 +109,16 @@ class TDOAEstimator(LeafSystem):
     microphones' places or of the speed of sound.
 
     State: the outputs, one group a port, and what ``HearingMemory`` holds.
-    Rate and latency: updated every 25 ms from the frame that ends then, and
-    visible after it: one tick, the time that a processor takes.
+    Rate and latency: updated every ``frame_s`` of the microphones, 25 ms, from the
+    frame that ends then, and visible after it: one tick, the time that a processor
+    takes.
 
     Args:
         parameters: Method, band and thresholds.
         robot: Places of the microphones.
         acoustics: Speed of sound.
         sound: What is listened to; its gate is the schedule where that is known.
+        microphones: Sample rate and length of the frames.
 
     Raises:
         InputError: The array cannot serve at this rate and band.
@@ -126,8 +143,10 @@ class TDOAEstimator(LeafSystem):
         robot: RobotParameters | None = None,
         acoustics: AcousticParameters | None = None,
         sound: SoundParameters | None = None,
+        microphones: MicArrayParameters | None = None,
     ) -> None:
         super().__init__()
+        self._microphones = microphones or MicArrayParameters()
         acoustics = acoustics or AcousticParameters()
         self._schedule = None
         if parameters is not None and parameters.schedule_known:
@@ -137,6 +156,7 @@ class TDOAEstimator(LeafSystem):
             parameters or TDOAParameters(),
             robot or RobotParameters(),
             acoustics,
+            self._microphones,
         )
         self.set_name("tdoa_estimator")
         self._audio = self.DeclareAbstractInputPort(
@@ -147,7 +167,7 @@ class TDOAEstimator(LeafSystem):
         self.DeclareDiscreteState(5)
         self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._listen
+            period_sec=self._microphones.frame_s, offset_sec=0.0, update=self._listen
         )
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
@@ -158,16 +178,19 @@ class TDOAEstimator(LeafSystem):
                 "the audio of a MicArray"
             )
         check_record(context, self._audio, audio)
-        if audio.sample_rate_hz != SAMPLE_RATE_HZ:
+        if audio.sample_rate_hz != self._microphones.sample_rate_hz:
             raise InputError(
                 "TDOAEstimator",
                 f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
-                f"record at {SAMPLE_RATE_HZ} Hz",
+                f"record at {self._microphones.sample_rate_hz:g} Hz",
             )
         before, located = self._remembered(context)
         fix, after = self._localiser.localise(audio.counts, before)
         if self._schedule and not may_sound(
-            self._schedule, audio.time, self._longest_way_s
+            self._schedule,
+            audio.time,
+            self._longest_way_s,
+            self._microphones.frame_s,
         ):
             fix = None
         flags = after.echoes is not None, after.heard, fix is not None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from systems.framework.parameters import (
     Parameters,
     Speed,
 )
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.hearing.target_filter import (
     HYPOTHESIS,
     TRACK_NAMES,
@@ -81,29 +82,40 @@ class Measurement(NamedTuple):
 class Track(NamedTuple):
     """The tracker's memory; floats or AutoDiffXd."""
 
-    pose_1: NDArray[Any]
-    """(3,) odometry pose one tick ago."""
-    pose_2: NDArray[Any]
-    """(3,) odometry pose two ticks ago."""
+    past_poses: NDArray[Any]
+    """(n, 3) odometry poses one to n ticks ago."""
     pose_heard: NDArray[Any]
     """(3,) odometry pose of the moment of the last estimate."""
     memory: NDArray[Any]
     """The filter's, see ``systems.hearing.target_filter``."""
 
     @classmethod
-    def unpack(cls, state: NDArray[Any]) -> Track:
-        """From the discrete state's vector, of which these are views."""
-        return cls(state[0:3], state[3:6], state[6:9], state[9:])
+    def unpack(cls, state: NDArray[Any], ticks: int) -> Track:
+        """From the discrete state's vector, of which these are views.
+
+        Args:
+            state: (n,) what ``pack`` gave.
+            ticks: Number of past poses.
+
+        Returns:
+            The track.
+        """
+        heard = 3 * ticks
+        past_poses = state[:heard].reshape(ticks, 3)
+        return cls(past_poses, state[heard : heard + 3], state[heard + 3 :])
 
     def pack(self) -> NDArray[Any]:
         """To the discrete state's vector."""
-        return np.concatenate(self)
+        return np.concatenate((self.past_poses.ravel(), *self[1:]))
 
     def names(self) -> tuple[str, ...]:
         """Of the elements of ``pack``."""
         poses = (
             f"{pose}_{axis}"
-            for pose in ("pose_1", "pose_2", "pose_heard")
+            for pose in (
+                *(f"pose_{k + 1}" for k in range(len(self.past_poses))),
+                "pose_heard",
+            )
             for axis in ("x", "y", "theta")
         )
         memory = (
@@ -125,24 +137,19 @@ class Track(NamedTuple):
 
 
 @register_jitable
-def past_pose(
-    pose_now: NDArray[Any], pose_1: NDArray[Any], pose_2: NDArray[Any], age: Any
-) -> NDArray[Any]:
-    """Odometry pose ``age`` seconds ago, 0 to 50 ms, between ticks by a line.
+def past_pose(poses: NDArray[Any], ticks: float) -> NDArray[Any]:
+    """Odometry pose so many ticks ago, between ticks by a line.
 
     Args:
-        pose_now: (3,) x, y, theta in W, m and rad.
-        pose_1: (3,) a tick ago.
-        pose_2: (3,) two ticks ago.
-        age: s; a number or AutoDiffXd.
+        poses: (n + 1, 3) x, y, theta in W now and at the last n ticks, m and rad;
+            floats or AutoDiffXd.
+        ticks: 0 to n, not whole.
 
     Returns:
         (3,) x, y, theta in W, m and rad.
     """
-    ticks = age / FRAME_PERIOD_S
-    if ticks <= 1.0:
-        return pose_now + ticks * (pose_1 - pose_now)
-    return pose_1 + (ticks - 1.0) * (pose_2 - pose_1)
+    after = max(math.ceil(ticks) - 1, 0)
+    return poses[after] + (ticks - after) * (poses[after + 1] - poses[after])
 
 
 class _Microphones(NamedTuple):
@@ -171,8 +178,8 @@ def _sighting(
     p_PS_B: NDArray[Any],
     covariance: NDArray[Any],
     ranged: float,
-    poses: tuple[NDArray[Any], NDArray[Any], NDArray[Any]],
-    age: float,
+    poses: NDArray[Any],
+    ticks: float,
     microphones: _Microphones,
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """An estimate as the filter takes it; ``.py_func`` takes AutoDiffXd.
@@ -181,15 +188,15 @@ def _sighting(
         p_PS_B: See ``Measurement``.
         covariance: See ``Measurement``.
         ranged: 1 where the range is known, or 0.
-        poses: Of the robot now, one tick and two ticks ago, (3,) each.
-        age: Of the estimate, s.
+        poses: (n + 1, 3) of the robot now and at the last n ticks.
+        ticks: Age of the estimate.
         microphones: ``_Microphones``.
 
     Returns:
         Pose of the robot (3,) at the moment that the estimate is valid for, and
         the sighting (10,) of ``systems.hearing.target_filter``.
     """
-    pose = past_pose(*poses, age)
+    pose = past_pose(poses, ticks)
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x_P = pose[0] + microphones.control_point * c
     y_P = pose[1] + microphones.control_point * s
@@ -219,6 +226,7 @@ class TrackerModel:
         robot: Place of P, and microphones.
         measurement_age_s: From the moment an estimate is valid for to its
             arrival, s.
+        tick_s: Period of the robot, s.
     """
 
     def __init__(
@@ -226,7 +234,11 @@ class TrackerModel:
         tracker: TrackerParameters,
         robot: RobotParameters,
         measurement_age_s: float,
+        tick_s: float = TICK_S,
     ) -> None:
+        self._age_ticks = measurement_age_s / tick_s
+        self.past_ticks = max(2, math.ceil(self._age_ticks))
+        """Number of past poses that a track remembers."""
         self._hold = tracker.hold
         centre_P = np.mean(robot.microphones_m, axis=0).tolist()
         ahead = ArrayShape.of(robot.microphones_m).ahead
@@ -234,7 +246,7 @@ class TrackerModel:
         self._hypotheses = 2 if both else 1
         ahead_B = (1.0, 0.0) if ahead is None else ahead.tolist()
         self._microphones = _Microphones(robot.control_point_m, *centre_P, *ahead_B)
-        self._tick = FRAME_PERIOD_S * ages(self._hypotheses)
+        self._tick = tick_s * ages(self._hypotheses)
         self._settings = FilterSettings(
             speed_std=tracker.source_top_speed_m_s / 2.0,
             velocity_fade=tracker.velocity_fade_s,
@@ -248,7 +260,8 @@ class TrackerModel:
     def start(self, pose: Any) -> Track:
         """Nothing heard yet; before time zero the robot was where it starts."""
         pose = np.asarray(pose)
-        return Track(pose, pose, pose, blank_memory(self._hypotheses))
+        past_poses = np.tile(pose, (self.past_ticks, 1))
+        return Track(past_poses, pose, blank_memory(self._hypotheses))
 
     def hear(self, track: Track, estimate: Measurement, pose: Any) -> Track:
         """The track with an estimate folded in that arrives at ``pose``.
@@ -261,13 +274,12 @@ class TrackerModel:
         Returns:
             A new track; an outlier leaves the pose of the last believed one.
         """
-        poses = np.asarray(pose), track.pose_1, track.pose_2
+        poses = np.vstack((pose, track.past_poses))
         p_PS_B, covariance, ranged = estimate
         memory = track.memory.copy()
-        age = self._settings.measurement_age
         measured = p_PS_B, covariance, float(ranged)
         then, sighting = _of_scalars(memory, _sighting)(
-            *measured, poses, age, self._microphones
+            *measured, poses, self._age_ticks, self._microphones
         )
         believed = _of_scalars(memory, fold)(memory, sighting, self._settings)
         heard = then if believed else track.pose_heard
@@ -281,10 +293,11 @@ class TrackerModel:
             pose: (3,) odometry pose of the robot at this tick, m and rad.
 
         Returns:
-            A new track, older by 25 ms.
+            A new track, older by a tick.
         """
         memory = track.memory + self._tick
-        return Track(np.asarray(pose), track.pose_1, track.pose_heard, memory)
+        past_poses = np.vstack((pose, track.past_poses[:-1]))
+        return Track(past_poses, track.pose_heard, memory)
 
     def position(self, track: Track, pose: Any) -> Any:
         """The target in W for a robot at ``pose``, (2,) m.

@@ -25,7 +25,7 @@ from systems.framework.parameters import (
     Parameters,
 )
 from systems.framework.scalar_math import float_of
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.ranging.collision_vector import SLOTS
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -142,11 +142,11 @@ class ImpedanceLoop:
     A mix-in beside ``LeafSystem_[T]``: the controller's file adds its law as
     ``radial_force(c, s)`` in N. Each collision vector's s is the change of the
     same feature over one round of the sensors, over the time of that round; 0
-    where the feature was not there a round ago. A round is a tick of 25 ms, and
-    three where the sensors fire one after the other: every sensor has then
-    fired once since, and a held range is held in both vectors. At constant
+    where the feature was not there a round ago. A round is a tick where all sensors
+    fire at every tick, and three where three fire one after the other: every sensor has
+    then fired once since, and a held range is held in both vectors. At constant
     velocities s is exact, at every tick, of a pair of sensors as of one; else
-    it is the mean over the round, which is up to 50 ms old itself.
+    it is the mean over the round, which is up to a round less a tick old itself.
     """
 
     FACTS = BlockFacts(
@@ -170,6 +170,7 @@ class ImpedanceLoop:
         attraction=None,
         repulsion=None,
         sensors=None,
+        tick_s=TICK_S,
     ):
         self._scalar = scalar
         self._robot = robot or RobotParameters()
@@ -177,7 +178,8 @@ class ImpedanceLoop:
         self._repulsion = repulsion
         self._velocity_term = (repulsion or SharedRepulsion()).velocity_term
         sensors = sensors or UltrasonicParameters()
-        self._round_ticks = sensors.round_ticks
+        self._round_ticks = sensors.round_ticks(tick_s)
+        self._round_s = self._round_ticks * tick_s
         self._least_range_m = sensors.minimum_range_m
         self.FACTS = replace(self.FACTS, states=_slot_names(self._round_ticks))
         # What a copy for another scalar type is made with.
@@ -186,6 +188,7 @@ class ImpedanceLoop:
             "attraction": self._attraction,
             "repulsion": repulsion,
             "sensors": sensors,
+            "tick_s": tick_s,
         }
         self.set_name(name)
         self._inputs = [
@@ -201,7 +204,7 @@ class ImpedanceLoop:
         ]
         self.DeclareDiscreteState([scalar(0.0)] * (_ROW * self._round_ticks))
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+            period_sec=tick_s, offset_sec=0.0, update=self._remember
         )
         sources = {port.ticket() for port in self._inputs}
         sources.add(self.xd_ticket())
@@ -243,7 +246,7 @@ class ImpedanceLoop:
             self._before(context),
             self.radial_force,
             self._velocity_term,
-            self._round_ticks * FRAME_PERIOD_S,
+            self._round_s,
         )
         speeds = [zero + s for s in speeds] + [zero] * (SLOTS - len(speeds))
         return F_m, F_b, speeds, vectors_W

@@ -29,14 +29,15 @@ _DOCUMENTATION = """Follows the target; {about}.
     - forces_W [N, attraction then repulsion, x and y each]
     - obstacle_speeds [m/s, s of each slot]
 
-Discrete state, 25 ms: the collision vectors of the last round of the sensors,
+Discrete state, every tick: the collision vectors of the last round of the sensors,
 for s. The outputs are functions of state and present input: no latency.
 
 Args:
     robot: Mass and place of P.
     attraction: ``AttractionParameters``.
     repulsion: ``RepulsionParameters``; uses ``{law}``.
-    sensors: ``UltrasonicParameters``: order of firing{more}.
+    sensors: ``UltrasonicParameters``: period and order of firing{more}.
+    tick_s: Period of the controller, s.
 
 Reference: {reference}.
 """

@@ -32,7 +32,7 @@ def RadialLawController_(T):
             - forces_W [N, attraction then repulsion, x and y each]
             - obstacle_speeds [m/s, s of each slot]
 
-        Discrete state, 25 ms: the collision vectors of the last round of the
+        Discrete state, every tick: the collision vectors of the last round of the
         sensors, for s. The outputs are functions of state and present input:
         no latency.
 
@@ -40,7 +40,8 @@ def RadialLawController_(T):
             robot: Mass and place of P.
             attraction: ``AttractionParameters``.
             repulsion: ``RepulsionParameters``, handed to the law.
-            sensors: ``UltrasonicParameters``: order of firing.
+            sensors: ``UltrasonicParameters``: period and order of firing.
+            tick_s: Period of the controller, s.
             law: ``law(c, s, repulsion)``: force away from the obstacle in N at
                 distance c in m and speed s in m/s. Use pydrake.math, so that
                 it can be differentiated.

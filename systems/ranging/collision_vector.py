@@ -16,7 +16,7 @@ from systems.framework.finite import read_lists
 from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
@@ -276,20 +276,21 @@ def CollisionVector_(T):
             - features [number of the sensor or pair, 0 none]
 
         Slots are filled from the first; only ``aggregation: sum`` fills more
-        than one. With ``firing: simultaneous`` a function of the present
+        than one. Where all sensors fire at every tick, a function of the present
         ranges: no state, no latency; the ports of age and pose are not read.
-        With ``firing: sequential`` a range that is held stands for a point
-        that rests in W: it is carried on to the present pose. An obstacle's
-        own motion since that sensor fired, 50 ms at most of three, remains an error.
+        Else a range that is held stands for a point that rests in W: it is carried
+        on to the present pose. An obstacle's own motion since that sensor fired, up
+        to a round less a tick, remains an error.
 
-        Discrete state, 25 ms, with ``firing: sequential``: the poses of the ticks of a
-        round before this one, two for three sensors.
+        Discrete state, every tick, where ranges are held: the poses of the ticks of
+        a round before this one, two for three sensors that fire one after the other.
 
         Args:
             parameters: ``CollisionVectorParameters``.
-            sensors: Places and order of firing, ``UltrasonicParameters``.
+            sensors: Places, period and order of firing, ``UltrasonicParameters``.
             robot: Place of P.
             initial_pose: (x, y, theta) before time zero, m and rad.
+            tick_s: Period of the robot, s.
 
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
@@ -303,6 +304,7 @@ def CollisionVector_(T):
             sensors=None,
             robot=None,
             initial_pose=(0.0, 0.0, 0.0),
+            tick_s=TICK_S,
             converter=None,
         ):
             super().__init__(converter=converter)
@@ -310,6 +312,7 @@ def CollisionVector_(T):
             self._sensors = sensors or UltrasonicParameters()
             self._robot = robot or RobotParameters()
             self._initial_pose = tuple(initial_pose)
+            self._tick_s = tick_s
             self.set_name("collision_vector")
             count = self._sensors.count
             inputs = [
@@ -323,12 +326,12 @@ def CollisionVector_(T):
             ]
             self._echoes, self._motion = inputs[:2], inputs[2:]
             sources = {port.ticket() for port in self._echoes}
-            self._past_poses = self._sensors.round_ticks - 1
+            self._past_poses = self._sensors.round_ticks(tick_s) - 1
             if self._past_poses:
                 past = [T(v) for v in self._initial_pose] * self._past_poses
                 self.DeclareDiscreteState(past)
                 self.DeclarePeriodicDiscreteUpdateEvent(
-                    period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+                    period_sec=tick_s, offset_sec=0.0, update=self._remember
                 )
                 sources |= {port.ticket() for port in self._motion}
                 sources.add(self.xd_ticket())
@@ -342,6 +345,7 @@ def CollisionVector_(T):
                 sensors=other._sensors,
                 robot=other._robot,
                 initial_pose=other._initial_pose,
+                tick_s=other._tick_s,
                 converter=converter,
             )
 
@@ -358,7 +362,7 @@ def CollisionVector_(T):
             """The points as they lie from the present pose."""
             ages, now = read_lists(context, self._motion)
             poses = self._poses(context, now)
-            ticks = [round(float_of(age) / FRAME_PERIOD_S) for age in ages]
+            ticks = [round(float_of(age) / self._tick_s) for age in ages]
             return [
                 carried_point(point, poses[k], poses[0], self._robot.control_point_m)
                 if point is not None and k

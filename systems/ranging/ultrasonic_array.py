@@ -32,7 +32,7 @@ from systems.framework.parameters import (
     Size,
     SoundSpeed,
 )
-from systems.framework.signals import FRAME_PERIOD_S, TICK_S
+from systems.framework.signals import TICK_S, whole
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
@@ -147,10 +147,25 @@ class UltrasonicParameters(Parameters):
         half_angle = math.radians(self.beam_half_angle_deg)
         return np.array(self.axes), np.array(self.places), half_angle
 
-    @property
-    def round_ticks(self) -> int:
+    def period_ticks(self, tick_s: float) -> int:
+        """Ticks from one firing to the next.
+
+        Raises:
+            InputError: The period is no multiple of the tick.
+        """
+        ticks = self.period_s / tick_s
+        if not whole(ticks):
+            raise InputError(
+                "period_s",
+                f"{self.period_s:g} s is no multiple of a tick of {tick_s:g} s; give "
+                "one",
+            )
+        return round(ticks)
+
+    def round_ticks(self, tick_s: float) -> int:
         """Ticks from one reading of a sensor to its next."""
-        return self.count if self.firing == "sequential" else 1
+        rounds = self.count if self.firing == "sequential" else 1
+        return rounds * self.period_ticks(tick_s)
 
     @cached_property
     def least_luck(self) -> float:
@@ -274,11 +289,12 @@ class UltrasonicArray(LeafSystem):
     dropping the echo at contact would drop the force. A cone reports a range,
     not a direction.
 
-    State: ranges and echoes of the last tick, for sequential firing.
+    State: ranges and echoes of the last tick, where they are held.
     Rate and latency: a function of the present poses; no latency. Noise is
-    drawn once a 25 ms tick. With ``firing: sequential`` one sensor fires a
-    tick, from left to right, and the others hold: the ranges of three are 0, 25 and
-    50 ms old, and a sensor's next comes after a round of 75 ms.
+    drawn once a tick. All fire every ``period_s``, at multiples of it, and hold in
+    between. With ``firing: sequential`` one sensor fires a period, from left to
+    right, and the others hold: with periods of 25 ms the ranges of three are 0, 25
+    and 50 ms old, and a sensor's next comes after a round of 75 ms.
 
     Args:
         parameters: The sensors.
@@ -287,6 +303,10 @@ class UltrasonicArray(LeafSystem):
         source_size: Length and width of the master robot, m.
         obstacle_count: Number of boxes on the obstacle ports.
         seed: Seed of the noise.
+        tick_s: Period of the robot, s.
+
+    Raises:
+        InputError: The sensors' period is no multiple of the tick.
     """
 
     FACTS = BlockFacts("ultrasonic", "obstacle sensing")
@@ -300,6 +320,7 @@ class UltrasonicArray(LeafSystem):
         source_size: Size = (0.326, 0.352),
         obstacle_count: int = 0,
         seed: int = 0,
+        tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self._parameters = parameters or UltrasonicParameters()
@@ -307,6 +328,9 @@ class UltrasonicArray(LeafSystem):
         self._sound_speed = (acoustics or AcousticParameters()).c
         self._source_size = source_size
         self._seed = seed
+        self._tick_s = tick_s
+        self._period = self._parameters.period_ticks(tick_s)
+        self._round = self._parameters.round_ticks(tick_s)
         check_finite("UltrasonicArray: source_size", source_size)
         self.set_name("ultrasonic_array")
         count = self._parameters.count
@@ -327,9 +351,9 @@ class UltrasonicArray(LeafSystem):
         farthest = np.full(count, self._parameters.maximum_range_m)
         held: Any = np.concatenate([farthest, np.zeros(count)])
         self.DeclareDiscreteState(held)
-        if self._parameters.firing == "sequential":
+        if self._round > 1:
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._hold
+                period_sec=tick_s, offset_sec=0.0, update=self._hold
             )
         sources = {port.ticket() for port in self._inputs}
         sources |= {self.time_ticket(), self.xd_ticket()}
@@ -351,19 +375,18 @@ class UltrasonicArray(LeafSystem):
     def _read(self, context: Any) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """(n,) ranges and (n,) echoes as they stand now."""
         pose_WB, poses_WO, sizes, pose_WS = read_arrays(context, self._inputs)
-        tick = _tick(context)
+        tick = self._tick(context)
         numbers = standard_normals((2, self._parameters.count), self._seed, tick)
         rectangles = world_rectangles(poses_WO, sizes, pose_WS, self._source_size)
         true = cone_ranges(pose_WB, rectangles, self._parameters, self._control_point)
         ranges, echo = measured_ranges(
             true, self._parameters, self._sound_speed, numbers
         )
-        if self._parameters.firing == "simultaneous":
+        if self._round == 1:
             return ranges, echo
+        fires = self._ages(tick) == 0
         held = context.get_discrete_state(0).CopyToVector().reshape(2, -1)
-        fires = tick % self._parameters.count
-        held[:, fires] = ranges[fires], echo[fires]
-        return held[0], held[1]
+        return np.where(fires, ranges, held[0]), np.where(fires, echo, held[1])
 
     def _hold(self, context: Any, discrete_state: Any) -> None:
         discrete_state.set_value(np.concatenate(self._readings.Eval(context)))
@@ -375,11 +398,14 @@ class UltrasonicArray(LeafSystem):
         output.SetFromVector(self._readings.Eval(context)[1])
 
     def _calc_ages(self, context: Any, output: Any) -> None:
-        tick, round_ = _tick(context), self._parameters.round_ticks
-        numbers = range(self._parameters.count)
-        ages = [(tick - k) % round_ * FRAME_PERIOD_S for k in numbers]
-        output.SetFromVector(ages)
+        output.SetFromVector(self._ages(self._tick(context)) * self._tick_s)
 
+    def _ages(self, tick: int) -> NDArray[np.int64]:
+        """(n,) ticks since each sensor fired."""
+        turns = np.arange(self._parameters.count)
+        if self._parameters.firing == "simultaneous":
+            turns = np.zeros_like(turns)
+        return (tick - turns * self._period) % self._round
 
-def _tick(context: Any) -> int:
-    return round(context.get_time() / FRAME_PERIOD_S)
+    def _tick(self, context: Any) -> int:
+        return round(context.get_time() / self._tick_s)

@@ -20,7 +20,7 @@ from systems.framework.parameters import (
     Positive,
     Time,
 )
-from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 
 __all__ = ["MicArrayParameters", "channel_skew", "convert"]
 
@@ -29,13 +29,16 @@ class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
     sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
-    """Rate of the converter, Hz; at most that at which sound is computed."""
+    """Rate of the converter, Hz; at most that at which sound is computed.
+
+    No filter stands before the converter: what sounds above half the rate is folded.
+    """
     frame_s: Period = TICK_S
     """Length of a frame, and time from one to the next, s: so often the robot hears."""
     snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m over the noise, dB.
 
-    The noise is white and Gaussian over 0-50 kHz, of equal power in every
+    The noise is white and Gaussian up to half the sample rate, of equal power in every
     channel and independent of distance.
     """
     sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
@@ -73,13 +76,24 @@ class MicArrayParameters(Parameters):
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
-        if not all(0.0 <= skew < 1.0 / SAMPLE_RATE_HZ for skew in self.channel_skew_s):
+        sample = 1.0 / self.sample_rate_hz
+        if not all(0.0 <= skew < sample for skew in self.channel_skew_s):
             raise InputError(
                 "channel_skew_s",
-                f"{self.channel_skew_s} must lie in [0, "
-                f"{1.0 / SAMPLE_RATE_HZ:g}) s, one sample",
+                f"{self.channel_skew_s} must lie in [0, {sample:g}) s, one sample",
+            )
+        if not whole(samples := self.frame_s * self.sample_rate_hz):
+            raise InputError(
+                "sample_rate_hz",
+                f"{self.sample_rate_hz:g} Hz gives {samples:.4f} samples in a frame of "
+                f"{self.frame_s:g} s; use {round(samples) / self.frame_s:g}",
             )
         return self
+
+    @cached_property
+    def frame_samples(self) -> int:
+        """Samples a channel in a frame."""
+        return round(self.frame_s * self.sample_rate_hz)
 
     @cached_property
     def full_scale(self) -> int:

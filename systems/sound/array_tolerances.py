@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -9,14 +10,13 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from systems.framework.signals import FRAME_PERIOD_S
 from systems.sound.adc import MicArrayParameters, channel_skew
 
 __all__ = ["RealArray", "Tolerances", "draw_tolerances", "real_array"]
 
-# Spacing of 2.5 ms: even a robot that spins at 4 rad/s bends the delay by
+# Widest spacing of knots, s: even a robot that spins at 4 rad/s bends the delay by
 # less than 1e-4 sample from a cubic in that time.
-_KNOTS = 11
+_SPACING_S = 0.0025
 
 
 @dataclass(frozen=True)
@@ -77,7 +77,7 @@ def real_array(
 
     Args:
         p_BM: (n, 2) stated places of the microphones in B, m.
-        parameters: Stated skew of the channels.
+        parameters: Stated skew of the channels, and length of a frame.
         tolerances: The errors of both, and of the gains.
         c: Speed of sound, m/s.
 
@@ -89,6 +89,9 @@ def real_array(
         ValueError: The skew is given for another number of channels.
     """
     late = channel_skew(parameters, len(p_BM)) + tolerances.channel_delays
-    knots = np.linspace(0.0, FRAME_PERIOD_S, _KNOTS)
+    spans = math.ceil(parameters.frame_s / _SPACING_S - 1e-9)
+    while parameters.frame_samples % spans:
+        spans += 1
+    knots = np.linspace(0.0, parameters.frame_s, spans + 1)
     instants = knots + late[:, None]
     return RealArray(p_BM + tolerances.position_errors, instants, tolerances.gains, c)

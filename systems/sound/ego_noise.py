@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.noise import BEFORE_THE_RUN, tick_generator
-from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
+from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.adc import MicArrayParameters
 from systems.sound.sound_file import read_sound
 from systems.sound.waveforms import MICROPHONE_BAND_HZ, band_limited
@@ -40,8 +40,8 @@ def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
 class EgoNoise:
     """What the robot's motors and fans add to each channel.
 
-    The recording is brought to 100 kHz and to the band of the microphones, and
-    repeated without a seam. A channel for each microphone is played as it is,
+    The recording is brought to the sample rate and to the band of the microphones,
+    and repeated without a seam. A channel for each microphone is played as it is,
     coherent as it was recorded; one channel is played to all microphones from
     places of its own, drawn from the seed, so that channels are incoherent.
 
@@ -55,7 +55,10 @@ class EgoNoise:
     """
 
     def __init__(self, parameters: MicArrayParameters, count: int, seed: int) -> None:
-        self._loops = _read_loops(parameters.ego_noise_file or "", count)
+        self._loops = _read_loops(
+            parameters.ego_noise_file or "", count, parameters.sample_rate_hz
+        )
+        self._samples = parameters.frame_samples
         self._level = 10.0 ** (-parameters.ego_noise_snr_db_at_1m / 20.0)
         self._at_rest = parameters.ego_noise_share_at_rest
         starts = tick_generator(seed, BEFORE_THE_RUN + 1).integers(
@@ -65,24 +68,24 @@ class EgoNoise:
         self._starts = np.full(count, starts[0]) if together else starts
         self._rows = np.arange(count) if together else np.zeros(count, dtype=int)
 
-    def frame(self, tick: int, share: float) -> NDArray[np.float32]:
-        """(n, FRAME_SAMPLES) of the frame that ends at a tick.
+    def frame(self, number: int, share: float) -> NDArray[np.float32]:
+        """(n, samples) of a frame.
 
         Args:
-            tick: Number of the tick.
+            number: Of the frame; that which ends at time zero is 0.
             share: From ``driving_share``.
 
         Returns:
-            (n, FRAME_SAMPLES) pressure over the RMS pressure of the source at 1 m.
+            (n, samples) pressure over the RMS pressure of the source at 1 m.
         """
-        first = self._starts + (tick - 1) * FRAME_SAMPLES
-        places = (first[:, None] + np.arange(FRAME_SAMPLES)) % self._loops.shape[1]
+        first = self._starts + (number - 1) * self._samples
+        places = (first[:, None] + np.arange(self._samples)) % self._loops.shape[1]
         level = self._level * (self._at_rest + (1.0 - self._at_rest) * share)
         return np.float32(level) * self._loops[self._rows[:, None], places]
 
 
-def _read_loops(file: str, count: int) -> NDArray[np.float32]:
-    """(1 or n, length) samples at 100 kHz, of unit RMS over all channels."""
+def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
+    """(1 or n, length) samples at a rate, of unit RMS over all channels."""
     field = "microphones.ego_noise_file"
     channels, rate = read_sound(file, field)
     if len(channels) not in (1, count):
@@ -107,7 +110,9 @@ def _read_loops(file: str, count: int) -> NDArray[np.float32]:
             f"{file} has nothing between {low:g} and {high:g} Hz, which the "
             "microphones pass; choose another",
         )
-    fade = round(FADE_S * SAMPLE_RATE_HZ)
+    if rate_hz != SAMPLE_RATE_HZ:
+        heard = soxr.resample(heard.T, SAMPLE_RATE_HZ, rate_hz, quality="VHQ").T
+    fade = round(FADE_S * rate_hz)
     angle = np.pi / 2.0 * (np.arange(fade) + 0.5) / fade
     loops = heard[:, :-fade].copy()
     loops[:, :fade] *= np.sin(angle)

@@ -16,8 +16,6 @@ from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import (
-    FRAME_PERIOD_S,
-    FRAME_SAMPLES,
     SAMPLE_RATE_HZ,
     AudioFrame,
     Emission,
@@ -38,7 +36,6 @@ from systems.sound.room import RoomParameters, room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 __all__ = [
-    "FRAME_SAMPLES",
     "MicArray",
     "MicArrayParameters",
     "microphone_reach",
@@ -46,7 +43,7 @@ __all__ = [
     "record_frame",
 ]
 
-# Two instants closer than this are one tick of a 25 ms clock, s.
+# Two instants closer than this are one tick of the clock, s.
 _SAME_INSTANT_S = 1e-6
 
 
@@ -94,22 +91,22 @@ def record_frame(
         before: Pose and velocity of the robot a frame ago, (3,) each.
         now: Pose and velocity of the robot now.
         array: From ``real_array``.
-        parameters: Microphones, amplifier and converter.
+        parameters: Microphones, amplifier, converter and length of the frame.
         seed: Seed of the noise.
         rise: Height of the microphones above the sources, m.
-        reflections: (n, FRAME_SAMPLES) Pa each, of the sources' reflections.
-        ego_noise: (n, FRAME_SAMPLES) over the level of the first source at 1 m.
+        reflections: (n, samples) Pa each, of the sources' reflections.
+        ego_noise: (n, samples) over the level of the first source at 1 m.
 
     Returns:
-        (n, FRAME_SAMPLES) counts, with their full scale, rate and time.
+        (n, samples) counts, with their full scale, rate and time.
 
     Raises:
         ValueError: A source is out of the emission's reach.
     """
-    direct = _direct_sound(emissions, time, before, now, array, rise)
+    direct = _direct_sound(emissions, time, before, now, array, parameters, rise)
     pressure = _total([*direct, *reflections])
-    tick = round(time / FRAME_PERIOD_S)
-    noise = frame_noise((len(array.p_BM), FRAME_SAMPLES), seed, tick)
+    number = round(time / parameters.frame_s)
+    noise = frame_noise((len(array.p_BM), parameters.frame_samples), seed, number)
     snr = 10.0 ** (parameters.snr_db_at_1m / 20.0)
     if ego_noise is not None:
         noise += np.float32(snr) * ego_noise
@@ -119,7 +116,7 @@ def record_frame(
     return AudioFrame(
         counts=counts,
         full_scale=parameters.full_scale,
-        sample_rate_hz=SAMPLE_RATE_HZ,
+        sample_rate_hz=parameters.sample_rate_hz,
         time=time,
     )
 
@@ -130,10 +127,11 @@ def _direct_sound(
     before: tuple[NDArray[np.float64], NDArray[np.float64]],
     now: tuple[NDArray[np.float64], NDArray[np.float64]],
     array: RealArray,
+    parameters: MicArrayParameters,
     rise: float,
 ) -> list[NDArray[np.float32]]:
-    """(n, FRAME_SAMPLES) Pa of each source that sounds."""
-    begin = time - FRAME_PERIOD_S
+    """(n, samples) Pa of each source that sounds."""
+    begin = time - parameters.frame_s
     sounding = [emission for emission in emissions if emission.sounding]
     for emission in emissions:
         if not emission.sounding:  # the robot's place is good enough for silence
@@ -142,7 +140,7 @@ def _direct_sound(
         return []
     times = begin + array.instants
     p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
-    arriving = (times, p_WM, v_WM, FRAME_SAMPLES, array.c, rise)
+    arriving = (times, p_WM, v_WM, parameters.frame_samples, array.c, rise)
     return [propagate(emission, *arriving) for emission in sounding]
 
 
@@ -169,10 +167,10 @@ class MicArray(LeafSystem):
         output_ports:
         - audio [AudioFrame]
 
-    A frame published at t covers [t - 25 ms, t). Between the two ticks the
-    robot follows a cubic Hermite polynomial; sound travels as in
-    ``systems.sound.propagation``. A robot that has no tick behind it, or is read
-    between two ticks, is taken to have come at its present velocity.
+    A frame published at t covers [t - frame_s, t), 25 ms. Within a frame the robot
+    follows a cubic Hermite polynomial; sound travels as in
+    ``systems.sound.propagation``. A robot that has no frame behind it, or is read
+    between two frames' ends, is taken to have come at its present velocity.
 
     In a room the direct sound is as without one. The reflections are those of
     robot and source at rest where they were at the last multiple of the room's
@@ -187,10 +185,10 @@ class MicArray(LeafSystem):
     ``systems.sound.array_tolerances``; ``SOUND_SPEED`` (1, m/s), of the air. Their
     defaults are drawn from the seed, within the tolerances of the parameters.
 
-    State: time, pose and velocity of the robot at the last tick; in a room
+    State: time, pose and velocity of the robot at the last frame's end; in a room
     also time, pose of the robot and place of each source at the last update.
     Rate and latency: a function of the state and the present inputs; no
-    latency. The state is updated every 25 ms.
+    latency. The state is updated every ``frame_s``.
 
     Args:
         parameters: Microphones, amplifier and converter.
@@ -226,7 +224,9 @@ class MicArray(LeafSystem):
         self.set_name("mic_array")
         c = (acoustics or AcousticParameters()).c
         self._declare_errors(c)
-        self._reverberation = Reverberation(room, c) if room else None
+        self._reverberation = None
+        if room:
+            self._reverberation = Reverberation(room, c, self._parameters)
         self._ego_noise = None
         if self._parameters.ego_noise_file is not None:
             count = len(self._robot.microphones_m)
@@ -242,12 +242,12 @@ class MicArray(LeafSystem):
         ]
         self.DeclareDiscreteState(np.r_[-np.inf, np.zeros(6)])
         if room:
-            self._update_ticks = round(room.update_period_s / FRAME_PERIOD_S)
+            self._update_frames = room.update_frames(self._parameters.frame_s)
             self.DeclareDiscreteState(
                 np.r_[-np.inf, np.zeros(3 + 2 * len(self._sources))]
             )
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+            period_sec=self._parameters.frame_s, offset_sec=0.0, update=self._remember
         )
         self.DeclareAbstractOutputPort(
             name="audio",
@@ -308,8 +308,8 @@ class MicArray(LeafSystem):
             discrete_state.set_value(1, np.r_[state[0], places])
 
     def _updates(self, time: float) -> bool:
-        """Whether reflections take new places at a tick."""
-        return round(time / FRAME_PERIOD_S) % self._update_ticks == 0
+        """Whether reflections take new places at a frame's end."""
+        return round(time / self._parameters.frame_s) % self._update_frames == 0
 
     def _emissions(self, context: Any) -> list[Emission]:
         emissions = []
@@ -349,17 +349,17 @@ class MicArray(LeafSystem):
 
     def _record(self, context: Any, output: Any) -> None:
         emissions = self._emissions(context)
-        time = context.get_time()
+        time, frame_s = context.get_time(), self._parameters.frame_s
         pose, velocity = read_arrays(context, self._motion)
         ego_noise = None
         if self._ego_noise is not None:
             share = driving_share(velocity, self._robot)
-            ego_noise = self._ego_noise.frame(round(time / FRAME_PERIOD_S), share)
+            ego_noise = self._ego_noise.frame(round(time / frame_s), share)
         array: Any = self._array.Eval(context)
         last = context.get_discrete_state(0).value()
         before = last[1:4], last[4:7]
-        if abs(last[0] - (time - FRAME_PERIOD_S)) > _SAME_INSTANT_S:
-            before = pose - FRAME_PERIOD_S * velocity, velocity
+        if abs(last[0] - (time - frame_s)) > _SAME_INSTANT_S:
+            before = pose - frame_s * velocity, velocity
         output.set_value(
             record_frame(
                 emissions,

@@ -26,6 +26,7 @@ __all__ = [
     "microphone_paths",
     "propagate",
     "retarded_delays",
+    "sampled_at",
 ]
 
 #: Samples that the interpolation kernel touches on either side.
@@ -33,6 +34,9 @@ KERNEL_REACH = 6
 
 #: 1/R grows no further below this distance, m: no microphone is a point.
 MINIMUM_RANGE_M = 0.01
+
+# Rates that differ by less than this share differ by rounding alone.
+_SAME_RATE = 1e-9
 
 # A Kaiser window of 12 taps and this beta leaves an error of 1e-5 up to 18 kHz:
 # at 100 kHz the nearest image starts at 82 kHz, so the transition is wide.
@@ -220,30 +224,32 @@ def _interpolate(
     first: NDArray[np.float64],
     delays: NDArray[np.float64],
     rates: NDArray[np.float64],
-    c: float,
-    nearest: float,
+    units: tuple[float, float, float],
     out: NDArray[np.float32],
 ) -> None:  # pragma: no cover  (compiled)
     """Fills out (m, length) with samples of the delayed sound over distance.
 
-    In units of samples: first (m,) is the place among the samples of each
-    channel's first instant, delays and rates (m, k) stand at evenly spaced
-    knots, c is in m per sample and nearest the least distance in m.
+    In units of emitted samples: first (m,) is the place among the samples of each
+    channel's first instant, delays and rates (m, k) stand at evenly spaced knots;
+    units are the time from one instant to the next, c in m per sample, and the least
+    distance in m.
     """
+    step, c, nearest = units
     spans = delays.shape[1] - 1
     h = out.shape[1] // spans
+    span_samples = h * step
     u = np.empty(h, dtype=np.float32)
     amplitude = np.empty(h, dtype=np.float32)
     begin = np.empty(h, dtype=np.int32)
     for m in range(out.shape[0]):
         for k in range(spans):
             a, b = delays[m, k], delays[m, k + 1]
-            da, db = h * rates[m, k], h * rates[m, k + 1]
+            da, db = span_samples * rates[m, k], span_samples * rates[m, k + 1]
             bend, curl = 3.0 * (b - a) - 2.0 * da - db, 2.0 * (a - b) + da + db
             for i in range(h):
                 s = i / h
                 d = a + s * (da + s * (bend + s * curl))
-                position = first[m] + k * h + i - d
+                position = first[m] + k * span_samples + i * step - d
                 whole = math.floor(position)
                 u[i] = np.float32(position - whole - 0.5)
                 begin[i] = np.int32(whole - i)
@@ -258,6 +264,44 @@ def _interpolate(
                 _delayed(samples, begin[i] + i, u[i:end], kernel, span[i:end])
                 i = end
             span *= amplitude
+
+
+@njit(cache=True)
+def _sampled_at(
+    sound: NDArray[np.float32],
+    kernel: NDArray[np.float32],
+    first: float,
+    step: float,
+    out: NDArray[np.float32],
+) -> None:  # pragma: no cover  (compiled)
+    """Fills out (m, count) with sound[:, first + i step], interpolated."""
+    u = np.empty(1, dtype=np.float32)
+    for i in range(out.shape[1]):
+        position = first + i * step
+        whole = math.floor(position)
+        u[0] = np.float32(position - whole - 0.5)
+        for m in range(out.shape[0]):
+            _delayed(sound[m], whole, u, kernel, out[m, i : i + 1])
+
+
+def sampled_at(
+    sound: NDArray[np.float32], first: int, step: float, count: int
+) -> NDArray[np.float32]:
+    """Sound at another rate, by the kernel of ``propagate``.
+
+    Args:
+        sound: (m, n) samples.
+        first: Place of the first one that is wanted; at least ``KERNEL_REACH``.
+        step: From one that is wanted to the next, samples; ``KERNEL_REACH`` of them
+            must follow the last one.
+        count: Number of samples that are wanted.
+
+    Returns:
+        (m, count) samples.
+    """
+    out = np.empty((len(sound), count), dtype=np.float32)
+    _sampled_at(sound, INTERPOLATION_KERNEL, float(first), step, out)
+    return out
 
 
 def check_reach(
@@ -299,6 +343,8 @@ def propagate(
 ) -> NDArray[np.float32]:
     """Sound pressure at moving microphones over one frame.
 
+    The microphones' sample rate need not be that of the emission.
+
     The delay is exact at the knots and follows cubic polynomials between them.
     With knots every 2.5 ms and the bodies of this model, delays are right to
     1e-3 sample from 0.1 to 18 kHz, and amplitudes to 1e-4.
@@ -327,6 +373,9 @@ def propagate(
     delays *= rate
     if (first - delays[:, 0]).min() < KERNEL_REACH:
         raise _out_of_reach(delays[:, 0].max() * c / rate)
+    step = float(times[0, -1] - times[0, 0]) * rate / count
+    if abs(step - round(step)) < _SAME_RATE:
+        step = float(round(step))
     out = np.empty((len(times), count), dtype=np.float32)
     _interpolate(
         emission.samples,
@@ -334,8 +383,7 @@ def propagate(
         first,
         delays,
         rates,
-        c / rate,
-        MINIMUM_RANGE_M,
+        (step, c / rate, MINIMUM_RANGE_M),
         out,
     )
     return out

@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from systems.framework.input_error import InputError
-from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, Emission
+from systems.framework.signals import SAMPLE_RATE_HZ, Emission
+from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import RealArray
+from systems.sound.propagation import KERNEL_REACH, sampled_at
 from systems.sound.room import RoomParameters, room_images, room_impulse_responses
 from systems.world.geometry import rotate
 
@@ -38,16 +40,28 @@ class Reverberation:
         room: The room.
         c: Speed of sound that absorption and length of the responses are
             worked out for, m/s.
+        parameters: Sample rate and length of the frames.
 
     Raises:
         InputError: See ``RoomParameters.walls``.
     """
 
-    def __init__(self, room: RoomParameters, c: float) -> None:
+    def __init__(
+        self,
+        room: RoomParameters,
+        c: float,
+        parameters: MicArrayParameters | None = None,
+    ) -> None:
+        self._parameters = parameters or MicArrayParameters()
         self.room = room
         self._c = c
         self._images = room_images(room, c)
-        self._needed = self._images.length - 1 + FRAME_SAMPLES
+        # Of the sound in a frame, and what interpolation reads on either side of it.
+        self._frame = round(self._parameters.frame_s * SAMPLE_RATE_HZ)
+        self._step = SAMPLE_RATE_HZ / self._parameters.sample_rate_hz
+        self._margin = 0 if self._step == 1.0 else KERNEL_REACH
+        self._heard = self._frame + 2 * self._margin
+        self._needed = self._images.length - 1 + self._heard
         self._size = int(fft.next_fast_len(self._needed, real=True))
         self._spectrum = lru_cache(maxsize=_KEPT)(self._compute_spectrum)
 
@@ -76,18 +90,18 @@ class Reverberation:
             array: The array with its errors.
 
         Returns:
-            For each source (m, FRAME_SAMPLES) Pa, or None where it is silent.
+            For each source (m, samples) Pa, or None where it is silent.
 
         Raises:
             InputError: Somebody is outside the room, or an emission does not
                 reach back.
         """
         return [
-            self._frame(emission, time, _place(old, k), _place(new, k), array)
+            self._reflected(emission, time, _place(old, k), _place(new, k), array)
             for k, emission in enumerate(emissions)
         ]
 
-    def _frame(
+    def _reflected(
         self,
         emission: Emission,
         time: float,
@@ -95,7 +109,7 @@ class Reverberation:
         new: tuple[float, ...],
         array: RealArray,
     ) -> NDArray[np.float32] | None:
-        end = round((time - emission.start_time) * SAMPLE_RATE_HZ)
+        end = round((time - emission.start_time) * SAMPLE_RATE_HZ) + self._margin
         if end < self._needed:
             raise InputError(
                 "MicArray",
@@ -106,12 +120,15 @@ class Reverberation:
         if not emission.sounding:
             return None
         sent = fft.rfft(emission.samples[end - self._needed : end], self._size)
-        after = self._convolved(sent, new, array)
-        if old == new:
-            return after
-        before = self._convolved(sent, old, array)
-        share = (np.arange(FRAME_SAMPLES, dtype=np.float32) + 0.5) / FRAME_SAMPLES
-        return before + share * (after - before)
+        heard = self._convolved(sent, new, array)
+        if old != new:
+            before = self._convolved(sent, old, array)
+            share = np.arange(self._heard, dtype=np.float32) - self._margin + 0.5
+            heard = before + share / self._frame * (heard - before)
+        if not self._margin:
+            return heard
+        count = self._parameters.frame_samples
+        return sampled_at(heard, self._margin, self._step, count)
 
     def _convolved(
         self,
@@ -122,7 +139,7 @@ class Reverberation:
         late = array.instants[:, 0]
         key = (array.p_BM.tobytes(), late.tobytes(), array.c)
         heard = fft.irfft(sent * self._spectrum(places, *key), self._size)
-        return heard[:, self._needed - FRAME_SAMPLES : self._needed]
+        return heard[:, self._needed - self._heard : self._needed]
 
     def _compute_spectrum(
         self, places: tuple[float, ...], p_BM: bytes, late: bytes, c: float

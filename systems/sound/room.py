@@ -20,7 +20,7 @@ from pydantic import Field, Strict, model_validator
 from systems.framework.compiling import REORDER
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, Parameters, Point
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.sound.propagation import (
     INTERPOLATION_KERNEL,
     KERNEL_REACH,
@@ -68,18 +68,11 @@ class RoomParameters(Parameters):
     """Height of every loudspeaker above the floor, m."""
     microphone_height_m: Length = 0.3
     """Height of the microphones above the floor, m."""
-    update_period_s: float = Field(default=0.1, ge=FRAME_PERIOD_S, le=60.0)
-    """Reflections are of the poses at multiples of this, s; a multiple of 25 ms."""
+    update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
+    """Reflections are of the poses at multiples of this, s; a multiple of a frame."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:
-        ticks = self.update_period_s / FRAME_PERIOD_S
-        if abs(ticks - round(ticks)) > 1e-9:
-            raise InputError(
-                "update_period_s",
-                f"{self.update_period_s} is not a multiple of "
-                f"{FRAME_PERIOD_S} s; use {round(ticks) * FRAME_PERIOD_S:g}",
-            )
         for name in ("source_height_m", "microphone_height_m"):
             if getattr(self, name) >= self.size_m[2]:
                 raise InputError(
@@ -88,6 +81,22 @@ class RoomParameters(Parameters):
                     f"{self.size_m[2]} m; lower it",
                 )
         return self
+
+    def update_frames(self, frame_s: float) -> int:
+        """Frames from one update of the reflections to the next.
+
+        Raises:
+            InputError: The update's period is no multiple of a frame.
+        """
+        frames = self.update_period_s / frame_s
+        if not whole(frames):
+            raise InputError(
+                "room.update_period_s",
+                f"{self.update_period_s:g} s is not a multiple of a frame of the "
+                f"microphones, {frame_s:g} s; use "
+                f"{max(1, round(frames)) * frame_s:g}",
+            )
+        return round(frames)
 
     @property
     def corner(self) -> NDArray[np.float64]:

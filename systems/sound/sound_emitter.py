@@ -13,12 +13,7 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, read_arrays
-from systems.framework.signals import (
-    FRAME_PERIOD_S,
-    SAMPLE_RATE_HZ,
-    Emission,
-    read_only,
-)
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission, read_only
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.waveforms import SoundParameters, make_waveform
 
@@ -80,6 +75,7 @@ def make_emission(
     sound: SoundParameters,
     p_WS: NDArray[np.float64],
     v_WS: NDArray[np.float64],
+    tick_s: float = TICK_S,
 ) -> Emission:
     """What has left the loudspeaker up to a time.
 
@@ -89,12 +85,13 @@ def make_emission(
         sound: The gate.
         p_WS: (k, 2) source in W at the last k ticks, the last one now, m.
         v_WS: (k, 2) its velocity, m/s.
+        tick_s: From one tick to the next, s.
 
     Returns:
         Samples of sound pressure at 1 m, Pa, and where they left; its arrays cannot be
         written to.
     """
-    ages, count = _history(len(p_WS))
+    ages, count = _history(len(p_WS), tick_s)
     first = round(time * SAMPLE_RATE_HZ) + MARGIN - count
     samples = emitted_samples(waveform, sound, first, count)
     emitted = _silence(count) if samples is None else samples
@@ -113,9 +110,9 @@ def make_emission(
 
 
 @cache
-def _history(ticks: int) -> tuple[NDArray[np.float64], int]:
+def _history(ticks: int, tick_s: float) -> tuple[NDArray[np.float64], int]:
     """Ages of the last ticks, s, and the number of samples of an emission."""
-    ages = FRAME_PERIOD_S * np.arange(ticks - 1.0, -1.0, -1.0)
+    ages = tick_s * np.arange(ticks - 1.0, -1.0, -1.0)
     return ages, round(ages[0] * SAMPLE_RATE_HZ) + MARGIN
 
 
@@ -124,17 +121,21 @@ def _silence(count: int) -> NDArray[np.float32]:
     return np.zeros(count, dtype=np.float32)
 
 
-def history_ticks(maximum_range_m: float, c: float) -> int:
+def history_ticks(
+    maximum_range_m: float, c: float, frame_s: float = TICK_S, tick_s: float = TICK_S
+) -> int:
     """Ticks back to when sound left that arrives now from the maximum range.
 
     Args:
         maximum_range_m: Longest way of sound, m.
         c: Speed of sound, m/s.
+        frame_s: Longest frame of a listener, s.
+        tick_s: From one tick to the next, s.
 
     Returns:
         Number of ticks, the one now among them.
     """
-    return math.ceil((FRAME_PERIOD_S + maximum_range_m / c) / FRAME_PERIOD_S) + 1
+    return math.ceil((frame_s + maximum_range_m / c) / tick_s) + 1
 
 
 class SoundEmitter(LeafSystem):
@@ -149,7 +150,7 @@ class SoundEmitter(LeafSystem):
         output_ports:
         - emission [Emission]
 
-    Discrete state, 25 ms: position and velocity of the source at the last
+    Discrete state, every tick: position and velocity of the source at the last
     ticks, as far back as sound from the maximum range was emitted; before
     time zero the source rests where it starts. The output is a function of
     time, state and present input: no latency. Before time zero it is silent.
@@ -158,7 +159,9 @@ class SoundEmitter(LeafSystem):
         sound: What to play.
         acoustics: Speed of sound.
         maximum_range_m: Longest way to a listener, m, that of reflections included.
+        frame_s: Longest frame of a listener, s.
         seed: Seed of noise-like waveforms.
+        tick_s: Period of the update, s.
 
     Raises:
         ValueError: The sound file cannot be played, or the range is not finite.
@@ -174,14 +177,17 @@ class SoundEmitter(LeafSystem):
         sound: SoundParameters | None = None,
         acoustics: AcousticParameters | None = None,
         maximum_range_m: float = MAXIMUM_RANGE_M,
+        frame_s: float = TICK_S,
         seed: int = 0,
+        tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self._sound = sound or SoundParameters()
         self._waveform = make_waveform(self._sound, seed)
         check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
         c = (acoustics or AcousticParameters()).c
-        self._ticks = history_ticks(maximum_range_m, c)
+        self._tick_s = tick_s
+        self._ticks = history_ticks(maximum_range_m, c, frame_s, tick_s)
         self.set_name("sound_emitter")
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=3)
@@ -190,7 +196,7 @@ class SoundEmitter(LeafSystem):
         self.DeclareDiscreteState(4 * self._ticks)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=FRAME_PERIOD_S, offset_sec=0.0, update=self._remember
+            period_sec=tick_s, offset_sec=0.0, update=self._remember
         )
         self._emission: Any = self.DeclareAbstractOutputPort(
             name="emission",
@@ -219,4 +225,6 @@ class SoundEmitter(LeafSystem):
         p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)
         v_WS = np.concatenate((held[split:], velocity[:2])).reshape(-1, 2)
         time = context.get_time()
-        output.set_value(make_emission(time, self._waveform, self._sound, p_WS, v_WS))
+        output.set_value(
+            make_emission(time, self._waveform, self._sound, p_WS, v_WS, self._tick_s)
+        )

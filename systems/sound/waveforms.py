@@ -17,7 +17,7 @@ from systems.framework.parameters import (
     Positive,
     Time,
 )
-from systems.framework.signals import FRAME_PERIOD_S, SAMPLE_RATE_HZ
+from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.sound_file import read_sound
 
 __all__ = [
@@ -137,15 +137,16 @@ def _time(seconds: float) -> NDArray[np.float64]:
     return np.arange(round(seconds * SAMPLE_RATE_HZ)) / SAMPLE_RATE_HZ
 
 
+_SWEEP_S = 0.025
+
+
 def _chirp(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    """Sweeps of one frame's length, so that every frame holds the whole band."""
+    """Sweeps so long that every frame of 25 ms holds the whole band."""
     import scipy.signal
 
-    time = _time(FRAME_PERIOD_S)
-    sweep = scipy.signal.chirp(
-        time, sound.low_hz, FRAME_PERIOD_S, sound.high_hz, phi=-90.0
-    )
-    return np.tile(sweep, round(sound.on_s / FRAME_PERIOD_S) or 1)
+    time = _time(_SWEEP_S)
+    sweep = scipy.signal.chirp(time, sound.low_hz, _SWEEP_S, sound.high_hz, phi=-90.0)
+    return np.tile(sweep, round(sound.on_s / _SWEEP_S) or 1)
 
 
 def _band_noise(sound: SoundParameters, seed: int) -> NDArray[np.float64]:

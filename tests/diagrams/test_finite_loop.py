@@ -14,7 +14,7 @@ import systems.framework.noise
 import systems.sound.mic_array
 from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
 from diagrams.builder import SoundFollower
-from systems.framework.signals import FRAME_PERIOD_S, AudioFrame, Emission
+from systems.framework.signals import TICK_S, AudioFrame, Emission
 
 BUILDS = {
     "audio": (),
@@ -80,7 +80,7 @@ def test_a_wire_that_goes_bad_stops_the_run(build: str, role: str, name: str) ->
         kind = type(block).__name__.split("_")[0]
         message = f"^{kind}: {re.escape(name + place)} is {bad} at "
         with pytest.raises(ValueError, match=message):
-            simulator.AdvanceTo(SPOILT_AT_S + 2.0 * FRAME_PERIOD_S)
+            simulator.AdvanceTo(SPOILT_AT_S + 2.0 * TICK_S)
 
 
 def test_noise_of_the_microphones_that_goes_bad_stops_the_run(

@@ -26,6 +26,7 @@ from systems.sound.room import RoomParameters
 ONE_OF_EVERYTHING = """
 name: one of everything
 description: every field of the scenario's own level, and some of each block
+tick_s: 0.0125
 seed: 7
 duration_s: 0.1
 arena_m: [5, 6]

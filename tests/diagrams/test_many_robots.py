@@ -216,7 +216,7 @@ def test_without_its_schedule_a_follower_takes_one_for_the_other(convoy):
 def test_frames_that_can_hold_the_sound(time, may):
     """Bursts of 0.5 s from 1 s on, a way of 0.1 s, frames of 25 ms."""
     sound = SoundParameters(start_s=1.0)
-    assert may_sound(sound, time, 0.1) is may
+    assert may_sound(sound, time, 0.1, 0.025) is may
 
 
 def test_both_followers_of_one_source_complete():

@@ -14,7 +14,7 @@ from diagrams import (
     simulation,
 )
 from diagrams.scenario import Scenario
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 
 
 def test_code_is_loaded_aside_and_once_for_a_kind_of_build(monkeypatch):
@@ -32,7 +32,7 @@ def test_code_is_loaded_aside_and_once_for_a_kind_of_build(monkeypatch):
     follower = build_sound_follower(scenario, log=True)
     first, second = (simulate(scenario, follower=follower) for _ in range(2))
     assert len(simulators) == 3
-    assert simulators[0].get_context().get_time() < 10 * FRAME_PERIOD_S
+    assert simulators[0].get_context().get_time() < 10 * TICK_S
     assert first.wall_s < 1.0
     for name, values in first.columns.items():
         assert values.tobytes() == second.columns[name].tobytes()

@@ -10,7 +10,7 @@ from scipy.stats import binomtest
 from analysis.hearing.detection import FalseAlarms, detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
 from systems.base.robot import RobotParameters
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.hearing.localise import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.slow
 C = 340.0
 SHAPE = ArrayShape.of(RobotParameters().microphones_m)
 RATES = (1e-1, 1e-2, 1e-3)
-FRAMES = round(600.0 / FRAME_PERIOD_S)
+FRAMES = round(600.0 / TICK_S)
 
 
 @pytest.fixture(scope="module")

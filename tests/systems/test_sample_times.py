@@ -1,4 +1,4 @@
-"""When blocks act: all sampled ones every 25 ms, from the start on (Han 2019, 4.1)."""
+"""When blocks act: from the start on, every 25 ms (Han 2019, 4.1) or as told."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from pydrake.systems.framework import LeafSystem
 
 import systems
 from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.sound.adc import MicArrayParameters
 
 IN_TURN = UltrasonicParameters(firing="sequential")
 SAMPLED = {
@@ -37,6 +38,22 @@ def test_sampled_every_frame_from_the_start_on(name):
     timing = block.GetUniquePeriodicDiscreteUpdateAttribute()
     assert timing is not None
     assert (timing.period_sec(), timing.offset_sec()) == (0.025, 0.0)
+
+
+SLOW = MicArrayParameters(frame_s=0.1)
+TOLD = {name: {"tick_s": 0.0125} for name in SAMPLED.keys() | LAWS} | {
+    "IdealSourceSensor": {"frame_s": 0.1},
+    "MicArray": {"parameters": SLOW},
+    "TDOAEstimator": {"microphones": SLOW},
+}
+
+
+@pytest.mark.parametrize("name", sorted(TOLD))
+def test_sampled_as_told(name):
+    block = getattr(systems, name)(**SAMPLED.get(name, {}) | TOLD[name])
+    timing = block.GetUniquePeriodicDiscreteUpdateAttribute()
+    expected = 0.0125 if "tick_s" in TOLD[name] else 0.1
+    assert (timing.period_sec(), timing.offset_sec()) == (expected, 0.0)
 
 
 def test_other_blocks_are_functions_of_now():

@@ -19,9 +19,9 @@ import systems
 from systems.base.wheel_odometry import OdometryParameters
 from systems.framework.finite import check_finite, read_arrays, read_lists
 from systems.framework.signals import (
-    FRAME_PERIOD_S,
     FRAME_SAMPLES,
     SAMPLE_RATE_HZ,
+    TICK_S,
     AudioFrame,
     Emission,
 )
@@ -76,7 +76,7 @@ def good_value(port: Any, level: float) -> Any:
     if port.get_data_type() == PortDataType.kAbstractValued:
         return audio() if port.get_name() == "audio" else emission()
     if port.get_name() == "range_ages":
-        level *= FRAME_PERIOD_S
+        level *= TICK_S
     return [level] * port.size()
 
 

@@ -83,8 +83,13 @@ FIELDS = {
     "MicArrayParameters.position_tolerance_m": (0.0, 0.1),
     "MicArrayParameters.delay_tolerance_s": (0.0, 1e-4),
     "MicArrayParameters.gain_tolerance_db": (0.0, 40.0),
+    # A robot's clock, and the frames of its microphones.
+    "Scenario.tick_s": (1e-3, 1.0),
+    "MicArrayParameters.frame_s": (1e-3, 1.0),
+    "UltrasonicParameters.period_s": (1e-3, 1.0),
+    "MicArrayParameters.sample_rate_hz": (1e3, 1e5),
     # The room's response is worked out anew at most once a frame.
-    "RoomParameters.update_period_s": (0.025, 60.0),
+    "RoomParameters.update_period_s": (1e-3, 60.0),
     "RoomParameters.reverberation_time_s": (1e-3, 20.0),
     "RoomParameters.absorption": (ABOVE_0, 1.0),
     "RoomParameters.maximum_order": (1, 150),

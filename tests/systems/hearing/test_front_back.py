@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.hearing.target_filter import (
     HYPOTHESIS,
     LARGEST_COST,
@@ -24,7 +24,7 @@ from systems.hearing.target_filter import (
     fold,
 )
 
-T = FRAME_PERIOD_S
+T = TICK_S
 #: Standard deviation of a measured position, m.
 NOISE = 0.004
 SETTINGS = FilterSettings(

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.stats import chi2
 
-from systems.framework.signals import FRAME_PERIOD_S
+from systems.framework.signals import TICK_S
 from systems.hearing.target_filter import (
     GATE,
     HYPOTHESIS,
@@ -24,7 +24,7 @@ from systems.hearing.target_filter import (
     fold,
 )
 
-T = FRAME_PERIOD_S
+T = TICK_S
 SETTINGS = FilterSettings(
     speed_std=0.3,
     velocity_fade=4.0,

@@ -23,13 +23,24 @@ PAIR = math.sin(math.radians(30)) / (
 )  # fmt: skip
 
 
-def approach(bench, firing, aggregation, *, robot, wall, heading=0.0, start=START):
+def approach(
+    bench,
+    firing,
+    aggregation,
+    *,
+    robot,
+    wall,
+    heading=0.0,
+    start=START,
+    period=T,
+    ticks=30,
+):
     """Speeds (ticks, 3) and vectors (ticks, 6) while robot and wall close in.
 
     The robot drives along its heading at ``robot`` m/s, a long wall across its
     path comes at ``wall`` m/s.
     """
-    sensors = UltrasonicParameters(noise_m=0.0, firing=firing)
+    sensors = UltrasonicParameters(noise_m=0.0, firing=firing, period_s=period)
     far = {"poses_WO": [0.0] * 3, "sizes": [1.0, 30.0], "pose_WS": [90.0, 0.0, 0.0]}
     array = bench(
         UltrasonicArray(parameters=sensors, obstacle_count=1),
@@ -50,10 +61,11 @@ def approach(bench, firing, aggregation, *, robot, wall, heading=0.0, start=STAR
         target_valid=[1.0],
         v_WP=[0.0, 0.0],
     )
-    updated = [controller, collision, array] if firing == "sequential" else [controller]
+    held = firing == "sequential" or period > T
+    updated = [controller, collision, array] if held else [controller]
     towards = np.array([math.cos(heading), math.sin(heading)])
     speeds, vectors = [], []
-    for tick in range(30):
+    for tick in range(ticks):
         pose = [*(robot * tick * T * towards), heading]
         ahead = 0.175 + start + 0.5 - wall * tick * T
         put(array, pose_WB=pose, poses_WO=[*(ahead * towards), heading])
@@ -83,6 +95,22 @@ def test_speed_of_a_wall_is_true_at_every_tick(bench, robot, wall, heading):
     speeds, _ = approach(bench, "sequential", "nearest", **closing)
     np.testing.assert_array_equal(speeds[:4], 0.0, "a round after the first echo")
     np.testing.assert_allclose(speeds[6:, 0], 0.72, atol=1e-9)
+
+
+@pytest.mark.parametrize(("robot", "wall"), [(0.3, 0.0), (0.0, 0.3), (0.1, 0.2)])
+@pytest.mark.parametrize(
+    ("firing", "first"), [("simultaneous", 4), ("sequential", 2 * 6)]
+)
+def test_speed_of_a_wall_where_sensors_fire_every_other_tick(
+    bench, firing, first, robot, wall
+):
+    """A round is two ticks, or six; s is true from the end of the second one on."""
+    closing = {"robot": robot, "wall": wall, "period": 2 * T, "ticks": 60}
+    speeds, vectors = approach(bench, firing, "nearest", **closing)
+    np.testing.assert_allclose(speeds[first:, 0], 0.3, atol=1e-9)
+    if not wall:
+        now = START - robot * T * np.arange(60)
+        np.testing.assert_allclose(vectors[first:, 0], now[first:], atol=1e-9)
 
 
 def test_distance_of_a_resting_wall_is_that_of_now(bench):

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters
-from systems.framework.signals import FRAME_PERIOD_S, FRAME_SAMPLES
+from systems.framework.signals import FRAME_SAMPLES, TICK_S
 from systems.sound.adc import MicArrayParameters
 from systems.sound.ego_noise import EgoNoise, driving_share
 from systems.sound.mic_array import MicArray
@@ -106,7 +106,7 @@ SILENT = SoundParameters(start_s=100.0)
 
 def counts_at(block, tick, speed):
     """What the microphones record at a tick while the source is silent."""
-    time = tick * FRAME_PERIOD_S
+    time = tick * TICK_S
     p_WS, v_WS = np.tile([2.0, 0.0], (6, 1)), np.zeros((6, 2))
     sent = make_emission(time, make_waveform(SILENT), SILENT, p_WS, v_WS)
     context = block.CreateDefaultContext()

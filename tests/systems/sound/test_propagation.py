@@ -14,6 +14,7 @@ from systems.sound.propagation import (
     microphone_paths,
     propagate,
     retarded_delays,
+    sampled_at,
 )
 
 FS = 100_000.0
@@ -116,6 +117,30 @@ def test_source_passing_at_1_m_s(tone, velocity):
         )
         assert abs(error * FS) < 1e-3
         assert gain == pytest.approx(1.0, abs=1e-3)
+
+
+@pytest.mark.parametrize("rate", [32_000.0, 44_000.0, 50_000.0])
+@pytest.mark.parametrize("tone", [500.0, 2_000.0, 8_000.0, 15_000.0])
+def test_microphones_of_another_rate(rate, tone):
+    """A tone at 2 m, at instants of the microphone's own, while it passes at 1 m/s."""
+    position, velocity = np.array([0.01, 2.0]), np.array([1.0, 0.0])
+    sound = emission(lambda t: np.sin(2 * np.pi * tone * t), position, velocity)
+    count = round(FRAME * rate)
+    times, p_WM, v_WM = at_rest((0.0, 0.0))
+    heard = propagate(sound, times, p_WM, v_WM, count, C)[0]
+    t = TIME - FRAME + np.arange(count) / rate
+    delay = analytic_delay(t, position, velocity, np.zeros(2))
+    expected = np.sin(2 * np.pi * tone * (t - delay)) / (C * delay)
+    np.testing.assert_allclose(heard, expected, atol=3e-4)
+
+
+def test_sound_at_another_rate():
+    """Places between the samples of two tones."""
+    tones = np.array([[700.0], [9_000.0]])
+    sound = np.sin(2 * np.pi * tones * np.arange(2_600) / FS).astype(np.float32)
+    found = sampled_at(sound, 20, 3.125, 800)
+    t = (20 + 3.125 * np.arange(800)) / FS
+    np.testing.assert_allclose(found, np.sin(2 * np.pi * tones * t), atol=1e-4)
 
 
 @pytest.mark.parametrize("speed", [5.0, -5.0])

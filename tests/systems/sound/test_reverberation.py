@@ -11,7 +11,7 @@ import scipy.signal
 from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters
-from systems.framework.signals import FRAME_PERIOD_S, FRAME_SAMPLES, Emission
+from systems.framework.signals import FRAME_SAMPLES, TICK_S, Emission
 from systems.sound import reverberation
 from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import draw_tolerances, real_array
@@ -104,9 +104,9 @@ def test_resting_array_records_what_pyroomacoustics_simulates():
 def exact(room, source, velocity, pose, pose_velocity, time):
     """Each image moves as its source does, by the propagation in the free field."""
     images = room_images(room, C)
-    begin = time - FRAME_PERIOD_S
+    begin = time - TICK_S
     times = begin + ARRAY.instants
-    then = pose - FRAME_PERIOD_S * pose_velocity
+    then = pose - TICK_S * pose_velocity
     p_WM, v_WM = microphone_paths(
         times, begin, then, pose_velocity, time, pose, pose_velocity, ARRAY.p_BM
     )
@@ -142,19 +142,33 @@ def test_resting_places_are_exact():
     assert np.std(found - expected) < 1e-3 * np.std(expected)
 
 
+def test_a_slower_converter_hears_every_other_sample():
+    source, pose = np.array([1.6, 0.9]), np.array([-0.8, -0.3, 0.4])
+    old, new = places(pose, source), places(pose + 0.05, source)
+    slow = MicArrayParameters(sample_rate_hz=50_000.0)
+    of_all, of_half = (
+        Reverberation(ROOM, C, parameters).frames(
+            [emission(source)], TIME, old, new, ARRAY
+        )[0]
+        for parameters in (MicArrayParameters(), slow)
+    )
+    assert of_half.shape == (len(of_all), FRAME_SAMPLES // 2)
+    np.testing.assert_allclose(of_half, of_all[:, ::2], atol=1e-4 * np.std(of_all))
+
+
 def driven(ticks_held):
     """Errors of four frames of moving bodies, places taken every so many ticks."""
     velocity, pose_velocity = np.array([0.0, 0.3]), np.array([0.4, -0.2, 0.3])
     room = Reverberation(ROOM, C)
 
     def at(tick):
-        time = TIME + tick * FRAME_PERIOD_S
+        time = TIME + tick * TICK_S
         source = np.array([1.6, 0.9]) + (time - TIME) * velocity
         return source, np.array([-0.8, -0.3, 0.4]) + (time - TIME) * pose_velocity
 
     errors, signals = [], []
     for tick in range(1, 5):
-        time = TIME + tick * FRAME_PERIOD_S
+        time = TIME + tick * TICK_S
         _, pose = at(tick)
         held = (tick - 1) // ticks_held * ticks_held
         taken = tick // ticks_held * ticks_held
@@ -188,7 +202,7 @@ def test_new_places_fade_in_without_a_click():
     there = places([-0.6, -0.1, 0.5], [1.5, 0.7])
     frames: list[Any] = []
     for tick, (old, new) in enumerate([(here, here), (here, there), (there, there)]):
-        time = TIME + tick * FRAME_PERIOD_S
+        time = TIME + tick * TICK_S
         sent = emission((1.6, 0.9), time=time, wave=wave.astype(np.float32))
         frames += room.frames([sent], time, old, new, ARRAY)
     heard: Any = np.concatenate(frames, axis=1)
@@ -210,7 +224,7 @@ def test_who_rests_needs_one_response(monkeypatch):
     here = places([-0.8, -0.3, 0.4], [1.6, 0.9])
     there = places([-0.8, -0.2, 0.4], [1.6, 0.9])
     for tick, old, new in [(0, here, here), (1, here, here), (2, here, there)]:
-        time = TIME + tick * FRAME_PERIOD_S
+        time = TIME + tick * TICK_S
         room.frames([emission((1.6, 0.9), time=time)], time, old, new, ARRAY)
     assert len(computed) == 2
 
