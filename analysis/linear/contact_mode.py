@@ -31,7 +31,6 @@ from systems import DiffDrivePlant
 from systems.base.diff_drive_plant import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelSpeedCommand_
-from systems.framework.signals import TICK_S
 
 __all__ = [
     "ContactLimits",
@@ -91,11 +90,10 @@ def _chain(
     continuous = Linearize(block, context, wheels.get_index(), pose.get_index())
     sampled = DiscreteTimeApproximation(continuous, period_s)
 
-    command = WheelSpeedCommand_[AutoDiffXd](robot=robot)
+    command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=period_s)
     rest = [np.zeros(2), np.zeros(3)]
-    update = block_model(command, np.zeros(4), rest, period_s=TICK_S)
-    # v+ = v + T a and the wheels follow v+: the acceleration's column goes with T.
-    push = update.B[:, 0] * (period_s / TICK_S)
+    update = block_model(command, np.zeros(4), rest, period_s=period_s)
+    push = update.B[:, 0]
     v, w = slice(0, 2), slice(2, 4)
     A = np.block(
         [

@@ -39,7 +39,8 @@ _CONDITIONS: dict[Scheme, str] = {
     "held velocity": "D > 0 and 2 D T + K T^2 < 4",
     "held velocity, one tick late": "K T < D and 2 D T - K T^2 < 4",
 }
-#: A motor lag that counts as none, s; a shorter one costs the exponential digits.
+#: A motor lag that counts as none at the default tick, s; a shorter one costs the
+#: exponential digits. The stiffest springs that are tried go with 1/tick^2.
 _NO_LAG_S = 1e-7
 #: Sample periods that are tried, s.
 _PERIODS_S = np.geomspace(0.002, 4.0, 160)
@@ -100,7 +101,8 @@ def check_conditions(
 
 def _chain(scheme: Scheme, tick_s: float) -> LinearModel:
     """From the acceleration of a unit mass to what the law sees of it."""
-    built = motion_chain(Scenario(), motor_lag_s=_NO_LAG_S, period_s=tick_s)
+    no_lag_s = _NO_LAG_S * (tick_s / TICK_S) ** 2
+    built = motion_chain(Scenario(), motor_lag_s=no_lag_s, period_s=tick_s)
     if scheme == "held velocity":
         return built
     if scheme == "held velocity, one tick late":
