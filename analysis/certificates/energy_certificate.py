@@ -146,13 +146,8 @@ class EnergyCertificate:
             "certified_at_any_speed_share": self.any_speed_share,
             "start_certified": self.start_certified,
             "cell_m": self.cell_m,
-            "workspace_m": [
-                float(self.x_m[0]),
-                float(self.x_m[-1]),
-                float(self.y_m[0]),
-                float(self.y_m[-1]),
-            ],
-            "passivity": self.passivity.to_dict(),
+            "workspace_m": [*self.x_m[[0, -1]], *self.y_m[[0, -1]]],
+            "passivity": self.passivity,
         }
 
 

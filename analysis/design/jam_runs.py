@@ -32,7 +32,6 @@ def jam_runs(
     scenario: Scenario,
     laws: Sequence[str],
     *,
-    starts_m: Sequence[float] = JAM_STARTS_M,
     progress: Callable[[float], None] | None = None,
 ) -> list[JamRuns]:
     """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
@@ -40,7 +39,6 @@ def jam_runs(
     Args:
         scenario: Its attraction and repulsion are used.
         laws: As ``Scenario.law``.
-        starts_m: Where the robot starts, across the line to the source, m.
         progress: Called with the number of runs done.
 
     Returns:
@@ -55,7 +53,7 @@ def jam_runs(
     for law in laws:
         causes: Counter[str] = Counter()
         jams = 0
-        for start in starts_m:
+        for start in JAM_STARTS_M:
             place = layout.start.model_copy(update={"position_m": (0.0, start)})
             run = simulate(
                 layout.model_copy(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from analysis.laws.push_and_pull import (
@@ -101,15 +101,8 @@ class LawDesign:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        checks = [
-            asdict(check)
-            | {
-                "ratio": check.ratio if math.isfinite(check.ratio) else None,
-                "met": check.met,
-            }
-            for check in self.checks
-        ]
-        return {"law": self.law, "gains": self.gains, "met": self.met, "checks": checks}
+        checks = [vars(c) | {"ratio": c.ratio, "met": c.met} for c in self.checks]
+        return vars(self) | {"met": self.met, "checks": checks}
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import Port, ideal_loop
@@ -88,9 +89,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
         at = 2 * places.index("wheels")
         C = np.insert(C, [at, at], found.A[wheels], axis=0)
         D = np.insert(D, [at, at], found.B[wheels], axis=0)
-    turn = np.zeros((2 * len(places), 2 * len(places)))
-    for k, place in enumerate(places):
-        turn[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = _axes(point, place)
+    turn = block_diag(*(_axes(point, place) for place in places))
     names = tuple(f"{place}_{way}" for place in places for way in DIRECTIONS)
     return LinearModel(
         name=f"loop cut at {' and '.join(places) or 'nothing'}",
@@ -111,8 +110,7 @@ def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
         return np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
     if place == "sensor":
         return np.eye(2)
-    c, s = math.cos(point.theta_WB), math.sin(point.theta_WB)
-    return np.array([[c, s], [-s, c]])
+    return point.axes
 
 
 def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:

@@ -86,6 +86,12 @@ class OperatingPoint:
         return self.source_distance_m - self.loop.scenario.attraction.follow_distance_m
 
     @property
+    def axes(self) -> NDArray[np.float64]:
+        """(2, 2) rows: along the line to the source, and across it, in W."""
+        c, s = math.cos(self.theta_WB), math.sin(self.theta_WB)
+        return np.array([[c, s], [-s, c]])
+
+    @property
     def continuum(self) -> bool:
         """Whether P is free to move along a curve, as round the source."""
         sizes = np.abs(np.linalg.eigvals(self.stiffness_n_m))

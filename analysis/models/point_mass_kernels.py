@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
 from systems.world.geometry import beyond
 
-__all__ = ["distances", "forces", "run", "trajectory"]
+__all__ = ["forces", "run", "trajectory"]
 
 _Array = NDArray[np.float64]
 _State = tuple[float, float, float, float]
@@ -41,24 +41,6 @@ def _nearest(
     corner = du != 0.0 and dv != 0.0
     cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
     return cx, cy, math.sqrt(cx * cx + cy * cy), corner
-
-
-@njit(cache=True)
-def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (compiled)
-    """Distances of points from bodies; 0 inside a body.
-
-    Args:
-        points: (n, 2) in W, m.
-        bodies: (k, 6), see the module.
-
-    Returns:
-        (n, k) m.
-    """
-    out = np.empty((points.shape[0], bodies.shape[0]))
-    for i in range(points.shape[0]):
-        for k in range(bodies.shape[0]):
-            out[i, k] = _nearest(points[i, 0], points[i, 1], bodies[k])[2]
-    return out
 
 
 @njit(cache=True)
@@ -206,7 +188,7 @@ def _advance(
 @njit(cache=True)
 def run(
     starts: _Array, steps: int, h: float, contact: float, world: _World
-) -> tuple[_Array, _Array, _Array, _Array]:  # pragma: no cover
+) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
     """Integrates starts until contact or the end.
 
     Args:
@@ -217,12 +199,12 @@ def run(
         world: See the module.
 
     Returns:
-        Times of contact (n,), s, infinite without; least distances (n,), m; largest
-        rises of V above its least value so far (n,), J; and ends (n, 4).
+        Times of contact (n,), s, infinite without; least distances (n,), m; and
+        largest rises of V above its least value so far (n,), J.
     """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
-    rises, ends = np.zeros(count), np.empty((count, 4))
+    rises = np.zeros(count)
     for i in range(count):
         state = (starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
         lowest = np.inf
@@ -234,8 +216,7 @@ def run(
                 break
             lowest = min(lowest, energy)
             rises[i] = max(rises[i], energy - lowest)
-        ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3] = state
-    return times, closest, rises, ends
+    return times, closest, rises
 
 
 @njit(cache=True)

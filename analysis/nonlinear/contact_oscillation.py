@@ -61,14 +61,9 @@ class OscillationRun:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "cause": self.cause,
-            "amplitudes_m": self.amplitudes_m.tolist(),
-            "centres_m": self.centres_m.tolist(),
-            "growth_per_s": self.growth_per_s.tolist(),
-            "frequencies_rad_s": self.frequencies_rad_s.tolist(),
-            "settled_amplitude_m": self.settled_amplitude_m,
-        }
+        every_tick = ("times_s", "clearances_m")
+        cycles = {k: v for k, v in vars(self).items() if k not in every_tick}
+        return cycles | {"settled_amplitude_m": self.settled_amplitude_m}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +84,7 @@ class ContactOscillation:
             "to_go_m": self.contact.to_go_m,
             "equilibrium_m": self.contact.equilibrium_m,
             "variants": {
-                name: {
-                    "predicted": self.predictions[name].to_dict(),
-                    "simulated": run.to_dict(),
-                }
+                name: {"predicted": self.predictions[name], "simulated": run}
                 for name, run in self.runs.items()
             },
         }

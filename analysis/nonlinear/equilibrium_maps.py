@@ -95,15 +95,7 @@ class EquilibriumMap:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "law": self.law,
-            "parameter": self.parameter,
-            "sensing": self.sensing,
-            "values": list(self.values),
-            "jams": list(self.jams),
-            "collisions": list(self.collisions),
-            "points": [vars(p) for p in self.points],
-        }
+        return vars(self) | {"jams": self.jams, "collisions": self.collisions}
 
 
 def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
@@ -161,7 +153,6 @@ def gap_map(
     gaps_m: Sequence[float] = tuple(np.round(np.arange(0.2, 2.41, 0.1), 2)),
     *,
     sensing: str = "exact nearest",
-    progress: Callable[[float], None] | None = None,
 ) -> EquilibriumMap:
     """Rest points before two boxes on either side of the line to the source.
 
@@ -169,7 +160,6 @@ def gap_map(
         scenario: Law and gains.
         gaps_m: Distances between the boxes' facing sides, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
-        progress: Called with the share that is done.
 
     Returns:
         Places of rest in W, m, by gap.
@@ -183,7 +173,7 @@ def gap_map(
         y = 0.5 * (gap + BOX_M[1])
         return [(BOX_X_M, y), (BOX_X_M, -y)]
 
-    return _map(scenario, ("gap_m", gaps_m, boxes, _GAP_CELL_M), sensing, progress)
+    return _map(scenario, ("gap_m", gaps_m, boxes, _GAP_CELL_M), sensing)
 
 
 def offset_map(
@@ -191,7 +181,6 @@ def offset_map(
     offsets_m: Sequence[float] = tuple(np.round(np.arange(0.0, 0.21, 0.02), 2)),
     *,
     sensing: str = "cones",
-    progress: Callable[[float], None] | None = None,
 ) -> EquilibriumMap:
     """Rest points before one box beside the line to the source.
 
@@ -199,7 +188,6 @@ def offset_map(
         scenario: Law and gains.
         offsets_m: Distances of its centre from the line, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
-        progress: Called with the share that is done.
 
     Returns:
         Places of rest in W, m, by offset.
@@ -213,7 +201,7 @@ def offset_map(
         return [(BOX_X_M, offset)]
 
     varied = ("offset_m", offsets_m, box, _OFFSET_CELL_M)
-    return _map(scenario, varied, sensing, progress)
+    return _map(scenario, varied, sensing)
 
 
 def _map(
@@ -222,7 +210,6 @@ def _map(
         str, Sequence[float], Callable[[float], list[tuple[float, float]]], float
     ],
     sensing: str,
-    progress: Callable[[float], None] | None,
 ) -> EquilibriumMap:
     """Of (parameter, values, boxes by value, cell of the grid)."""
     parameter, numbers, boxes, cell_m = varied
@@ -231,12 +218,10 @@ def _map(
         raise InputError("sensing", f"{sensing!r} is none of {words}")
     values = tuple(float(v) for v in numbers)
     points = []
-    for k, value in enumerate(values):
+    for value in values:
         case = boxes_scenario(scenario, boxes(value), sensing)
         found = _end_of_run(case) if sensing == "cones" else _minima(case, cell_m)
         points += [RestPoint(value, x, y, outcome) for x, y, outcome in found]
-        if progress is not None:
-            progress((k + 1) / len(values))
     return EquilibriumMap(scenario.law, parameter, sensing, values, tuple(points))
 
 

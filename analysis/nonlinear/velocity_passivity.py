@@ -64,15 +64,11 @@ class VelocityTermPassivity:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "velocity_term": self.velocity_term,
-            "rise_n_s_m": self.rise_n_s_m,
-            "fall_n_s_m": self.fall_n_s_m,
-            "largest_injection_n_s_m": self.largest_injection_n_s_m,
-            "attraction_damping_n_s_m": self.attraction_damping_n_s_m,
-            "passive_alone": self.passive_alone,
-            "covered": self.covered,
-        }
+        names = (
+            "velocity_term", "rise_n_s_m", "fall_n_s_m", "largest_injection_n_s_m",
+            "attraction_damping_n_s_m", "passive_alone", "covered",
+        )  # fmt: skip
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, eq=False)
