@@ -1,13 +1,24 @@
-"""Real-time factors, and what the diagram adds to its own pure functions."""
+"""Real-time factors, and what the diagram adds to Drake and to its own functions."""
 
 from __future__ import annotations
 
-from time import perf_counter
+from collections.abc import Callable
+from time import process_time
+from typing import Any
 
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator
+
+from benchmarks.hollow import hollow_diagram
 from benchmarks.plain_loop import PlainLoop
-from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
+from diagrams import (
+    Scenario,
+    build_sound_follower,
+    load_scenario,
+    simulate,
+)
+from diagrams.simulation import simulator_config
 
-__all__ = ["diagram_overhead", "real_time_factor"]
+__all__ = ["overhead_of_a_run", "overhead_of_the_diagram", "real_time_factor"]
 
 #: Runs of each; the fastest counts, since a machine only ever adds time.
 REPEATS = 3
@@ -21,24 +32,54 @@ def real_time_factor(overrides: tuple[str, ...]) -> float:
     return max(run.simulated_s / run.wall_s for run in runs[1:])
 
 
-def diagram_overhead() -> float:
-    """Time of the simulation over that of the same functions in a plain loop.
+def overhead_of_a_run(overrides: tuple[str, ...]) -> float:
+    """Time of ``simulate`` over that of the same diagram with nothing in its blocks.
 
-    The loop calls the pure functions of every block in the same order, with
+    Both log every tick; the run is judged at every tick, too, and its result made.
+    """
+    scenario = load_scenario("default", overrides)
+    follower = build_sound_follower(scenario, log=True)
+    hollow = hollow_diagram(follower, log=True)
+
+    def run() -> float:
+        start = process_time()
+        simulate(scenario, follower=follower)
+        return process_time() - start
+
+    return _ratio(run, lambda: _simulated(hollow, scenario))
+
+
+def overhead_of_the_diagram() -> float:
+    """Time of the simulation over that of its functions and of Drake itself.
+
+    A plain loop calls the pure functions of every block in the same order, with
     the same integrator, on plain variables, and ends at the same place
-    (``tests/evals/test_plain_loop.py``). Neither side logs or judges the run.
+    (``tests/evals/test_plain_loop.py``); the same diagram with nothing in its blocks
+    is what Drake needs for them. Neither side logs or judges the run.
     """
     scenario = load_scenario("default")
     follower = build_sound_follower(scenario)
-    loop = PlainLoop(scenario)
-    simulated, plain = [], []
-    for _ in range(REPEATS + 1):
-        simulator = make_simulator(follower)
-        simulator.Initialize()
-        start = perf_counter()
-        simulator.AdvanceTo(scenario.duration_s)
-        simulated.append(perf_counter() - start)
-        start = perf_counter()
+    hollow, loop = hollow_diagram(follower), PlainLoop(scenario)
+
+    def parts() -> float:
+        start = process_time()
         loop.run()
-        plain.append(perf_counter() - start)
-    return min(simulated) / min(plain)
+        return process_time() - start + _simulated(hollow, scenario)
+
+    return _ratio(lambda: _simulated(follower.diagram, scenario), parts)
+
+
+def _simulated(diagram: Any, scenario: Scenario) -> float:
+    """Time that a diagram's run takes without judging it, s."""
+    simulator = Simulator(diagram)
+    ApplySimulatorConfig(simulator_config(scenario), simulator)
+    simulator.Initialize()
+    start = process_time()
+    simulator.AdvanceTo(scenario.duration_s)
+    return process_time() - start
+
+
+def _ratio(of: Callable[[], float], over: Callable[[], float]) -> float:
+    """Of the least times, taken in turns, the first ones left out."""
+    times = [(of(), over()) for _ in range(REPEATS + 1)][1:]
+    return min(time for time, _ in times) / min(time for _, time in times)

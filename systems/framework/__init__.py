@@ -7,7 +7,6 @@ from systems.framework.noise import frame_noise
 from systems.framework.parameters import Parameters
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import (
-    FRAME_PERIOD_S,
     FRAME_SAMPLES,
     SAMPLE_RATE_HZ,
     TICK_S,
@@ -16,7 +15,6 @@ from systems.framework.signals import (
 )
 
 __all__ = [
-    "FRAME_PERIOD_S",
     "FRAME_SAMPLES",
     "SAMPLE_RATE_HZ",
     "TICK_S",

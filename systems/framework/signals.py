@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 __all__ = [
-    "FRAME_PERIOD_S",
     "FRAME_SAMPLES",
     "SAMPLE_RATE_HZ",
     "TICK_S",
@@ -22,7 +21,6 @@ __all__ = [
 #: (Han 2019, section 4.1; printed "25 m/s").
 TICK_S = 0.025
 
-FRAME_PERIOD_S = TICK_S
 
 #: Rate at which sound is computed, and that of the converter unless its parameters
 #: say another (Han 2019, section 4.1).

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from typing import Any
 
 import pytest
 from pydrake.systems.framework import LeafSystem
@@ -12,7 +13,7 @@ from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.sound.adc import MicArrayParameters
 
 IN_TURN = UltrasonicParameters(firing="sequential")
-SAMPLED = {
+SAMPLED: dict[str, dict[str, Any]] = {
     "CollisionVector": {"sensors": IN_TURN},
     "IdealSourceSensor": {},
     "MicArray": {},
@@ -41,7 +42,9 @@ def test_sampled_every_frame_from_the_start_on(name):
 
 
 SLOW = MicArrayParameters(frame_s=0.1)
-TOLD = {name: {"tick_s": 0.0125} for name in SAMPLED.keys() | LAWS} | {
+TOLD: dict[str, dict[str, Any]] = {
+    name: {"tick_s": 0.0125} for name in SAMPLED.keys() | LAWS
+} | {
     "IdealSourceSensor": {"frame_s": 0.1},
     "MicArray": {"parameters": SLOW},
     "TDOAEstimator": {"microphones": SLOW},

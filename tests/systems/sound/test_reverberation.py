@@ -152,8 +152,12 @@ def test_a_slower_converter_hears_every_other_sample():
         )[0]
         for parameters in (MicArrayParameters(), slow)
     )
+    assert of_all is not None
+    assert of_half is not None
     assert of_half.shape == (len(of_all), FRAME_SAMPLES // 2)
-    np.testing.assert_allclose(of_half, of_all[:, ::2], atol=1e-4 * np.std(of_all))
+    np.testing.assert_allclose(
+        of_half, of_all[:, ::2], atol=1e-4 * float(np.std(of_all))
+    )
 
 
 def driven(ticks_held):
