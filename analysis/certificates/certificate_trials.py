@@ -31,8 +31,6 @@ class CertificateTrials:
     """Runs from certified starts."""
     outside: PointMassRuns
     """Runs from starts that are not certified."""
-    drawn: int
-    """Starts drawn for the shares."""
     certified_share: float
     """Share of the drawn starts that is certified."""
     energy_share: float
@@ -68,7 +66,6 @@ class CertificateTrials:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        example = self.example
         rises = np.append(self.inside.energy_rises_j, self.outside.energy_rises_j)
         return {
             "inside_starts": len(self.inside.starts),
@@ -79,11 +76,9 @@ class CertificateTrials:
             "energy_alone_share": self.energy_share,
             "safe_share": self.safe_share,
             "ratio": self.ratio,
-            "closest_inside_m": float(self.inside.closest_m.min(initial=np.inf))
-            if len(self.inside.starts)
-            else None,
-            "largest_energy_rise_j": float(rises.max(initial=0.0)),
-            "colliding_start": example.tolist() if example is not None else None,
+            "closest_inside_m": self.inside.closest_m.min(initial=np.inf),
+            "largest_energy_rise_j": rises.max(initial=0.0),
+            "colliding_start": self.example,
         }
 
 
@@ -156,7 +151,6 @@ def try_certificate(
         certificate=certificate,
         inside=runs[0],
         outside=runs[1],
-        drawn=drawn,
         certified_share=certified / drawn,
         energy_share=by_energy / drawn,
     )

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -61,15 +60,11 @@ class DiagramTrials:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        low, high = self.interval
+        rate = {"estimate": self.collisions / len(self.causes)}
         return {
             "runs": len(self.causes),
             "collisions": self.collisions,
-            "collision_rate": {
-                "estimate": self.collisions / len(self.causes),
-                "low": low,
-                "high": high,
-            },
+            "collision_rate": rate | self.interval._asdict(),
             "causes": dict(Counter(self.causes)),
             "mechanisms": dict(Counter(m for m in self.mechanisms if m)),
             "skipped": self.skipped,
@@ -81,7 +76,6 @@ def try_diagram(
     *,
     starts: int = 24,
     hearing: str = "ideal",
-    progress: Callable[[float], None] | None = None,
 ) -> DiagramTrials:
     """Runs the scenario's diagram from random certified starts.
 
@@ -94,7 +88,6 @@ def try_diagram(
         starts: Runs.
         hearing: ``ideal`` (bursts of exact positions), or ``audio`` at about a
             second a run.
-        progress: Called with the share that is done.
 
     Returns:
         Starts of P, and how each run ended.
@@ -110,14 +103,9 @@ def try_diagram(
     scenario = scenario.model_copy(update={"hearing": hearing})
     follower = build_sound_follower(scenario)
     states, poses, skipped = _certified_starts(certificate, scenario, starts)
-    causes, mechanisms = [], []
-    for k, (state, pose) in enumerate(zip(states, poses, strict=True)):
-        cause, mechanism = _run(follower, state, pose)
-        causes.append(cause)
-        mechanisms.append(mechanism)
-        if progress is not None:
-            progress((k + 1) / starts)
-    return DiagramTrials(states, tuple(causes), tuple(mechanisms), skipped)
+    ends = [_run(follower, *start) for start in zip(states, poses, strict=True)]
+    causes, mechanisms = zip(*ends, strict=True)
+    return DiagramTrials(states, causes, mechanisms, skipped)
 
 
 def _certified_starts(

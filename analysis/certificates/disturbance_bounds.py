@@ -101,13 +101,8 @@ class DisturbanceBounds:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "law": self.law,
-            "source": [vars(row) for row in self.source],
-            "obstacle": [
-                {**vars(row), "certified": row.certified} for row in self.obstacle
-            ],
-        }
+        rows = [vars(row) | {"certified": row.certified} for row in self.obstacle]
+        return vars(self) | {"obstacle": rows}
 
 
 def disturbance_bounds(scenario: Scenario, *, runs: int = 200) -> DisturbanceBounds:

@@ -25,8 +25,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.ndimage import binary_propagation
 
-from analysis.certificates.escape_levels import border_cells, cell_bounds, climb, flood
+from analysis.certificates.escape_levels import border_cells, cell_bounds, climb
 from analysis.models.point_mass import PointMass, VelocityTermModel, point_mass
 from analysis.nonlinear.velocity_passivity import (
     VelocityTermPassivity,
@@ -145,13 +146,8 @@ class EnergyCertificate:
             "certified_at_any_speed_share": self.any_speed_share,
             "start_certified": self.start_certified,
             "cell_m": self.cell_m,
-            "workspace_m": [
-                float(self.x_m[0]),
-                float(self.x_m[-1]),
-                float(self.y_m[0]),
-                float(self.y_m[-1]),
-            ],
-            "passivity": self.passivity.to_dict(),
+            "workspace_m": [*self.x_m[[0, -1]], *self.y_m[[0, -1]]],
+            "passivity": self.passivity,
         }
 
 
@@ -206,8 +202,8 @@ def certify_energy(
     escape = np.array([climb(lower, seed, blocked) for seed in seeds]) - 1e-6
     strong = (escape - upper > model.top_kinetic_energy_j) & ~border
     reached = [
-        flood(np.isfinite(seed), wall | blocked)
-        for seed, wall in zip(seeds, strong, strict=True)
+        binary_propagation(np.isfinite(seed) & way, np.ones((3, 3)), mask=way)
+        for seed, way in zip(seeds, ~(strong | blocked), strict=True)
     ]
     return EnergyCertificate(
         scenario=scenario,

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from analysis.models.point_mass import PointMass
 
-__all__ = ["border_cells", "cell_bounds", "climb", "flood"]
+__all__ = ["border_cells", "cell_bounds", "climb"]
 
 
 def cell_bounds(
@@ -102,35 +102,3 @@ def climb(
                     level[a, b] = over
                     heapq.heappush(heap, (over, a, b))
     return level
-
-
-@njit(cache=True)
-def flood(
-    sources: NDArray[np.bool_], walls: NDArray[np.bool_]
-) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
-    """Cells that can be reached from the sources without crossing walls.
-
-    Args:
-        sources: (nx, ny) cells to begin in.
-        walls: (nx, ny) cells that no path enters.
-
-    Returns:
-        (nx, ny) whether each cell is reached; paths go to all eight neighbours.
-    """
-    nx, ny = sources.shape
-    reached = np.zeros((nx, ny), dtype=np.bool_)
-    stack = [(-1, -1)]
-    stack.pop()
-    for i in range(nx):
-        for j in range(ny):
-            if sources[i, j] and not walls[i, j]:
-                reached[i, j] = True
-                stack.append((i, j))
-    while len(stack) > 0:
-        i, j = stack.pop()
-        for a in range(max(i - 1, 0), min(i + 2, nx)):
-            for b in range(max(j - 1, 0), min(j + 2, ny)):
-                if not reached[a, b] and not walls[a, b]:
-                    reached[a, b] = True
-                    stack.append((a, b))
-    return reached

@@ -12,7 +12,7 @@ from fractions import Fraction
 __all__ = ["Polynomial", "gram_polynomial", "is_positive_definite", "match_gram"]
 
 #: Exponents of the variables.
-Monomial = tuple[int, ...]
+Exponents = tuple[int, ...]
 
 
 class Polynomial:
@@ -22,7 +22,7 @@ class Polynomial:
         terms: Coefficient by exponents; floats are taken as they are stored.
     """
 
-    def __init__(self, terms: dict[Monomial, Fraction | float | int]) -> None:
+    def __init__(self, terms: dict[Exponents, Fraction | float | int]) -> None:
         fractions = {m: Fraction(c) for m, c in terms.items()}
         self.terms = {m: c for m, c in fractions.items() if c != 0}
 
@@ -40,7 +40,7 @@ class Polynomial:
         return self + (-other)
 
     def __mul__(self, other: Polynomial) -> Polynomial:
-        out: dict[Monomial, Fraction | float | int] = {}
+        out: dict[Exponents, Fraction | float | int] = {}
         for m, c in self.terms.items():
             for n, d in other.terms.items():
                 key = tuple(a + b for a, b in zip(m, n, strict=True))
@@ -49,7 +49,7 @@ class Polynomial:
 
     def derivative(self, variable: int) -> Polynomial:
         """With respect to a variable, counted from 0."""
-        out: dict[Monomial, Fraction | float | int] = {}
+        out: dict[Exponents, Fraction | float | int] = {}
         for m, c in self.terms.items():
             if m[variable]:
                 lowered = (*m[:variable], m[variable] - 1, *m[variable + 1 :])
@@ -68,7 +68,7 @@ class Polynomial:
 
 
 def gram_polynomial(
-    basis: Sequence[Monomial], gram: Sequence[Sequence[Fraction]]
+    basis: Sequence[Exponents], gram: Sequence[Sequence[Fraction]]
 ) -> Polynomial:
     """z' G z of monomials z.
 
@@ -79,7 +79,7 @@ def gram_polynomial(
     Returns:
         The sum of all products, as a polynomial with rational coefficients.
     """
-    out: dict[Monomial, Fraction | float | int] = {}
+    out: dict[Exponents, Fraction | float | int] = {}
     for i, m in enumerate(basis):
         for j, n in enumerate(basis):
             key = tuple(a + b for a, b in zip(m, n, strict=True))
@@ -88,7 +88,7 @@ def gram_polynomial(
 
 
 def match_gram(
-    target: Polynomial, basis: Sequence[Monomial], gram: Iterable[Iterable[float]]
+    target: Polynomial, basis: Sequence[Exponents], gram: Iterable[Iterable[float]]
 ) -> list[list[Fraction]] | None:
     """The Gram matrix near ``gram`` whose z' G z is exactly the target.
 
@@ -106,7 +106,7 @@ def match_gram(
     rows = [[Fraction(value) for value in row] for row in gram]
     size = len(basis)
     rows = [[(rows[i][j] + rows[j][i]) / 2 for j in range(size)] for i in range(size)]
-    places: dict[Monomial, list[tuple[int, int]]] = {}
+    places: dict[Exponents, list[tuple[int, int]]] = {}
     for i in range(size):
         for j in range(size):
             key = tuple(a + b for a, b in zip(basis[i], basis[j], strict=True))

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.certificates.exact_polynomials import Monomial, Polynomial
+from analysis.certificates.exact_polynomials import Exponents, Polynomial
 from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
 
@@ -56,7 +56,7 @@ class LagModel:
         a, b = float(self.scales[0]), float(self.scales[1])
         h = self.coefficients.copy()
         h[0] += sign * self.error_n_m
-        push: dict[Monomial, Any] = {
+        push: dict[Exponents, Any] = {
             (k + 1, 0, 0): -a * float(value) / (mass * b) for k, value in enumerate(h)
         }
         push[0, 1, 0] = -damping / mass

@@ -20,12 +20,12 @@ from pydrake.solvers import (
     MathematicalProgramResult,
     SolverInterface,
 )
-from pydrake.symbolic import Expression
+from pydrake.symbolic import Expression, Monomial
 from pydrake.symbolic import Polynomial as SymbolicPolynomial
 from scipy.linalg import solve_continuous_lyapunov
 
 from analysis.certificates.exact_polynomials import (
-    Monomial,
+    Exponents,
     Polynomial,
     gram_polynomial,
     is_positive_definite,
@@ -50,8 +50,9 @@ __all__ = [
 _SHRINKINGS = (4.0, 16.0, 64.0, 256.0, 1024.0)
 #: V' is to fall at least by this share of |y|^2, 1/s.
 _DECAY = 1e-4
-#: The multipliers' monomials, degrees 1 and 2; those of the sum, 1 to 3.
+#: The multipliers' monomials, degrees 1 and 2; those of V; those of the sum, 1 to 3.
 _MULTIPLIER_BASIS = [m for m in product(range(3), repeat=3) if 1 <= sum(m) <= 2]
+_UNIT: list[Exponents] = [(1, 0, 0), (0, 1, 0), (0, 0, 1)]
 _SUM_BASIS = [m for m in product(range(4), repeat=3) if 1 <= sum(m) <= 3]
 
 
@@ -105,32 +106,33 @@ class Feasibility:
     sums: list[Any]
 
 
-def _symbolic(polynomial: Polynomial, y: NDArray[Any]) -> Expression:
-    total = Expression(0.0)
-    for monomial, value in polynomial.terms.items():
-        term = Expression(float(value))
-        for variable, exponent in zip(y, monomial, strict=True):
-            if exponent:
-                term = term * variable**exponent
-        total = total + term
-    return total
+def _symbolic(polynomial: Polynomial, y: NDArray[Any]) -> SymbolicPolynomial:
+    powers = _basis(list(polynomial.terms), y)
+    values = [Expression(float(value)) for value in polynomial.terms.values()]
+    return SymbolicPolynomial(dict(zip(powers, values, strict=True)))
 
 
-def _monomials(basis: list[Monomial], y: NDArray[Any]) -> NDArray[Any]:
-    return np.array([_symbolic(Polynomial({m: 1}), y) for m in basis])
+def _basis(exponents: list[Exponents], y: NDArray[Any]) -> NDArray[Any]:
+    return np.array([Monomial(dict(zip(y, m, strict=True))) for m in exponents])
 
 
-def _form(matrix: Any, vector: Any) -> Any:
-    """z' G z; numpy's own product warns of values in arrays of symbols."""
-    size = range(len(vector))
-    return sum(matrix[i, j] * vector[i] * vector[j] for i in size for j in size)
+def _form(matrix: Any, basis: NDArray[Any], y: NDArray[Any]) -> SymbolicPolynomial:
+    """z' G z of monomials z, of y alone where G has decision variables."""
+    z = [monomial.ToExpression() for monomial in basis]
+    size = range(len(z))
+    total = sum(matrix[i, j] * z[i] * z[j] for i in size for j in size)
+    return SymbolicPolynomial(total, y)
 
 
-def _falling(model: LagModel, P: NDArray[Any], y: NDArray[Any], sign: float) -> Any:
-    """-V' - decay |y|^2."""
-    rates = [_symbolic(rate, y) for rate in model.rates(sign)]
-    dot = sum(2.0 * P[i, j] * y[j] * rates[i] for i in range(3) for j in range(3))
-    return -dot - _DECAY * sum(v * v for v in y)
+def _gap(
+    model: LagModel, P: NDArray[Any], sigma: Any, y: NDArray[Any], sign: float
+) -> SymbolicPolynomial:
+    """-V' - decay |y|^2 - sigma (1 - V), which is to be a sum of squares."""
+    V = _form(P, _basis(_UNIT, y), y)
+    gap = SymbolicPolynomial(-_DECAY * sum(v * v for v in y), y)
+    for variable, rate in zip(y, model.rates(sign), strict=True):
+        gap -= V.Differentiate(variable) * _symbolic(rate, y)
+    return gap - sigma * (1.0 - V)
 
 
 def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
@@ -145,19 +147,12 @@ def feasibility(model: LagModel, P: NDArray[np.float64]) -> Feasibility:
     """
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
-    z, s = _monomials(_SUM_BASIS, y), _monomials(_MULTIPLIER_BASIS, y)
     multipliers, sums = [], []
     for sign in (-1.0, 1.0):
-        S = program.NewSymmetricContinuousVariables(len(s))
-        G = program.NewSymmetricContinuousVariables(len(z))
-        program.AddPositiveSemidefiniteConstraint(S)
-        program.AddPositiveSemidefiniteConstraint(G)
-        gap = _falling(model, P, y, sign) - _form(S, s) * (1.0 - _form(P, y))
-        program.AddEqualityConstraintBetweenPolynomials(
-            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
-        )
+        sigma, S = program.NewSosPolynomial(_basis(_MULTIPLIER_BASIS, y))
+        gap = _gap(model, P, sigma, y, sign)
         multipliers.append(S)
-        sums.append(G)
+        sums.append(program.AddSosConstraint(gap, _basis(_SUM_BASIS, y)))
     return Feasibility(program, multipliers, sums)
 
 
@@ -212,14 +207,10 @@ def larger_region(
     program = MathematicalProgram()
     y: Any = program.NewIndeterminates(3, "y")
     new: Any = program.NewSymmetricContinuousVariables(3, "P")
-    z, s = _monomials(_SUM_BASIS, y), _monomials(_MULTIPLIER_BASIS, y)
     for sign, S in zip((-1.0, 1.0), multipliers, strict=True):
-        G = program.NewSymmetricContinuousVariables(len(z))
-        program.AddPositiveSemidefiniteConstraint(G)
-        gap = _falling(model, new, y, sign) - _form(S, s) * (1.0 - _form(new, y))
-        program.AddEqualityConstraintBetweenPolynomials(
-            SymbolicPolynomial(gap, y), SymbolicPolynomial(_form(G, z), y)
-        )
+        sigma = _form(S, _basis(_MULTIPLIER_BASIS, y), y)
+        gap = _gap(model, new, sigma, y, sign)
+        program.AddSosConstraint(gap, _basis(_SUM_BASIS, y))
     for n in faces(model):
         block = np.empty((4, 4), dtype=object)
         block[:3, :3], block[:3, 3], block[3, :3], block[3, 3] = new, n, n, 1.0
@@ -236,6 +227,11 @@ def larger_region(
         return P
     found: Any = result.GetSolution(new)
     return np.asarray(0.5 * (found + found.T))
+
+
+def _rational(matrix: Any) -> list[list[Fraction]]:
+    """The symmetric part, as the rational numbers that its floats are."""
+    return [[Fraction(float(v)) for v in row] for row in 0.5 * (matrix + matrix.T)]
 
 
 def is_proved(
@@ -261,24 +257,15 @@ def is_proved(
     """
     if result is None:
         return False
-    rows = [[Fraction(float(v)) for v in row] for row in 0.5 * (P + P.T)]
-    unit = [m for m in product(range(2), repeat=3) if sum(m) == 1][::-1]
-    V = gram_polynomial(unit, rows)
+    rows = _rational(P)
+    V = gram_polynomial(_UNIT, rows)
     one = Polynomial({(0, 0, 0): 1})
     for sign, S, G in zip((-1.0, 1.0), problem.multipliers, problem.sums, strict=True):
-        S_found = result.GetSolution(S)
-        multiplier = match_gram(
-            gram_polynomial(
-                _MULTIPLIER_BASIS,
-                [[Fraction(float(v)) for v in row] for row in S_found],
-            ),
-            _MULTIPLIER_BASIS,
-            S_found,
-        )
+        multiplier = _rational(result.GetSolution(S))
         dot = Polynomial({})
         for k, rate in enumerate(model.rates(sign)):
             dot = dot + V.derivative(k) * rate
-        if multiplier is None or not is_positive_definite(multiplier):
+        if not is_positive_definite(multiplier):
             return False
         sigma = gram_polynomial(_MULTIPLIER_BASIS, multiplier)
         gap = -dot - sigma * (one - V)

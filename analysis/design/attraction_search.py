@@ -15,7 +15,7 @@ from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.linear.contact_mode import contact_matrix
-from analysis.models.ideal_loop import ideal_scenario
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulate
 from systems.framework.input_error import InputError
@@ -27,6 +27,7 @@ __all__ = [
     "follow_distance",
     "following_lag",
     "search_attraction",
+    "with_attraction",
 ]
 
 #: K_r that are tried, N/m.
@@ -62,7 +63,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
 
     def excess(K_r: float) -> float:
         return (
-            attraction_damping_ratio(_with(scenario, K_r, time * K_r))
+            attraction_damping_ratio(with_attraction(scenario, K_r, time * K_r))
             - requirements.damping
         )
 
@@ -75,7 +76,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
         )
     # Rounded up, since damping grows with K_r here: D_r grows along with it.
     K_r = math.ceil(10.0 * brentq(excess, low, high)) / 10.0
-    scenario = _with(scenario, K_r, round(time * K_r, 2))
+    scenario = with_attraction(scenario, K_r, round(time * K_r, 2))
     overshoot = braking_overshoot(scenario)
     follow = follow_distance(scenario, requirements, overshoot)
     while True:
@@ -127,19 +128,15 @@ def braking_overshoot(scenario: Scenario) -> float:
 
     P comes at top speed; no obstacle, exact hearing, no avoidance.
     """
-    attraction = scenario.attraction.model_copy(
-        update={"follow_distance_m": _STAND_OFF_M}
-    )
     changes = {
         "law": "none",
         "duration_s": 15.0,
         "obstacles": (),
-        "start": {},
-        "attraction": attraction.model_dump(),
-        "source": scenario.source.model_dump() | {"waypoints_m": [[_APPROACH_M, 0.0]]},
+        "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
+        "attraction": {"follow_distance_m": _STAND_OFF_M},
+        "source": {"waypoints_m": [[_APPROACH_M, 0.0]]},
     }
-    data = ideal_scenario(scenario).model_dump() | changes
-    run = simulate(Scenario.model_validate(data))
+    run = simulate(changed(ideal_scenario(scenario), changes))
     return max(0.0, _STAND_OFF_M - float(run.columns["source_range_true"].min()))
 
 
@@ -161,7 +158,17 @@ def follow_distance(
     return round(math.ceil(least / _STEP_M - 1e-9) * _STEP_M, 2)
 
 
-def _with(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
+def with_attraction(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
+    """The same scenario with another spring and damper to the source.
+
+    Args:
+        scenario: It stays as it is.
+        K_r: N/m.
+        D_r: N s/m.
+
+    Returns:
+        A copy.
+    """
     attraction = AttractionParameters.model_validate(
         scenario.attraction.model_dump() | {"stiffness_n_m": K_r, "damping_n_s_m": D_r}
     )

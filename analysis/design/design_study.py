@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from analysis.design.attraction_search import (
@@ -60,14 +60,8 @@ class Alternative:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        attraction = self.scenario.attraction.model_dump()
-        plain = {k: v for k, v in vars(self).items() if isinstance(v, float)}
-        return {
-            "attraction": attraction,
-            **plain,
-            "laws": [law.to_dict() for law in self.laws],
-            "jams": [asdict(runs) for runs in self.jams],
-        }
+        figures = {k: v for k, v in vars(self).items() if k != "scenario"}
+        return {"attraction": self.scenario.attraction, **figures}
 
 
 @dataclass(frozen=True)
@@ -95,17 +89,6 @@ class DesignStudy:
     """The scenario's attraction."""
     recommended: Alternative
     """The attraction that the requirements give."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON."""
-        return {
-            "requirements": asdict(self.requirements),
-            "kinetic_energy_j": self.kinetic_energy_j,
-            "barriers": [asdict(row) for row in self.barriers],
-            "contact_limits_n_m": list(self.contact_limits_n_m),
-            "today": self.today.to_dict(),
-            "recommended": self.recommended.to_dict(),
-        }
 
 
 #: Latencies of ``DesignStudy.contact_limits_n_m``, periods.

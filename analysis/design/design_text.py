@@ -8,7 +8,7 @@ from typing import Any
 
 from analysis.design.design_study import Alternative, DesignStudy
 from analysis.design.requirements import Check
-from analysis.reporting.plain_values import write_json
+from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
@@ -77,7 +77,7 @@ def design_summary(study: DesignStudy, out: Path) -> dict[str, Any]:
     return {
         "schema_version": SCHEMA_VERSION,
         "scenario": study.today.scenario.name,
-        **study.to_dict(),
+        **plain(study),
         "versions": versions(),
         "out": str(out),
     }

@@ -32,21 +32,24 @@ def jam_runs(
     scenario: Scenario,
     laws: Sequence[str],
     *,
-    starts_m: Sequence[float] = JAM_STARTS_M,
     progress: Callable[[float], None] | None = None,
 ) -> list[JamRuns]:
     """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
 
     Args:
-        scenario: Its attraction and repulsion are used.
+        scenario: Its attraction, repulsion, tick and rates of sensors are used.
         laws: As ``Scenario.law``.
-        starts_m: Where the robot starts, across the line to the source, m.
         progress: Called with the number of runs done.
 
     Returns:
         One a law, in their order.
     """
-    layout = load_scenario("two_static_obstacles", ["hearing=ideal"])
+    rates = (
+        f"tick_s={scenario.tick_s}",
+        f"microphones.frame_s={scenario.microphones.frame_s}",
+        f"ultrasonic.period_s={scenario.ultrasonic.period_s}",
+    )
+    layout = load_scenario("two_static_obstacles", ["hearing=ideal", *rates])
     static = layout.repulsion.active.speed_limit_m_s
     active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
     repulsion = scenario.repulsion.model_copy(update={"active": active})
@@ -55,7 +58,7 @@ def jam_runs(
     for law in laws:
         causes: Counter[str] = Counter()
         jams = 0
-        for start in starts_m:
+        for start in JAM_STARTS_M:
             place = layout.start.model_copy(update={"position_m": (0.0, start)})
             run = simulate(
                 layout.model_copy(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from analysis.laws.push_and_pull import (
@@ -64,7 +64,7 @@ class Check:
     value: float
     bound: float
     unit: str
-    at_least: bool
+    at_least: bool = False
     """Whether the bound is a lower one."""
 
     @property
@@ -101,15 +101,8 @@ class LawDesign:
 
     def to_dict(self) -> dict[str, Any]:
         """For JSON."""
-        checks = [
-            asdict(check)
-            | {
-                "ratio": check.ratio if math.isfinite(check.ratio) else None,
-                "met": check.met,
-            }
-            for check in self.checks
-        ]
-        return {"law": self.law, "gains": self.gains, "met": self.met, "checks": checks}
+        checks = [vars(c) | {"ratio": c.ratio, "met": c.met} for c in self.checks]
+        return vars(self) | {"met": self.met, "checks": checks}
 
 
 def with_gains(scenario: Scenario, law: str, **gains: float) -> Scenario:
@@ -187,38 +180,16 @@ def check_law(
     """
     push = spring(law, scenario)
     to_go = metres_to_go(scenario, requirements)
-    barrier = net_barrier(push, scenario, to_go)
-    checks = [
-        Check("barrier", barrier, kinetic_energy(scenario), "J", at_least=True),
-        *(
-            Check(*row, at_least=False)
-            for row in (
-                (
-                    "contact stiffness",
-                    stiffest(law, scenario),
-                    allowed_stiffness(scenario, requirements),
-                    "N/m",
-                ),
-                (
-                    "offset behind the source",
-                    rest_offset(law, scenario),
-                    scenario.stop.goal_margin_m,
-                    "m",
-                ),
-                (
-                    "offset by a far echo",
-                    far_offset(law, scenario),
-                    requirements.far_offset_m,
-                    "m",
-                ),
-                (
-                    "energy put back",
-                    injected_share(law, scenario),
-                    requirements.injected_share,
-                    "1",
-                ),
-            )
-        ),
-    ]
+    barrier, energy = net_barrier(push, scenario, to_go), kinetic_energy(scenario)
+    slope, allowed = stiffest(law, scenario), allowed_stiffness(scenario, requirements)
+    rest, far = rest_offset(law, scenario), far_offset(law, scenario)
+    room, share = scenario.stop.goal_margin_m, injected_share(law, scenario)
+    checks = (
+        Check("barrier", barrier, energy, "J", at_least=True),
+        Check("contact stiffness", slope, allowed, "N/m"),
+        Check("offset behind the source", rest, room, "m"),
+        Check("offset by a far echo", far, requirements.far_offset_m, "m"),
+        Check("energy put back", share, requirements.injected_share, "1"),
+    )
     gains = getattr(scenario.repulsion, law).model_dump()
-    return LawDesign(law, gains, tuple(checks))
+    return LawDesign(law, gains, checks)

@@ -23,6 +23,8 @@ __all__ = ["LawCurves", "law_curves", "radial_forces"]
 #: Where curves are drawn, m and m/s (negative: the obstacle recedes).
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
 SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)
+#: Where speeds vary, m: half of rho_0.
+AT_DISTANCE_M = 0.4
 
 
 @dataclass(frozen=True)
@@ -44,28 +46,13 @@ class LawCurves:
     force_n: NDArray[np.float64]
     """(k,) force at these speeds, N."""
 
-    def to_dict(self) -> dict[str, Any]:
-        """For JSON: lists in place of arrays."""
-        values = vars(self).items()
-        return {k: v.tolist() if isinstance(v, np.ndarray) else v for k, v in values}
 
-
-def law_curves(
-    scenario: Scenario,
-    laws: Iterable[str],
-    *,
-    distance_m: NDArray[np.float64] = DISTANCES_M,
-    speed_m_s: NDArray[np.float64] = SPEEDS_M_S,
-    at_distance_m: float = 0.4,
-) -> list[LawCurves]:
+def law_curves(scenario: Scenario, laws: Iterable[str]) -> list[LawCurves]:
     """Samples the laws with a scenario's gains.
 
     Args:
         scenario: Its ``repulsion`` and ``robot`` count.
         laws: As ``Scenario.law``.
-        distance_m: (n,) where to sample the push at rest, m, above 0.
-        speed_m_s: (k,) where to sample the force against speed, m/s.
-        at_distance_m: Distance of the latter, m; half of rho_0.
 
     Returns:
         One a law, forces in N.
@@ -84,11 +71,11 @@ def law_curves(
             LawCurves(
                 law=law,
                 velocity_term=scenario.repulsion.velocity_term,
-                distance_m=distance_m,
-                push_n=radial_forces(controller, distance_m, 0.0),
-                at_distance_m=at_distance_m,
-                speed_m_s=speed_m_s,
-                force_n=radial_forces(controller, at_distance_m, speed_m_s),
+                distance_m=DISTANCES_M,
+                push_n=radial_forces(controller, DISTANCES_M, 0.0),
+                at_distance_m=AT_DISTANCE_M,
+                speed_m_s=SPEEDS_M_S,
+                force_n=radial_forces(controller, AT_DISTANCE_M, SPEEDS_M_S),
             )
         )
     return curves

@@ -64,11 +64,11 @@ class RadialLaw:
 
     def at_rest(self, c: ArrayLike) -> NDArray[np.float64]:
         """f(c, 0) in N of many distances, by interpolation."""
-        return _interpolate(self.forces_n, c)
+        return np.interp(np.asarray(c), self.distances_m, self.forces_n, right=0.0)
 
     def energy(self, c: ArrayLike) -> NDArray[np.float64]:
         """U(c) in J, by interpolation."""
-        return _interpolate(self.energies_j, c)
+        return np.interp(np.asarray(c), self.distances_m, self.energies_j, right=0.0)
 
     def gradient(self, c: float, s: float) -> tuple[float, float]:
         """Slopes of f(c, s); at s = 0 the one towards s > 0.
@@ -83,15 +83,6 @@ class RadialLaw:
         f = self.function(AutoDiffXd(c, np.eye(2)[0]), AutoDiffXd(s, np.eye(2)[1]))
         slopes = f.derivatives() if isinstance(f, AutoDiffXd) else np.zeros(0)
         return (float(slopes[0]), float(slopes[1])) if len(slopes) else (0.0, 0.0)
-
-
-def _interpolate(table: NDArray[np.float64], c: ArrayLike) -> NDArray[np.float64]:
-    """Linear between entries DISTANCE_STEP_M apart; 0 beyond the last."""
-    place = np.maximum(np.asarray(c, dtype=float), 0.0) / DISTANCE_STEP_M
-    index = np.minimum(place.astype(int), len(table) - 2)
-    part = place - index
-    value = table[index] + part * (table[index + 1] - table[index])
-    return np.where(place < len(table) - 1, value, 0.0)
 
 
 def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:

@@ -7,15 +7,16 @@ what is left after a cycle of what was off before it.
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.linear.delayed_run import kicked, offsets
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
+from analysis.models.ideal_scenarios import changed
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
@@ -153,11 +154,12 @@ def burst_cycle(
 
 
 def _with_bursts(scenario: Scenario, hold: Hold, on: float, period: float) -> Scenario:
-    data = scenario.model_dump()
-    data["tracker"] |= {"hold": hold, "maximum_age_s": max(6.0, 3.0 * period)}
-    data["ideal_hearing"] |= {"burst_gaps": True}
-    data["sound"] |= {"on_s": on, "period_s": period, "start_s": 0.0}
-    return Scenario.model_validate(data)
+    changes = {
+        "tracker": {"hold": hold, "maximum_age_s": max(6.0, 3.0 * period)},
+        "ideal_hearing": {"burst_gaps": True},
+        "sound": {"on_s": on, "period_s": period, "start_s": 0.0},
+    }
+    return changed(scenario, changes)
 
 
 def _settled(loop: IdealLoop, point: OperatingPoint, ticks: int) -> NDArray[np.float64]:
@@ -188,7 +190,7 @@ def _multipliers(
     for matrix in matrices:
         product = matrix @ product
     motion = motion_model(point, product, 1.0)
-    axis = _axes(point)[direction]
+    axis = point.axes[direction]
     line = minimal_model(
         replace(
             motion,
@@ -199,12 +201,6 @@ def _multipliers(
     )
     poles = line.poles[np.abs(line.poles - 1.0) > _NEUTRAL]
     return poles[np.argsort(-np.abs(poles))]
-
-
-def _axes(point: OperatingPoint) -> NDArray[np.float64]:
-    """(2, 2) rows: along the line to the source, and across it, in W."""
-    c, s = math.cos(point.theta_WB), math.sin(point.theta_WB)
-    return np.array([[c, s], [-s, c]])
 
 
 def simulate_burst_cycle(
@@ -221,10 +217,8 @@ def simulate_burst_cycle(
         Growth over a cycle, and the way of P, m, at every tick.
     """
     loop, point = cycle.loop, cycle.point
-    axis = _axes(point)[DIRECTIONS.index(direction)]
-    state = cycle.state.copy()
-    kick = [loop.state_names.index(f"command.v_WP_{k}") for k in "xy"]
-    state[kick] += _KICK_M_S * axis
+    axis = point.axes[DIRECTIONS.index(direction)]
+    state = kicked(point, cycle.state, _KICK_M_S * axis)
     ticks = round(cycle.period_s / loop.tick_s)
     start, plant = _SETTLING_CYCLES * ticks, loop.indices("plant")[:3]
     run = loop.runner(state, start * loop.tick_s)
@@ -232,10 +226,7 @@ def simulate_burst_cycle(
     for k in range(start, start + cycles * ticks):
         run.advance((k + 1) * loop.tick_s)
         poses.append(run.state()[plant])
-    x, y, theta = np.array(poses).T
-    epsilon = loop.scenario.robot.control_point_m
-    places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
-    offset: NDArray[np.float64] = (places - point.p_WP) @ axis
+    offset = offsets(point, poses, axis)
     once = offset.reshape(cycles, ticks)[cycles // 4 :, -1]
     factor = _dominant_factor(once)
     time_s: NDArray[np.float64] = loop.tick_s * np.arange(1.0, len(offset) + 1)

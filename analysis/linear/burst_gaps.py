@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -73,16 +74,13 @@ def gap_chart(
     tick_s = scenario.tick_s
     ticks = np.rint(gaps / tick_s).astype(int)
     on = scenario.sound.on_s
-    longest = int(ticks.max()) * tick_s
+    heard, longest = round(on / tick_s), int(ticks.max()) * tick_s
     rows = []
     for hold in holds:
         cycle = burst_cycle(scenario, hold, on_s=on, gap_s=longest, point=point)
-        rows.append(
-            [
-                _largest(point, product)
-                for product in _products(cycle.matrices, round(on / tick_s), ticks)
-            ]
-        )
+        # Over the sound, and so many ticks of silence after it.
+        products = list(accumulate(cycle.matrices, lambda done, tick: tick @ done))
+        rows.append([_largest(point, products[heard + n - 1]) for n in ticks])
     return GapChart(
         on_s=on,
         gaps_s=ticks * tick_s,
@@ -90,23 +88,6 @@ def gap_chart(
         multiplier=np.array(rows),
         today=(scenario.sound.period_s - on, scenario.tracker.hold),
     )
-
-
-def _products(
-    matrices: NDArray[np.float64], heard: int, ticks: NDArray[np.int_]
-) -> list[NDArray[np.float64]]:
-    """Over the ticks that are heard and the first so many of silence."""
-    product, products = np.eye(matrices.shape[1]), []
-    for matrix in matrices[:heard]:
-        product = matrix @ product
-    wanted = dict.fromkeys(ticks.tolist())
-    for count in range(int(ticks.max()) + 1):
-        if count in wanted:
-            wanted[count] = product
-        if heard + count < len(matrices):
-            product = matrices[heard + count] @ product
-    products = [wanted[count] for count in ticks.tolist()]
-    return [product for product in products if product is not None]
 
 
 def _largest(point: OperatingPoint, product: NDArray[np.float64]) -> float:

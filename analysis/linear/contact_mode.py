@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +32,10 @@ from systems import DiffDrivePlant
 from systems.base.diff_drive_plant import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelSpeedCommand_
-from systems.framework.signals import TICK_S
 
 __all__ = [
     "ContactLimits",
+    "ContactOptions",
     "contact_limits",
     "contact_matrix",
     "contact_spectral_radius",
@@ -91,11 +92,10 @@ def _chain(
     continuous = Linearize(block, context, wheels.get_index(), pose.get_index())
     sampled = DiscreteTimeApproximation(continuous, period_s)
 
-    command = WheelSpeedCommand_[AutoDiffXd](robot=robot)
+    command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=period_s)
     rest = [np.zeros(2), np.zeros(3)]
-    update = block_model(command, np.zeros(4), rest, period_s=TICK_S)
-    # v+ = v + T a and the wheels follow v+: the acceleration's column goes with T.
-    push = update.B[:, 0] * (period_s / TICK_S)
+    update = block_model(command, np.zeros(4), rest, period_s=period_s)
+    push = update.B[:, 0]
     v, w = slice(0, 2), slice(2, 4)
     A = np.block(
         [
@@ -195,46 +195,34 @@ def contact_matrix(
     return before.A + before.B @ row[None]
 
 
+class ContactOptions(TypedDict, total=False):
+    """Of ``contact_matrix``, in the place of what the scenario says."""
+
+    damping_n_s_m: float | None
+    motor_lag_s: float | None
+    latency_ticks: int
+    period_s: float | None
+
+
 def contact_spectral_radius(
-    scenario: Scenario,
-    stiffness_n_m: float,
-    *,
-    damping_n_s_m: float | None = None,
-    motor_lag_s: float | None = None,
-    latency_ticks: int = 0,
-    period_s: float | None = None,
+    scenario: Scenario, stiffness_n_m: float, **options: Unpack[ContactOptions]
 ) -> float:
     """Largest |z| of the radial motion; stable below 1. See ``contact_matrix``.
 
     Args:
         scenario: Mass, robot, plant and damping are used.
         stiffness_n_m: All springs together, N/m.
-        damping_n_s_m: In place of D_r, N s/m.
-        motor_lag_s: In place of ``plant.motor_lag_s``, s.
-        latency_ticks: Age of the position that the springs act on, periods.
-        period_s: In place of the scenario's tick, s.
+        **options: See ``contact_matrix``.
 
     Returns:
         |z| over one period, 0 or more.
     """
-    matrix = contact_matrix(
-        scenario,
-        stiffness_n_m,
-        damping_n_s_m=damping_n_s_m,
-        motor_lag_s=motor_lag_s,
-        latency_ticks=latency_ticks,
-        period_s=period_s,
-    )
+    matrix = contact_matrix(scenario, stiffness_n_m, **options)
     return float(np.abs(np.linalg.eigvals(matrix)).max())
 
 
 def largest_contact_stiffness(
-    scenario: Scenario,
-    *,
-    damping_n_s_m: float | None = None,
-    motor_lag_s: float | None = None,
-    latency_ticks: int = 0,
-    period_s: float | None = None,
+    scenario: Scenario, **options: Unpack[ContactOptions]
 ) -> float:
     """Sum of springs, K_r + K_0, at which the radial motion stops decaying, N/m.
 
@@ -242,25 +230,14 @@ def largest_contact_stiffness(
 
     Args:
         scenario: Mass, robot, plant and damping are used.
-        damping_n_s_m: In place of D_r, N s/m.
-        motor_lag_s: In place of ``plant.motor_lag_s``, s.
-        latency_ticks: Age of the position that the springs act on, periods.
-        period_s: In place of the scenario's tick, s.
+        **options: See ``contact_matrix``.
 
     Returns:
         N/m; infinite where every spring that is tried is stable.
     """
 
     def excess(stiffness: float) -> float:
-        radius = contact_spectral_radius(
-            scenario,
-            stiffness,
-            damping_n_s_m=damping_n_s_m,
-            motor_lag_s=motor_lag_s,
-            latency_ticks=latency_ticks,
-            period_s=period_s,
-        )
-        return radius - 1.0
+        return contact_spectral_radius(scenario, stiffness, **options) - 1.0
 
     below = 0.0
     for stiffness in _STIFFNESSES:

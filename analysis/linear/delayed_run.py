@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.linear.delay_margin import DelayMargin, DelayPlace, delay_margin
-from analysis.models.open_loops import Direction
+from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 from systems.hearing.ideal_source_sensor import relative_position
@@ -136,22 +137,54 @@ def simulate_delayed(
         )
     if delay_s < 0.0:
         raise InputError("delay_s", f"is {delay_s}; give a delay of 0 s or more")
-    c, s = np.cos(point.theta_WB), np.sin(point.theta_WB)
-    axis = np.array([c, s] if direction == "along" else [-s, c])
-    loop = point.loop
-    state = point.state.copy()
-    kick = [loop.state_names.index(f"command.v_WP_{k}") for k in "xy"]
-    state[kick] += _KICK_M_S * axis
+    loop, axis = point.loop, point.axes[DIRECTIONS.index(direction)]
+    state = kicked(point, point.state, _KICK_M_S * axis)
     advance = _wheels_late if at == "wheels" else _hearing_late
     ticks = round(duration_s / loop.tick_s)
-    poses = np.array(advance(point, state, delay_s, ticks))
-    epsilon = loop.scenario.robot.control_point_m
-    x, y, theta = poses.T
-    places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
-    offset: NDArray[np.float64] = (places - point.p_WP) @ axis
+    offset = offsets(point, advance(point, state, delay_s, ticks), axis)
     time_s: NDArray[np.float64] = loop.tick_s * np.arange(1.0, ticks + 1)
     growth, frequency = fitted_oscillation(time_s, offset)
     return DelayedRun(delay_s, duration_s, growth, frequency, time_s, offset)
+
+
+def kicked(
+    point: OperatingPoint, state: NDArray[np.float64], kick_W: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """A state after a kick to the virtual mass.
+
+    Args:
+        point: Names the states.
+        state: (n,) of the diagram.
+        kick_W: (2,) m/s.
+
+    Returns:
+        (n,) a copy.
+    """
+    names, moved = point.loop.state_names, state.copy()
+    moved[[names.index(f"command.v_WP_{k}") for k in "xy"]] += kick_W
+    return moved
+
+
+def offsets(
+    point: OperatingPoint,
+    poses_WB: Sequence[NDArray[np.float64]],
+    axis: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """How far P is off an equilibrium along an axis.
+
+    Args:
+        point: The equilibrium.
+        poses_WB: n poses of the robot, m and rad.
+        axis: (2,) unit vector in W.
+
+    Returns:
+        (n,) m.
+    """
+    x, y, theta = np.array(poses_WB).T
+    epsilon = point.loop.scenario.robot.control_point_m
+    places = np.column_stack([x + epsilon * np.cos(theta), y + epsilon * np.sin(theta)])
+    found: NDArray[np.float64] = (places - point.p_WP) @ axis
+    return found
 
 
 def _wheels_late(

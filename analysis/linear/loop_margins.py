@@ -54,22 +54,12 @@ _NO_LOOP = 1e-9
 
 @dataclass(frozen=True)
 class FrequencyResponse:
-    """A loop and its gang of four over frequency."""
+    """A loop over frequency."""
 
     omega: NDArray[np.float64]
     """(n,) rad/s."""
     L: NDArray[np.complex128]
     """(n,) loop transfer function."""
-
-    @property
-    def S(self) -> NDArray[np.complex128]:
-        """Sensitivity 1 / (1 + L)."""
-        return 1.0 / (1.0 + self.L)
-
-    @property
-    def T(self) -> NDArray[np.complex128]:
-        """Complementary sensitivity L / (1 + L)."""
-        return self.L / (1.0 + self.L)
 
 
 @dataclass(frozen=True)

@@ -158,7 +158,6 @@ def pole_cloud(
     period: float,
     samples: int,
     seed: int,
-    progress: Callable[[], None] = lambda: None,
 ) -> PoleCloud:
     """Poles at random points of the box, and at the worst corner.
 
@@ -173,7 +172,6 @@ def pole_cloud(
         period: Sampling period, s.
         samples: Number of random points.
         seed: Of these.
-        progress: Called after each point.
 
     Returns:
         Poles in the z plane: nominal, of every point, and the worst.
@@ -186,10 +184,7 @@ def pole_cloud(
     values = low + unit.random(samples) * (high - low)
     whole = np.array([p.whole for p in parameters])
     values = np.where(whole, np.round(values), values)
-    found = []
-    for row in values:
-        found.append(poles(_named(parameters, row)))
-        progress()
+    found = [poles(_named(parameters, row)) for row in values]
     candidates = [*zip(values, found, strict=True), _worst_corner(poles, parameters)]
     worst, worst_poles = max(candidates, key=lambda item: _radius(item[1]))
     return PoleCloud(

@@ -39,10 +39,15 @@ _CONDITIONS: dict[Scheme, str] = {
     "held velocity": "D > 0 and 2 D T + K T^2 < 4",
     "held velocity, one tick late": "K T < D and 2 D T - K T^2 < 4",
 }
-#: A motor lag that counts as none, s; a shorter one costs the exponential digits.
+#: A motor lag that counts as none at the default tick, s; a shorter one costs the
+#: exponential digits. The stiffest springs that are tried go with 1/tick^2.
 _NO_LAG_S = 1e-7
 #: Sample periods that are tried, s.
 _PERIODS_S = np.geomspace(0.002, 4.0, 160)
+#: Springs and dampers of the attraction's chart, and springs of the delay's.
+_SPRINGS_N_M = np.geomspace(0.1, 400.0, 60)
+_DAMPERS_N_S_M = np.geomspace(0.05, 400.0, 60)
+_ALL_SPRINGS_N_M = np.geomspace(0.2, 100.0, 50)
 
 
 @dataclass(frozen=True)
@@ -100,7 +105,8 @@ def check_conditions(
 
 def _chain(scheme: Scheme, tick_s: float) -> LinearModel:
     """From the acceleration of a unit mass to what the law sees of it."""
-    built = motion_chain(Scenario(), motor_lag_s=_NO_LAG_S, period_s=tick_s)
+    no_lag_s = _NO_LAG_S * (tick_s / TICK_S) ** 2
+    built = motion_chain(Scenario(), motor_lag_s=no_lag_s, period_s=tick_s)
     if scheme == "held velocity":
         return built
     if scheme == "held velocity, one tick late":
@@ -213,8 +219,8 @@ def _growth(
 def gain_chart(
     scenario: Scenario,
     *,
-    stiffnesses_n_m: ArrayLike | None = None,
-    dampings_n_s_m: ArrayLike | None = None,
+    stiffnesses_n_m: ArrayLike = _SPRINGS_N_M,
+    dampings_n_s_m: ArrayLike = _DAMPERS_N_S_M,
 ) -> StabilityChart:
     """Over K_r and D_r: sampled, with the motors' lag, away from obstacles.
 
@@ -228,8 +234,7 @@ def gain_chart(
     """
     K, D = scenario.attraction.stiffness_n_m, scenario.attraction.damping_n_s_m
     tick_s = scenario.tick_s
-    x = _values(stiffnesses_n_m, np.geomspace(0.1, 400.0, 60))
-    y = _values(dampings_n_s_m, np.geomspace(0.05, 400.0, 60))
+    x, y = np.asarray(stiffnesses_n_m, float), np.asarray(dampings_n_s_m, float)
     return StabilityChart(
         title=f"attraction, with motor lag and {tick_s * 1e3:g} ms sampling",
         x_name="K_r (N/m)",
@@ -247,7 +252,7 @@ def gain_delay_chart(
     scenario: Scenario,
     *,
     delays_s: ArrayLike | None = None,
-    stiffnesses_n_m: ArrayLike | None = None,
+    stiffnesses_n_m: ArrayLike = _ALL_SPRINGS_N_M,
 ) -> StabilityChart:
     """Over the age of the position that the springs act on, and their stiffness.
 
@@ -262,9 +267,9 @@ def gain_delay_chart(
         Growth of the slowest mode, (ny, nx) 1/s.
     """
     tick_s = scenario.tick_s
-    delays = _values(delays_s, np.arange(0.0, 1.0, 2 * tick_s))
-    ticks = np.rint(delays / tick_s).astype(int)
-    y = _values(stiffnesses_n_m, np.geomspace(0.2, 100.0, 50))
+    delays = np.arange(0.0, 1.0, 2 * tick_s) if delays_s is None else delays_s
+    ticks = np.rint(np.asarray(delays, float) / tick_s).astype(int)
+    y = np.asarray(stiffnesses_n_m, float)
     return StabilityChart(
         title="all springs together, on a position of some age",
         x_name="delay (s)",
@@ -276,9 +281,3 @@ def gain_delay_chart(
         ),
         today=(0.0, scenario.attraction.stiffness_n_m),
     )
-
-
-def _values(
-    given: ArrayLike | None, default: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    return default if given is None else np.asarray(given, dtype=float)

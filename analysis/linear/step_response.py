@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from analysis.models.equilibria import follow_equilibrium
-from analysis.models.ideal_loop import frozen_scenario
+from analysis.models.ideal_scenarios import changed, frozen_scenario
 from analysis.models.operating_points import OperatingPoint
 from diagrams import build_sound_follower, make_simulator
 from diagrams.scenario import Scenario
@@ -119,13 +119,9 @@ def _run(
     ahead = np.array([math.cos(point.theta_WB), math.sin(point.theta_WB)])
     epsilon = scenario.robot.control_point_m
     x, y = control_point((*(point.p_WP + step_m * ahead), point.theta_WB), -epsilon)
-    data = scenario.model_dump()
-    data["start"] = {
-        "position_m": [x, y],
-        "heading_deg": math.degrees(point.theta_WB),
-    }
+    start = {"position_m": [x, y], "heading_deg": math.degrees(point.theta_WB)}
     # No stop rules: a small step is slow enough to count as rest.
-    follower = build_sound_follower(Scenario.model_validate(data), log=True)
+    follower = build_sound_follower(changed(scenario, {"start": start}), log=True)
     simulator = make_simulator(follower)
     simulator.Initialize()
     simulator.AdvanceTo(duration_s)

@@ -189,7 +189,6 @@ def join_blocks(
     state_names: tuple[str, ...],
     *,
     name: str,
-    cut: tuple[str, ...] = (),
     inputs: tuple[str, ...] = (),
     outputs: tuple[str, ...] = (),
 ) -> LinearModel:
@@ -199,7 +198,6 @@ def join_blocks(
         models: Linearised blocks, of one period.
         state_names: The order of states to return.
         name: Of the joined model.
-        cut: Signals whose wires are left open, to be fed from outside.
         inputs: Signals to feed from outside.
         outputs: Signals to return.
 
@@ -212,7 +210,7 @@ def join_blocks(
     said = [signal for model in models for signal in model.output_names]
     wires = np.zeros((len(heard), len(said)))
     for row, signal in enumerate(heard):
-        if signal in said and signal not in cut:
+        if signal in said:
             wires[row, said.index(signal)] = 1.0
     feed = np.array([[float(a == b) for b in inputs] for a in heard])
     feed = feed.reshape(len(heard), len(inputs))

@@ -81,6 +81,23 @@ class EquilibriumSearch:
         """Whether no equilibrium can have been missed."""
         return not self.unresolved and self.empty_outside
 
+    def follow_point(self) -> OperatingPoint:
+        """The stable equilibrium that is nearest to the follow distance.
+
+        Raises:
+            InputError: There is no stable equilibrium.
+        """
+        sinks = [point for point in self.points if point.stable]
+        if not sinks:
+            kinds = ", ".join(point.kind for point in self.points) or "none at all"
+            raise InputError(
+                "attraction",
+                f"the loop has no stable equilibrium (found: {kinds}), so that there "
+                "is nothing to linearise about; raise attraction.damping_n_s_m or "
+                "lower the law's stiffness",
+            )
+        return min(sinks, key=lambda point: abs(point.offset_m))
+
     @property
     def statement(self) -> str:
         """What was searched, and how completely, in a sentence or two."""
@@ -247,14 +264,4 @@ def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
     Raises:
         InputError: There is no stable equilibrium.
     """
-    search = find_equilibria(scenario)
-    sinks = [point for point in search.points if point.stable]
-    if not sinks:
-        kinds = ", ".join(point.kind for point in search.points) or "none at all"
-        raise InputError(
-            "scenario",
-            f"no stable equilibrium was found (found: {kinds}), so nothing can be "
-            "linearised about it; lower repulsion or raise attraction.damping_n_s_m, "
-            "or linearise one of find_equilibria(scenario).points",
-        )
-    return min(sinks, key=lambda point: abs(point.offset_m))
+    return find_equilibria(scenario).follow_point()

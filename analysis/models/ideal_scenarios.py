@@ -11,6 +11,7 @@ from systems.base.diff_drive_plant import PlantParameters
 from systems.framework.input_error import InputError
 
 __all__ = [
+    "changed",
     "frozen_scenario",
     "ideal_scenario",
     "require_ideal",
@@ -36,7 +37,7 @@ def ideal_scenario(scenario: Scenario) -> Scenario:
         ValueError: Its wheels can slip.
     """
     require_rolling(scenario.plant)
-    return _updated(scenario, _ALL_IDEAL)
+    return changed(scenario, _ALL_IDEAL)
 
 
 def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
@@ -56,10 +57,19 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
         x, y, theta = obstacle.path().pose(time_s)
         rest = {"waypoints_m": [[x, y]], "heading_deg": math.degrees(theta)}
         obstacles.append(obstacle.model_dump() | rest)
-    return _updated(scenario, {"source": source, "obstacles": obstacles})
+    return changed(scenario, {"source": source, "obstacles": obstacles})
 
 
-def _updated(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
+    """A copy with other values, validated.
+
+    Args:
+        scenario: It stays as it is.
+        changes: By field; a mapping changes fields of a group, in their units.
+
+    Returns:
+        The copy.
+    """
     data = scenario.model_dump()
     for key, value in changes.items():
         data[key] = data[key] | value if isinstance(value, dict) else value

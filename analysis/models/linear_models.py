@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -145,35 +145,29 @@ class LinearModel:
         """
         columns = [self.input_names.index(name) for name in inputs]
         rows = [self.output_names.index(name) for name in outputs]
-        return LinearModel(
-            self.name,
-            self.A,
-            self.B[:, columns],
-            self.C[rows],
-            self.D[np.ix_(rows, columns)],
-            self.state_names,
-            tuple(inputs),
-            tuple(outputs),
-            self.period_s,
+        return replace(
+            self,
+            B=self.B[:, columns],
+            C=self.C[rows],
+            D=self.D[np.ix_(rows, columns)],
+            input_names=tuple(inputs),
+            output_names=tuple(outputs),
         )
 
 
-def simple_poles(
-    poles: NDArray[np.complex128], *, apart: float = 1e-4
-) -> NDArray[np.complex128]:
-    """The poles that are neither zero nor within ``apart`` of another one.
+def simple_poles(poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """The poles that are neither zero nor within 1e-4 of another one.
 
     Others move by the root of a perturbation of the matrix: two computations
     that agree to rounding need not agree in them.
 
     Args:
         poles: (n,) in the z plane.
-        apart: Least distance from another pole.
 
     Returns:
         (k,) of them, in their order.
     """
     distances = np.abs(poles[:, None] - poles[None, :])
     np.fill_diagonal(distances, np.inf)
-    alone = (distances.min(axis=1) > apart) & (np.abs(poles) > 1e-3)
+    alone = (distances.min(axis=1) > 1e-4) & (np.abs(poles) > 1e-3)
     return poles[alone]

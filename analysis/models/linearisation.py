@@ -8,7 +8,8 @@ the limit of a period that goes to zero.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -86,16 +87,12 @@ def blockwise_model(point: OperatingPoint) -> LinearModel:
         ),
     )
     to_P = _control_point(point)
-    return LinearModel(
-        name=joined.name,
-        A=joined.A,
-        B=joined.B,
+    return replace(
+        joined,
         C=to_P @ joined.C,
         D=to_P @ joined.D,
-        state_names=joined.state_names,
         input_names=_INPUTS,
         output_names=_OUTPUTS,
-        period_s=joined.period_s,
     )
 
 
@@ -217,32 +214,19 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
     A_plant, B_plant = plant_jacobians(point)
     moving = [0, 1, 2, 5, 6]  # the wheels' angles move nothing
     A_plant, B_plant = A_plant[np.ix_(moving, moving)], B_plant[moving]
-    seen = _signals(controller, "output", "acceleration_W")
-    by = {
-        name: controller.D[np.ix_(seen, _signals(controller, "input", name))]
-        for name in (
-            "p_WS_estimated",
-            "pose_WB_estimated",
-            "v_WP",
-            "collision_vectors_B",
-        )
-    }
-    vectors = _signals(sensor, "output", "collision_vectors_B")
-    of = {
-        name: sensor.D[np.ix_(vectors, _signals(sensor, "input", name))]
-        for name in ("pose_WB", "pose_WS")
-    }
-    poses = _signals(command, "input", "pose_WB_estimated")
+    read, vectors = "acceleration_W", "collision_vectors_B"
+    by_vectors = _slope(controller, read, vectors)
+    by_pose = _slope(controller, read, "pose_WB_estimated")
+    by_pose = by_pose + by_vectors @ _slope(sensor, vectors, "pose_WB")
+    by_source = by_vectors @ _slope(sensor, vectors, "pose_WS")
+    by_source = _slope(controller, read, "p_WS_estimated") + by_source[:, :2]
+    poses = _signals(command.input_names, "pose_WB_estimated")
     wheels_v, wheels_pose = command.A[2:, :2], command.B[np.ix_([2, 3], poses)]
-    by_pose = by["pose_WB_estimated"] + by["collision_vectors_B"] @ of["pose_WB"]
-    by_source = (
-        by["p_WS_estimated"] + (by["collision_vectors_B"] @ of["pose_WS"])[:, :2]
-    )
     A = np.zeros((7, 7))
     A[:5, :5] = A_plant
     A[:5, :3] += B_plant @ wheels_pose
     A[:5, 5:] = B_plant @ wheels_v
-    A[5:, :3], A[5:, 5:] = by_pose, by["v_WP"]
+    A[5:, :3], A[5:, 5:] = by_pose, _slope(controller, read, "v_WP")
     B = np.zeros((7, 4))
     B[5:, :2], B[5:, 2:] = by_source, np.eye(2)
     C = np.zeros((3, 7))
@@ -262,9 +246,14 @@ def continuous_model(point: OperatingPoint) -> LinearModel:
     )  # fmt: skip
 
 
-def _signals(model: LinearModel, kind: str, port: str) -> list[int]:
-    names = model.input_names if kind == "input" else model.output_names
+def _signals(names: Sequence[str], port: str) -> list[int]:
     return [k for k, name in enumerate(names) if name.partition("[")[0] == port]
+
+
+def _slope(model: LinearModel, of: str, by: str) -> NDArray[np.float64]:
+    """How an output port follows an input port at once."""
+    rows, columns = _signals(model.output_names, of), _signals(model.input_names, by)
+    return model.D[np.ix_(rows, columns)]
 
 
 def plant_jacobians(

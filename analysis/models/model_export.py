@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 from scipy.io import savemat
 
@@ -47,7 +47,8 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
             ("C", model.C, y, x),
             ("D", model.D, y, u),
         ):
-            _write_csv(folder / f"{name}_{matrix}.csv", values, row_names, columns)
+            named = pd.DataFrame(values, row_names, columns)
+            named.to_csv(folder / f"{name}_{matrix}.csv", lineterminator="\n")
 
 
 def _identifier(name: str) -> str:
@@ -69,16 +70,3 @@ def _struct(model: LinearModel) -> dict[str, object]:
         "InputName": cells(model.input_names),
         "OutputName": cells(model.output_names),
     }
-
-
-def _write_csv(
-    path: Path,
-    values: NDArray[np.float64],
-    row_names: Sequence[str],
-    columns: Sequence[str],
-) -> None:
-    with path.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file, lineterminator="\n")
-        writer.writerow(["", *columns])
-        for name, row in zip(row_names, values, strict=True):
-            writer.writerow([name, *(repr(float(x)) for x in row)])

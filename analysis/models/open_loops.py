@@ -12,9 +12,11 @@ from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import Port, ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import Port, ideal_loop
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
 from analysis.models.operating_points import OperatingPoint
@@ -87,9 +89,7 @@ def cut_model(point: OperatingPoint, *places: BreakPoint) -> LinearModel:
         at = 2 * places.index("wheels")
         C = np.insert(C, [at, at], found.A[wheels], axis=0)
         D = np.insert(D, [at, at], found.B[wheels], axis=0)
-    turn = np.zeros((2 * len(places), 2 * len(places)))
-    for k, place in enumerate(places):
-        turn[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = _axes(point, place)
+    turn = block_diag(*(_axes(point, place) for place in places))
     names = tuple(f"{place}_{way}" for place in places for way in DIRECTIONS)
     return LinearModel(
         name=f"loop cut at {' and '.join(places) or 'nothing'}",
@@ -110,8 +110,7 @@ def _axes(point: OperatingPoint, place: BreakPoint) -> NDArray[np.float64]:
         return np.array([[1.0, 1.0], [-1.0, 1.0]]) / math.sqrt(2.0)
     if place == "sensor":
         return np.eye(2)
-    c, s = math.cos(point.theta_WB), math.sin(point.theta_WB)
-    return np.array([[c, s], [-s, c]])
+    return point.axes
 
 
 def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
@@ -124,20 +123,13 @@ def closed(model: LinearModel, signals: tuple[str, ...]) -> LinearModel:
     Returns:
         The model with the same inputs and outputs.
     """
-    into = [model.input_names.index(name) for name in signals]
-    out = [model.output_names.index(name) for name in signals]
-    gain = np.linalg.inv(np.eye(len(signals)) - model.D[np.ix_(out, into)])
-    back = gain @ model.C[out]
-    through = np.eye(len(model.input_names))
-    through[into] = gain @ (model.D[out] + np.eye(len(model.input_names))[into])
-    through[np.ix_(into, into)] = gain
-    return replace(
-        model,
-        A=model.A + model.B[:, into] @ back,
-        B=model.B @ through,
-        C=model.C + model.D[:, into] @ back,
-        D=model.D @ through,
-    )
+    import control
+
+    wires = np.zeros((len(model.input_names), len(model.output_names)))
+    for name in signals:
+        wires[model.input_names.index(name), model.output_names.index(name)] = 1.0
+    whole = control.feedback(model.to_control(), wires, sign=1)
+    return replace(model, A=whole.A, B=whole.B, C=whole.C, D=whole.D)
 
 
 def open_loop(
@@ -207,11 +199,13 @@ def target_loop(scenario: Scenario, at: BreakPoint = "sensor") -> LinearModel:
 
 def _attraction_slopes(scenario: Scenario) -> tuple[float, float]:
     """Stiffness, N/m, and damping, N s/m, towards a lone source at rest."""
-    data = ideal_scenario(scenario).model_dump()
-    data |= {"law": "none", "obstacles": []}
-    data["source"] |= {"waypoints_m": [[0.0, 0.0]]}
     distance = scenario.attraction.follow_distance_m + 2.0
-    data["start"] = {"position_m": [-distance, 0.0], "heading_deg": 0.0}
-    field = ForceField(ideal_loop(Scenario.model_validate(data)))
+    alone = {
+        "law": "none",
+        "obstacles": [],
+        "source": {"waypoints_m": [[0.0, 0.0]]},
+        "start": {"position_m": [-distance, 0.0], "heading_deg": 0.0},
+    }
+    field = ForceField(ideal_loop(changed(ideal_scenario(scenario), alone)))
     place = [-distance, 0.0]
     return -float(field.gradient(place)[1][0, 0]), field.damping(place)

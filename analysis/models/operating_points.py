@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import root_scalar
 
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import IdealLoop, ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import IdealLoop, ideal_loop
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.linear_models import LinearModel, Mode
 from analysis.models.model_reduction import minimal_model
 from diagrams.scenario import Scenario
@@ -83,6 +84,12 @@ class OperatingPoint:
     def offset_m(self) -> float:
         """How much farther from the source than ``follow_distance_m``, m."""
         return self.source_distance_m - self.loop.scenario.attraction.follow_distance_m
+
+    @property
+    def axes(self) -> NDArray[np.float64]:
+        """(2, 2) rows: along the line to the source, and across it, in W."""
+        c, s = math.cos(self.theta_WB), math.sin(self.theta_WB)
+        return np.array([[c, s], [-s, c]])
 
     @property
     def continuum(self) -> bool:
@@ -297,17 +304,17 @@ def moving_equilibrium(
 def _steady_scenario(scenario: Scenario, vx: float, vy: float) -> Scenario:
     """Ideal, without obstacles, the source driving 900 m from the origin."""
     speed = math.hypot(vx, vy)
-    data = ideal_scenario(scenario).model_dump()
-    data["obstacles"] = []
-    data["source"] |= {
+    source = {
         "waypoints_m": [[0.0, 0.0], [900.0 * vx / speed, 900.0 * vy / speed]],
         "speed_m_s": speed,
         "top_speed_m_s": 2.0 * speed + 1.0,
         "start_time_s": 0.0,
         "at_end": "stop",
     }
-    data["start"] = {"position_m": [-5.0 * vx, -5.0 * vy - 5.0], "heading_deg": 0.0}
-    return Scenario.model_validate(data)
+    start = {"position_m": [-5.0 * vx, -5.0 * vy - 5.0], "heading_deg": 0.0}
+    return changed(
+        ideal_scenario(scenario), {"obstacles": [], "source": source, "start": start}
+    )
 
 
 def _moving_point(

@@ -19,7 +19,7 @@ from analysis.laws.radial_law import RadialLaw, radial_law
 from analysis.models import point_mass_kernels as kernels
 from diagrams import Scenario
 from systems.framework.input_error import InputError
-from systems.world.geometry import control_point
+from systems.world.geometry import control_point, nearest_point_on_rectangle
 
 __all__ = ["PointMass", "PointMassRuns", "VelocityTermModel", "point_mass"]
 
@@ -44,8 +44,6 @@ class PointMassRuns:
     """(n,) least distance between P and a body."""
     energy_rises_j: NDArray[np.float64]
     """(n,) largest rise of V above its least value so far."""
-    ends: NDArray[np.float64]
-    """(n, 4) state at the end, or at contact."""
 
     @property
     def collided(self) -> NDArray[np.bool_]:
@@ -85,9 +83,9 @@ class PointMass:
 
     def distances(self, points: ArrayLike) -> NDArray[np.float64]:
         """(n, bodies) distances of points (n, 2) from each body, m; 0 inside."""
-        return kernels.distances(
-            np.ascontiguousarray(points, dtype=float), self._bodies()
-        )
+        points = np.asarray(points, dtype=float)
+        nearest = [nearest_point_on_rectangle(points.T, r) for r in self.rectangles]
+        return np.array([np.hypot(x, y) for x, y in nearest]).T
 
     def clearances(self, points: ArrayLike) -> NDArray[np.float64]:
         """(n,) distances from the nearest body, m."""
@@ -126,7 +124,7 @@ class PointMass:
             (n, 2) in W, N.
         """
         states = np.ascontiguousarray(states, dtype=float)
-        return kernels.forces(states, *self._numbers(term))
+        return kernels.forces(states, self._world(term))
 
     def run(
         self,
@@ -148,14 +146,14 @@ class PointMass:
             term: The velocity term: none (s = 0), or as the laws offer it.
 
         Returns:
-            Contact times, s, least distances, m, rises of V, J, and ends.
+            Contact times, s, least distances, m, and rises of V, J.
         """
         starts = np.ascontiguousarray(starts, dtype=float)
         steps = round(duration_s / STEP_S)
-        times, closest, rises, ends = kernels.run(
-            starts, steps, STEP_S, contact_m, *self._numbers(term)
+        times, closest, rises = kernels.run(
+            starts, steps, STEP_S, contact_m, self._world(term)
         )
-        return PointMassRuns(starts, times, closest, rises, ends)
+        return PointMassRuns(starts, times, closest, rises)
 
     def trajectory(
         self, start: ArrayLike, *, duration_s: float, term: VelocityTermModel
@@ -172,9 +170,9 @@ class PointMass:
         """
         start = np.ascontiguousarray(start, dtype=float)
         steps = round(duration_s / STEP_S)
-        return kernels.trajectory(start, steps, STEP_S, *self._numbers(term))
+        return kernels.trajectory(start, steps, STEP_S, self._world(term))
 
-    def _numbers(self, term: VelocityTermModel) -> tuple[Any, ...]:
+    def _world(self, term: VelocityTermModel) -> tuple[Any, ...]:
         gains = (
             self.stiffness_n_m,
             self.damping_n_s_m,
@@ -212,18 +210,16 @@ def point_mass(scenario: Scenario) -> PointMass:
             "obstacles",
         )
     rectangles = np.array([body.rectangle(0.0) for body in bodies.values()])
-    attraction = scenario.attraction
+    attraction, robot = scenario.attraction, scenario.robot
     return PointMass(
         law=radial_law(scenario),
         rectangles=rectangles,
         p_WS=rectangles[-1, :2].copy(),
-        p_WP=np.array(
-            control_point(scenario.start.pose, scenario.robot.control_point_m)
-        ),
+        p_WP=np.array(control_point(scenario.start.pose, robot.control_point_m)),
         stiffness_n_m=attraction.stiffness_n_m,
         damping_n_s_m=attraction.damping_n_s_m,
         follow_distance_m=attraction.follow_distance_m,
-        mass_kg=scenario.robot.mass_kg,
-        top_speed_m_s=scenario.robot.top_speed_m_s,
+        mass_kg=robot.mass_kg,
+        top_speed_m_s=robot.top_speed_m_s,
         all_bodies=all_bodies,
     )

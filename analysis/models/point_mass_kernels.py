@@ -2,7 +2,8 @@
 
 Bodies are rows (x, y, cos, sin, half length, half width); gains are (K_r, D_r,
 d_f, M, top speed, whether all bodies push, number of the velocity term); tables
-are those of ``RadialLaw``: forces, energies and increments.
+are those of ``RadialLaw``: forces, energies and increments. A world is bodies
+(k, 6), place of the source (2,) in W, m, gains, and tables.
 """
 
 from __future__ import annotations
@@ -16,13 +17,14 @@ from numpy.typing import NDArray
 from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
 from systems.world.geometry import beyond
 
-__all__ = ["distances", "forces", "run", "trajectory"]
+__all__ = ["forces", "run", "trajectory"]
 
 _Array = NDArray[np.float64]
 _State = tuple[float, float, float, float]
 _Vector = tuple[float, float, float, bool]
 _Gains = tuple[float, ...]
 _Tables = tuple[_Array, _Array, _Array]
+_World = tuple[_Array, _Array, _Gains, _Tables]
 
 #: A step across which the nearest body changes is done in so many parts.
 _SWITCH_PARTS = 32
@@ -39,24 +41,6 @@ def _nearest(
     corner = du != 0.0 and dv != 0.0
     cx, cy = body[2] * du - body[3] * dv, body[3] * du + body[2] * dv
     return cx, cy, math.sqrt(cx * cx + cy * cy), corner
-
-
-@njit(cache=True)
-def distances(points: _Array, bodies: _Array) -> _Array:  # pragma: no cover  (compiled)
-    """Distances of points from bodies; 0 inside a body.
-
-    Args:
-        points: (n, 2) in W, m.
-        bodies: (k, 6), see the module.
-
-    Returns:
-        (n, k) m.
-    """
-    out = np.empty((points.shape[0], bodies.shape[0]))
-    for i in range(points.shape[0]):
-        for k in range(bodies.shape[0]):
-            out[i, k] = _nearest(points[i, 0], points[i, 1], bodies[k])[2]
-    return out
 
 
 @njit(cache=True)
@@ -106,10 +90,11 @@ def _radial_force(
 
 @njit(cache=True)
 def _force(
-    state: _State, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
+    state: _State, world: _World
 ) -> tuple[float, float, float, float, int]:  # pragma: no cover
     """(Fx, Fy, potential energy, least distance, nearest body)."""
     x, y, vx, vy = state
+    bodies, p_WS, gains, tables = world
     stiffness, damping, follow, _, _, every, term = gains
     dx, dy = p_WS[0] - x, p_WS[1] - y
     r = max(math.sqrt(dx * dx + dy * dy), 1e-9)
@@ -135,17 +120,12 @@ def _force(
 
 
 @njit(cache=True)
-def forces(
-    states: _Array, bodies: _Array, p_WS: _Array, gains: _Gains, tables: _Tables
-) -> _Array:  # pragma: no cover  (compiled)
+def forces(states: _Array, world: _World) -> _Array:  # pragma: no cover  (compiled)
     """Sum of all forces at some states.
 
     Args:
         states: (n, 4) x, y, vx, vy, m and m/s.
-        bodies: (k, 6), see the module.
-        p_WS: (2,) the source, m.
-        gains: See the module.
-        tables: See the module.
+        world: See the module.
 
     Returns:
         (n, 2) in W, N.
@@ -153,33 +133,27 @@ def forces(
     out = np.empty((states.shape[0], 2))
     for i in range(states.shape[0]):
         state = (states[i, 0], states[i, 1], states[i, 2], states[i, 3])
-        fx, fy, _, _, _ = _force(state, bodies, p_WS, gains, tables)
+        fx, fy, _, _, _ = _force(state, world)
         out[i, 0], out[i, 1] = fx, fy
     return out
 
 
 @njit(cache=True)
-def _step(
-    state: _State,
-    h: float,
-    bodies: _Array,
-    p_WS: _Array,
-    gains: _Gains,
-    tables: _Tables,
-) -> _State:  # pragma: no cover
+def _step(state: _State, h: float, world: _World) -> _State:  # pragma: no cover
     """State after one Runge-Kutta step; |v| is cut to the top speed."""
     x, y, vx, vy = state
+    gains = world[2]
     m, g = 1.0 / gains[3], 0.5 * h
-    a1, b1, _, _, _ = _force(state, bodies, p_WS, gains, tables)
+    a1, b1, _, _, _ = _force(state, world)
     u2, w2 = vx + g * m * a1, vy + g * m * b1
     middle = (x + g * vx, y + g * vy, u2, w2)
-    a2, b2, _, _, _ = _force(middle, bodies, p_WS, gains, tables)
+    a2, b2, _, _, _ = _force(middle, world)
     u3, w3 = vx + g * m * a2, vy + g * m * b2
     middle = (x + g * u2, y + g * w2, u3, w3)
-    a3, b3, _, _, _ = _force(middle, bodies, p_WS, gains, tables)
+    a3, b3, _, _, _ = _force(middle, world)
     u4, w4 = vx + h * m * a3, vy + h * m * b3
     last = (x + h * u3, y + h * w3, u4, w4)
-    a4, b4, _, _, _ = _force(last, bodies, p_WS, gains, tables)
+    a4, b4, _, _, _ = _force(last, world)
     x += h / 6.0 * (vx + 2.0 * u2 + 2.0 * u3 + u4)
     y += h / 6.0 * (vy + 2.0 * w2 + 2.0 * w3 + w4)
     vx += h / 6.0 * m * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
@@ -192,41 +166,29 @@ def _step(
 
 @njit(cache=True)
 def _advance(
-    state: _State,
-    h: float,
-    bodies: _Array,
-    p_WS: _Array,
-    gains: _Gains,
-    tables: _Tables,
+    state: _State, h: float, world: _World
 ) -> tuple[_State, float, float]:  # pragma: no cover  (compiled)
     """State, V and least distance one step on.
 
     Where another body becomes the nearest the force steps; there the step is
     done again in parts, lest the energy show the integrator's error.
     """
-    _, _, _, _, before = _force(state, bodies, p_WS, gains, tables)
-    new = _step(state, h, bodies, p_WS, gains, tables)
-    _, _, energy, least, after = _force(new, bodies, p_WS, gains, tables)
+    _, _, _, _, before = _force(state, world)
+    new = _step(state, h, world)
+    _, _, energy, least, after = _force(new, world)
     if after != before:
         new = state
         for _ in range(_SWITCH_PARTS):
-            new = _step(new, h / _SWITCH_PARTS, bodies, p_WS, gains, tables)
-        _, _, energy, least, _ = _force(new, bodies, p_WS, gains, tables)
-    kinetic = 0.5 * gains[3] * (new[2] * new[2] + new[3] * new[3])
+            new = _step(new, h / _SWITCH_PARTS, world)
+        _, _, energy, least, _ = _force(new, world)
+    kinetic = 0.5 * world[2][3] * (new[2] * new[2] + new[3] * new[3])
     return new, energy + kinetic, least
 
 
 @njit(cache=True)
 def run(
-    starts: _Array,
-    steps: int,
-    h: float,
-    contact: float,
-    bodies: _Array,
-    p_WS: _Array,
-    gains: _Gains,
-    tables: _Tables,
-) -> tuple[_Array, _Array, _Array, _Array]:  # pragma: no cover
+    starts: _Array, steps: int, h: float, contact: float, world: _World
+) -> tuple[_Array, _Array, _Array]:  # pragma: no cover
     """Integrates starts until contact or the end.
 
     Args:
@@ -234,42 +196,32 @@ def run(
         steps: Most steps.
         h: Step, s.
         contact: P nearer to a body is contact, m.
-        bodies: (k, 6), see the module.
-        p_WS: (2,) the source, m.
-        gains: See the module.
-        tables: See the module.
+        world: See the module.
 
     Returns:
-        Times of contact (n,), s, infinite without; least distances (n,), m; largest
-        rises of V above its least value so far (n,), J; and ends (n, 4).
+        Times of contact (n,), s, infinite without; least distances (n,), m; and
+        largest rises of V above its least value so far (n,), J.
     """
     count = starts.shape[0]
     times, closest = np.full(count, np.inf), np.full(count, np.inf)
-    rises, ends = np.zeros(count), np.empty((count, 4))
+    rises = np.zeros(count)
     for i in range(count):
         state = (starts[i, 0], starts[i, 1], starts[i, 2], starts[i, 3])
         lowest = np.inf
         for k in range(steps):
-            state, energy, least = _advance(state, h, bodies, p_WS, gains, tables)
+            state, energy, least = _advance(state, h, world)
             closest[i] = min(closest[i], least)
             if least <= contact:
                 times[i] = (k + 1) * h
                 break
             lowest = min(lowest, energy)
             rises[i] = max(rises[i], energy - lowest)
-        ends[i, 0], ends[i, 1], ends[i, 2], ends[i, 3] = state
-    return times, closest, rises, ends
+    return times, closest, rises
 
 
 @njit(cache=True)
 def trajectory(
-    start: _Array,
-    steps: int,
-    h: float,
-    bodies: _Array,
-    p_WS: _Array,
-    gains: _Gains,
-    tables: _Tables,
+    start: _Array, steps: int, h: float, world: _World
 ) -> _Array:  # pragma: no cover
     """States from one start; contact is ignored.
 
@@ -277,10 +229,7 @@ def trajectory(
         start: (4,) x, y, vx, vy, m and m/s.
         steps: Number of steps.
         h: Step, s.
-        bodies: (k, 6), see the module.
-        p_WS: (2,) the source, m.
-        gains: See the module.
-        tables: See the module.
+        world: See the module.
 
     Returns:
         (steps + 1, 4), h apart.
@@ -289,6 +238,6 @@ def trajectory(
     out[0] = start
     state = (start[0], start[1], start[2], start[3])
     for k in range(steps):
-        state, _, _ = _advance(state, h, bodies, p_WS, gains, tables)
+        state, _, _ = _advance(state, h, world)
         out[k + 1, 0], out[k + 1, 1], out[k + 1, 2], out[k + 1, 3] = state
     return out

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.laws.head_on import HeadOn, head_on
-from analysis.models.ideal_loop import ideal_scenario
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.nonlinear.harmonic_balance import (
     OscillationPrediction,
     predict_oscillation,
@@ -61,14 +61,9 @@ class OscillationRun:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "cause": self.cause,
-            "amplitudes_m": self.amplitudes_m.tolist(),
-            "centres_m": self.centres_m.tolist(),
-            "growth_per_s": self.growth_per_s.tolist(),
-            "frequencies_rad_s": self.frequencies_rad_s.tolist(),
-            "settled_amplitude_m": self.settled_amplitude_m,
-        }
+        every_tick = ("times_s", "clearances_m")
+        cycles = {k: v for k, v in vars(self).items() if k not in every_tick}
+        return cycles | {"settled_amplitude_m": self.settled_amplitude_m}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +84,7 @@ class ContactOscillation:
             "to_go_m": self.contact.to_go_m,
             "equilibrium_m": self.contact.equilibrium_m,
             "variants": {
-                name: {
-                    "predicted": self.predictions[name].to_dict(),
-                    "simulated": run.to_dict(),
-                }
+                name: {"predicted": self.predictions[name], "simulated": run}
                 for name, run in self.runs.items()
             },
         }
@@ -168,30 +160,19 @@ def _head_on_scenario(
         scenario.attraction.follow_distance_m,
         _BOX_M[0] + _ROOM_BEHIND_M - contact.to_go_m,
     )
-    data = ideal_scenario(scenario).model_dump() | {
+    middle, far = face + 0.5 * _BOX_M[0], face + contact.to_go_m + follow
+    box = {"name": "box", "size_m": list(_BOX_M), "waypoints_m": [[middle, 0.0]]}
+    changes = {
         "duration_s": duration_s,
         "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
-        "obstacles": [
-            {
-                "name": "box",
-                "size_m": list(_BOX_M),
-                "waypoints_m": [[face + 0.5 * _BOX_M[0], 0.0]],
-            }
-        ],
+        "obstacles": [box],
+        "source": {"waypoints_m": [[far, 0.0]], "heading_deg": 0.0},
+        "attraction": {"follow_distance_m": follow},
+        "repulsion": {"velocity_term": term},
+        "tracker": {"hold": "world"},
+        "stop": {"stuck_after_s": 2.0 * duration_s, "goal_margin_m": 1e-6},
     }
-    source = {
-        "waypoints_m": [[face + contact.to_go_m + follow, 0.0]],
-        "heading_deg": 0.0,
-    }
-    data["source"] = data["source"] | source
-    data["attraction"] = data["attraction"] | {"follow_distance_m": follow}
-    data["repulsion"] = data["repulsion"] | {"velocity_term": term}
-    data["tracker"] = data["tracker"] | {"hold": "world"}
-    data["stop"] = data["stop"] | {
-        "stuck_after_s": 2.0 * duration_s,
-        "goal_margin_m": 1e-6,
-    }
-    return Scenario.model_validate(data)
+    return changed(ideal_scenario(scenario), changes)
 
 
 def _cycles(

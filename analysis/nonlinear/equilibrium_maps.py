@@ -14,8 +14,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import minimum_filter
 
-from analysis.models.ideal_loop import ideal_scenario
+from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
 from systems.framework.input_error import InputError
@@ -42,6 +43,12 @@ _GAP_CELL_M, _OFFSET_CELL_M = 0.02, 0.01
 #: Follow distance of the maps, m: as printed the attraction would end in the
 #: master robot, which repels as well.
 _FOLLOW_M = 1.2
+#: Ways to sense the boxes, as fields of a scenario.
+_SENSING: dict[str, dict[str, Any]] = {
+    "exact nearest": {"collision_vector": {"aggregation": "nearest"}},
+    "exact sum": {"collision_vector": {"aggregation": "sum"}},
+    "cones": {"obstacle_sensing": "ultrasonic"},
+}
 
 
 @dataclass(frozen=True)
@@ -88,15 +95,7 @@ class EquilibriumMap:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "law": self.law,
-            "parameter": self.parameter,
-            "sensing": self.sensing,
-            "values": list(self.values),
-            "jams": list(self.jams),
-            "collisions": list(self.collisions),
-            "points": [vars(p) for p in self.points],
-        }
+        return vars(self) | {"jams": self.jams, "collisions": self.collisions}
 
 
 def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
@@ -122,14 +121,9 @@ def local_minima(model: PointMass, *, cell_m: float) -> NDArray[np.float64]:
     potential = np.where(
         model.clearances(flat) > 0.0, model.potential(flat), np.inf
     ).reshape(grid.shape[:2])
-    inner = potential[1:-1, 1:-1]
-    least = np.isfinite(inner)
-    for i in range(3):
-        for j in range(3):
-            if (i, j) != (1, 1):
-                shifted = potential[i : i + inner.shape[0], j : j + inner.shape[1]]
-                least &= inner <= shifted
-    return np.asarray(grid[1:-1, 1:-1][least])
+    # Beyond the grid lies a wall that is lower than all.
+    least = potential <= minimum_filter(potential, 3, mode="constant", cval=-np.inf)
+    return np.asarray(grid[least & np.isfinite(potential)])
 
 
 def _refined(
@@ -159,7 +153,6 @@ def gap_map(
     gaps_m: Sequence[float] = tuple(np.round(np.arange(0.2, 2.41, 0.1), 2)),
     *,
     sensing: str = "exact nearest",
-    progress: Callable[[float], None] | None = None,
 ) -> EquilibriumMap:
     """Rest points before two boxes on either side of the line to the source.
 
@@ -167,7 +160,6 @@ def gap_map(
         scenario: Law and gains.
         gaps_m: Distances between the boxes' facing sides, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
-        progress: Called with the share that is done.
 
     Returns:
         Places of rest in W, m, by gap.
@@ -181,7 +173,7 @@ def gap_map(
         y = 0.5 * (gap + BOX_M[1])
         return [(BOX_X_M, y), (BOX_X_M, -y)]
 
-    return _map(scenario, ("gap_m", gaps_m, boxes, _GAP_CELL_M), sensing, progress)
+    return _map(scenario, ("gap_m", gaps_m, boxes, _GAP_CELL_M), sensing)
 
 
 def offset_map(
@@ -189,7 +181,6 @@ def offset_map(
     offsets_m: Sequence[float] = tuple(np.round(np.arange(0.0, 0.21, 0.02), 2)),
     *,
     sensing: str = "cones",
-    progress: Callable[[float], None] | None = None,
 ) -> EquilibriumMap:
     """Rest points before one box beside the line to the source.
 
@@ -197,7 +188,6 @@ def offset_map(
         scenario: Law and gains.
         offsets_m: Distances of its centre from the line, m.
         sensing: ``exact nearest``, ``exact sum`` or ``cones``.
-        progress: Called with the share that is done.
 
     Returns:
         Places of rest in W, m, by offset.
@@ -211,7 +201,7 @@ def offset_map(
         return [(BOX_X_M, offset)]
 
     varied = ("offset_m", offsets_m, box, _OFFSET_CELL_M)
-    return _map(scenario, varied, sensing, progress)
+    return _map(scenario, varied, sensing)
 
 
 def _map(
@@ -220,22 +210,18 @@ def _map(
         str, Sequence[float], Callable[[float], list[tuple[float, float]]], float
     ],
     sensing: str,
-    progress: Callable[[float], None] | None,
 ) -> EquilibriumMap:
     """Of (parameter, values, boxes by value, cell of the grid)."""
     parameter, numbers, boxes, cell_m = varied
-    if sensing not in ("exact nearest", "exact sum", "cones"):
-        raise InputError(
-            "sensing", f"{sensing!r} is none of 'exact nearest', 'exact sum', 'cones'"
-        )
+    if sensing not in _SENSING:
+        words = ", ".join(repr(word) for word in _SENSING)
+        raise InputError("sensing", f"{sensing!r} is none of {words}")
     values = tuple(float(v) for v in numbers)
     points = []
-    for k, value in enumerate(values):
+    for value in values:
         case = boxes_scenario(scenario, boxes(value), sensing)
         found = _end_of_run(case) if sensing == "cones" else _minima(case, cell_m)
         points += [RestPoint(value, x, y, outcome) for x, y, outcome in found]
-        if progress is not None:
-            progress((k + 1) / len(values))
     return EquilibriumMap(scenario.law, parameter, sensing, values, tuple(points))
 
 
@@ -285,20 +271,16 @@ def boxes_scenario(
     Returns:
         Scenario of 60 s with exact hearing.
     """
-    data = ideal_scenario(scenario).model_dump() | {
+    far = BOX_X_M + TO_GO_M + _FOLLOW_M
+    boxes = [
+        {"name": f"box {k + 1}", "size_m": list(size_m), "waypoints_m": [list(p)]}
+        for k, p in enumerate(places)
+    ]
+    world = {
         "duration_s": 60.0,
         "start": {"position_m": [0.0, 0.0], "heading_deg": 0.0},
-        "obstacles": [
-            {"name": f"box {k + 1}", "size_m": list(size_m), "waypoints_m": [list(p)]}
-            for k, p in enumerate(places)
-        ],
+        "obstacles": boxes,
+        "source": {"waypoints_m": [[far, 0.0]], "heading_deg": 0.0},
+        "attraction": {"follow_distance_m": _FOLLOW_M},
     }
-    source = {"waypoints_m": [[BOX_X_M + TO_GO_M + _FOLLOW_M, 0.0]], "heading_deg": 0.0}
-    data["source"] = data["source"] | source
-    data["attraction"] = data["attraction"] | {"follow_distance_m": _FOLLOW_M}
-    if sensing == "cones":
-        data["obstacle_sensing"] = "ultrasonic"
-    rule = {"exact nearest": "nearest", "exact sum": "sum"}.get(sensing)
-    if rule is not None:
-        data["collision_vector"] = data["collision_vector"] | {"aggregation": rule}
-    return Scenario.model_validate(data)
+    return changed(ideal_scenario(scenario), world | _SENSING[sensing])

@@ -18,8 +18,7 @@ from scipy.optimize import root
 from analysis.laws.head_on import HeadOn
 from analysis.linear.contact_mode import motion_chain
 from analysis.models.linear_models import LinearModel
-from analysis.nonlinear.velocity_terms import Variant
-from systems.laws.impedance import obstacle_speed
+from analysis.nonlinear.velocity_terms import Variant, sensed_speeds
 
 __all__ = ["OscillationPrediction", "predict_oscillation"]
 
@@ -67,19 +66,9 @@ class OscillationPrediction:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        cycle = self.limit_cycle
-        return {
-            "amplitudes_m": self.amplitudes_m.tolist(),
-            "centres_m": self.centres_m.tolist(),
-            "growth_per_s": self.growth_per_s.tolist(),
-            "frequencies_rad_s": self.frequencies_rad_s.tolist(),
-            "clamp_amplitude_m": self.clamp_amplitude_m,
-            "limit_cycle": None
-            if cycle is None
-            else dict(
-                zip(("amplitude_m", "centre_m", "frequency_rad_s"), cycle, strict=True)
-            ),
-        }
+        names = ("amplitude_m", "centre_m", "frequency_rad_s")
+        cycle = self.limit_cycle and dict(zip(names, self.limit_cycle, strict=True))
+        return vars(self) | {"limit_cycle": cycle}
 
 
 def predict_oscillation(
@@ -135,12 +124,9 @@ def _imbalance(
     phase = 2.0 * np.pi * np.arange(_PHASES) / _PHASES
     c = centre + amplitude * np.sin(phase)
     before = centre + amplitude * np.sin(phase - turn)
-    force = np.array(
-        [
-            contact.force(now, obstacle_speed((now, 0.0), (then, 0.0), term, tick_s))
-            for now, then in zip(c.tolist(), before.tolist(), strict=True)
-        ]
-    )
+    speeds = sensed_speeds(c, before, term, tick_s)
+    places = zip(c.tolist(), speeds.tolist(), strict=True)
+    force = np.array([contact.force(*place) for place in places])
     # sin(phase) is the imaginary part of exp(j phase).
     harmonic = 2.0j * np.mean(force * np.exp(-1j * phase)) / amplitude
     z = np.exp((growth + 1j * frequency) * tick_s)

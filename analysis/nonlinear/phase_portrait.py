@@ -59,7 +59,7 @@ class PhasePortrait:
             "velocity_term": self.velocity_term,
             "to_go_m": self.contact.to_go_m,
             "contact_m": self.contact_m,
-            "equilibria_m": list(self.contact.equilibria_m),
+            "equilibria_m": self.contact.equilibria_m,
             "starts": int(self.collides.size),
             "collisions": int(self.collides.sum()),
             "certified": int(self.certified.sum()),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,16 +33,6 @@ class RatioMap:
     """What is left to go behind the obstacle, m."""
     today: float
     """The scenario's ratio."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
-        return {
-            "ratios": self.ratios.tolist(),
-            "outer_m": [None if math.isnan(x) else x for x in self.outer_m.tolist()],
-            "inner_m": [None if math.isnan(x) else x for x in self.inner_m.tolist()],
-            "to_go_m": self.to_go_m,
-            "today": self.today,
-        }
 
 
 def stiffness_ratio_map(

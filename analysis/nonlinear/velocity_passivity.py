@@ -15,9 +15,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from analysis.laws.radial_law import INCREMENT_STEPS
-from analysis.models.point_mass import STEP_S, PointMass, point_mass
+from analysis.models.point_mass import STEP_S, point_mass
 from diagrams import Scenario
 
 __all__ = [
@@ -63,15 +64,11 @@ class VelocityTermPassivity:
 
     def to_dict(self) -> dict[str, Any]:
         """For the JSON document."""
-        return {
-            "velocity_term": self.velocity_term,
-            "rise_n_s_m": self.rise_n_s_m,
-            "fall_n_s_m": self.fall_n_s_m,
-            "largest_injection_n_s_m": self.largest_injection_n_s_m,
-            "attraction_damping_n_s_m": self.attraction_damping_n_s_m,
-            "passive_alone": self.passive_alone,
-            "covered": self.covered,
-        }
+        names = (
+            "velocity_term", "rise_n_s_m", "fall_n_s_m", "largest_injection_n_s_m",
+            "attraction_damping_n_s_m", "passive_alone", "covered",
+        )  # fmt: skip
+        return {name: getattr(self, name) for name in names}
 
 
 @dataclass(frozen=True, eq=False)
@@ -154,25 +151,14 @@ def energy_balance(
     start = np.append(model.p_WP, [0.0, 0.0])
     term: Any = passivity.velocity_term
     states = model.trajectory(start, duration_s=duration_s, term=term)
-    power = _term_power(model, states, term)
+    added = model.force(states, term) - model.force(states, "none")
+    power = np.sum(added * states[:, 2:], axis=1)
     loss = model.damping_n_s_m * np.sum(states[:, 2:] ** 2, axis=1)
     return EnergyBalance(
         passivity=passivity,
         times_s=STEP_S * np.arange(len(states), dtype=float),
         energies_j=model.energy(states),
-        injected_j=_work(power),
-        dissipated_j=_work(loss),
+        injected_j=cumulative_trapezoid(power, dx=STEP_S, initial=0.0),
+        dissipated_j=cumulative_trapezoid(loss, dx=STEP_S, initial=0.0),
         clearances_m=model.clearances(states[:, :2]),
     )
-
-
-def _term_power(
-    model: PointMass, states: NDArray[np.float64], term: Any
-) -> NDArray[np.float64]:
-    added = model.force(states, term) - model.force(states, "none")
-    return np.sum(added * states[:, 2:], axis=1)
-
-
-def _work(power: NDArray[np.float64]) -> NDArray[np.float64]:
-    steps = 0.5 * STEP_S * (power[1:] + power[:-1])
-    return np.append(0.0, np.cumsum(steps))

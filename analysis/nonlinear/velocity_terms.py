@@ -25,6 +25,7 @@ __all__ = [
     "VelocityTermAnalysis",
     "VelocityTermVariant",
     "describe_velocity_term",
+    "sensed_speeds",
     "velocity_term_analysis",
 ]
 
@@ -75,7 +76,7 @@ class OneSidedModel:
             "damping_n_s_m": self.damping_n_s_m,
             "damping_ratio": self.damping_ratio,
             "natural_frequency_rad_s": self.natural_frequency_rad_s,
-            "poles": [[float(p.real), float(p.imag)] for p in self.poles],
+            "poles": self.poles,
         }
 
 
@@ -93,17 +94,6 @@ class DescribingFunction:
     """(n,) the same bias of the controller's own difference over a tick, N."""
     sampled_damping_n_s_m: NDArray[np.float64]
     """(n,) the same damping of the controller's own difference, N s/m."""
-
-    def to_dict(self) -> dict[str, Any]:
-        """For the JSON document."""
-        names = (
-            "amplitudes_m_s",
-            "bias_n",
-            "damping_n_s_m",
-            "sampled_bias_n",
-            "sampled_damping_n_s_m",
-        )
-        return {name: getattr(self, name).tolist() for name in names}
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,9 +128,9 @@ class VelocityTermVariant:
         """For the JSON document."""
         return {
             "velocity_term": self.velocity_term,
-            "sides": [self.approaching.to_dict(), self.receding.to_dict()],
+            "sides": [self.approaching, self.receding],
             "amplitude_ratio": self.amplitude_ratio,
-            "describing_function": self.describing.to_dict(),
+            "describing_function": self.describing,
         }
 
 
@@ -167,7 +157,7 @@ class VelocityTermAnalysis:
             "law": self.contact.law.name,
             "to_go_m": self.contact.to_go_m,
             "equilibrium_m": self.contact.equilibrium_m,
-            "variants": {name: v.to_dict() for name, v in self.variants.items()},
+            "variants": self.variants,
             "bias_shift_m": self.bias_shift_m,
         }
 
@@ -269,10 +259,27 @@ def _sampled_harmonics(
     phase = turn * (np.arange(_CYCLE_TICKS, dtype=float) + 0.25)
     c = contact.equilibrium_m + amplitude / omega * np.sin(phase)
     before = contact.equilibrium_m + amplitude / omega * np.sin(phase - turn)
-    speeds = np.array(
-        [
-            obstacle_speed((now, 0.0), (then, 0.0), term, tick_s)
-            for now, then in zip(c.tolist(), before.tolist(), strict=True)
-        ]
+    return _harmonics(added, sensed_speeds(c, before, term, tick_s), phase, amplitude)
+
+
+def sensed_speeds(
+    now_m: NDArray[np.float64],
+    before_m: NDArray[np.float64],
+    term: Variant,
+    tick_s: float,
+) -> NDArray[np.float64]:
+    """The controller's s of an obstacle straight ahead.
+
+    Args:
+        now_m: (n,) distances at a tick, m.
+        before_m: (n,) distances a tick before, m.
+        term: Velocity term.
+        tick_s: The period, s.
+
+    Returns:
+        (n,) m/s.
+    """
+    pairs = zip(now_m.tolist(), before_m.tolist(), strict=True)
+    return np.array(
+        [obstacle_speed((c, 0.0), (then, 0.0), term, tick_s) for c, then in pairs]
     )
-    return _harmonics(added, speeds, phase, amplitude)

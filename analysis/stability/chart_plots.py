@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from analysis.linear.burst_gaps import GapChart
 from analysis.linear.contact_mode import ContactLimits
 from analysis.linear.delayed_run import DelayCheck
+from analysis.linear.linear_plots import panels
 from analysis.linear.root_locus import RootLocus
 from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 from analysis.reporting.palette import COLOURS
@@ -27,6 +28,8 @@ __all__ = [
 ]
 
 _LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+#: The mark of the scenario's own design.
+_TODAY: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
 #: Exponents beyond these look alike in a chart, 1/s.
 _SLOWEST, _FASTEST = -0.5, 0.5
 
@@ -47,9 +50,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
     )
     if chart.growth_per_s.min() < 0.0 < chart.growth_per_s.max():
         axes.contour(chart.x, chart.y, chart.growth_per_s, levels=[0.0], colors="black")
-    axes.plot(
-        *chart.today, "*", markersize=14, color="#F0E442", markeredgecolor="black"
-    )
+    axes.plot(*chart.today, "*", markersize=14, **_TODAY)
     axes.annotate("today", chart.today, textcoords="offset points", xytext=(9, 6))
     if chart.x.min() > 0.0:
         axes.set_xscale("log")
@@ -103,8 +104,7 @@ def plot_gap_chart(chart: GapChart) -> Figure:
     if chart.today[1] in chart.holds:
         row = chart.multiplier[chart.holds.index(chart.today[1])]
         at = float(np.interp(chart.today[0], chart.gaps_s, row))
-        axes.plot(chart.today[0], at, "*", markersize=14, color="#F0E442",
-                  markeredgecolor="black", label="today")  # fmt: skip
+        axes.plot(chart.today[0], at, "*", markersize=14, label="today", **_TODAY)
     axes.set_xlabel(f"silence after {chart.on_s:g} s of sound (s)")
     axes.set_ylabel("largest multiplier of a cycle")
     axes.grid(visible=True, which="both", linewidth=0.3)
@@ -133,10 +133,7 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
                 color=_LINES[k % len(_LINES)],
                 label=f"{ticks * limits.tick_s * 1e3:.0f} ms",
             )
-        axes.plot(
-            limits.today[0], today, "*", markersize=14, color="#F0E442",
-            markeredgecolor="black",
-        )  # fmt: skip
+        axes.plot(limits.today[0], today, "*", markersize=14, **_TODAY)
         axes.annotate(
             "today", (limits.today[0], today), textcoords="offset points", xytext=(8, 4)
         )
@@ -149,14 +146,9 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
 
 def plot_root_loci(loci: Sequence[RootLocus]) -> Figure:
     """Poles in the s plane, from a twentieth to twenty times today's gain."""
-    columns = min(2, len(loci))
-    rows = math.ceil(len(loci) / columns)
-    figure = Figure(figsize=(4.8 * columns, 3.8 * rows), layout="constrained")
-    cells = np.atleast_1d(figure.subplots(rows, columns)).ravel()
-    for axes, locus in zip(cells, loci, strict=False):
+    figure, cells = panels(len(loci), columns=2, size=(4.8, 3.8))
+    for axes, locus in zip(cells, loci, strict=True):
         _root_locus(figure, axes, locus)
-    for axes in cells[len(loci) :]:
-        axes.set_axis_off()
     return figure
 
 
@@ -164,10 +156,8 @@ def _root_locus(figure: Figure, axes: Axes, locus: RootLocus) -> None:
     poles = locus.poles
     values = np.repeat(locus.values[:, None], poles.shape[1], axis=1)
     dots = axes.scatter(poles.real, poles.imag, c=values, s=7, norm="log")
-    axes.plot(
-        locus.poles_today.real, locus.poles_today.imag, "*", markersize=11,
-        color="#F0E442", markeredgecolor="black", label=f"today: {locus.today:g}",
-    )  # fmt: skip
+    today, label = locus.poles_today, f"today: {locus.today:g}"
+    axes.plot(today.real, today.imag, "*", markersize=11, label=label, **_TODAY)
     slow = np.abs(locus.poles_today)[np.isfinite(locus.poles_today)]
     reach = 4.0 * max(float(slow[slow < 10.0].max(initial=0.5)), 0.5)
     axes.axvline(0.0, color="black", linewidth=0.8)

@@ -16,6 +16,7 @@ from typing import Any
 from analysis.models.linear_models import LinearModel
 from analysis.run_error import failure_text
 from analysis.stability.model_sheet import ModelSheet, model_sheet
+from analysis.stability.verdicts import Verdict
 from diagrams import Scenario
 from diagrams.laws import make_controller
 from diagrams.loading import scenario_from_mapping
@@ -111,6 +112,11 @@ class LawAnalysis:
             if finding.part.models and not finding.problem
             for model in finding.part.models(finding.data)
         )
+
+    @property
+    def verdicts(self) -> Sequence[Verdict]:
+        """Of the last part; none where it has no result."""
+        return self.data("verdicts") or ()
 
     def data(self, key: str) -> Any | None:
         """Data object of a part, none if it was left out or failed."""

@@ -1,4 +1,4 @@
-"""Parts of the stability report: operating points and linear models."""
+"""Parts of the stability report: operating points, linear models, a small step."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from analysis.linear.operating_point_plots import plot_equilibria
+from analysis.linear.linear_plots import plot_equilibria, plot_step
+from analysis.linear.step_response import Oscillation, StepCheck, check_step
 from analysis.models.equilibria import EquilibriumSearch, find_equilibria
 from analysis.models.linear_models import LinearModel, Mode
 from analysis.models.linearisation import (
@@ -68,8 +69,12 @@ class LinearModels:
     gradient: GradientCheck
 
 
-def linear_parts() -> tuple[Part, ...]:
-    """Operating points first: the report needs one to stand on."""
+def linear_parts(*, full: bool) -> tuple[Part, ...]:
+    """Operating points first: the report needs one to stand on.
+
+    Args:
+        full: Whether the small step is simulated with the scenario's sensors too.
+    """
     return (
         Part(
             "equilibria",
@@ -87,21 +92,19 @@ def linear_parts() -> tuple[Part, ...]:
             document=_models_document,
             models=lambda data: (data.continuous, data.sampled, data.at.motion),
         ),
+        Part(
+            "step",
+            "Prediction against simulation",
+            lambda study: check_step(study.scenario, full=full),
+            _render_step,
+            document=_step_document,
+        ),
     )
 
 
 def _operating_points(study: Study) -> OperatingPoints:
     search = find_equilibria(study.scenario)
-    sinks = [point for point in search.points if point.stable]
-    if not sinks:
-        kinds = ", ".join(point.kind for point in search.points) or "none at all"
-        raise InputError(
-            "attraction",
-            f"the loop has no stable equilibrium (found: {kinds}), so that "
-            "there is nothing to linearise about; raise attraction.damping_n_s_m or "
-            "lower the law's stiffness",
-        )
-    at = min(sinks, key=lambda point: abs(point.offset_m))
+    at = search.follow_point()
     try:
         return OperatingPoints(search, at, moving_equilibrium(study.scenario), "")
     except InputError as error:
@@ -289,6 +292,10 @@ def _element(value: float) -> Cell:
     return ZERO if abs(value) < _ZERO else float(np.round(value, 12))
 
 
+def _shares(mode: Mode) -> list[str]:
+    return [f"{k} {100.0 * v:.0f} %" for k, v in mode.participation.items()]
+
+
 def _mode_table(modes: Sequence[Mode], caption: str) -> str:
     moving = [m for m in modes if m.frequency_rad_s > _NEUTRAL_1_S]
     rows: list[list[Cell]] = [
@@ -299,7 +306,7 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
             mode.frequency_rad_s,
             mode.time_constant_s,
             mode.settling_s,
-            ", ".join(f"{k} {100.0 * v:.0f} %" for k, v in top(mode.participation)),
+            ", ".join(_shares(mode)[:3]),
         ]
         for mode in moving[:_MODES]
     ]
@@ -314,14 +321,30 @@ def _mode_table(modes: Sequence[Mode], caption: str) -> str:
     )  # fmt: skip
 
 
-def top(shares: dict[str, float], count: int = 3) -> list[tuple[str, float]]:
-    """The largest shares.
+def _step_document(data: StepCheck) -> dict[str, Any]:
+    names = ("predicted", "ideal", "full", "step_m", "frequency_error", "damping_error")
+    return {"step": {name: getattr(data, name) for name in names}}
 
-    Args:
-        shares: By name.
-        count: How many.
 
-    Returns:
-        Name and share, largest first.
-    """
-    return sorted(shares.items(), key=lambda item: -item[1])[:count]
+def _render_step(data: StepCheck, name: str) -> list[str]:
+    found: list[tuple[str, Oscillation | None]] = [
+        ("predicted by the linear model", data.predicted),
+        ("simulated, exact sensors", data.ideal),
+        ("simulated, the scenario's own sensors", data.full),
+    ]
+    rows: list[list[Cell]] = [
+        [title, each.frequency_rad_s, each.damping_ratio]
+        for title, each in found
+        if each
+    ]
+    return [
+        paragraph(
+            f"P starts {data.step_m:g} m off the operating point, along the line to "
+            f"the source. Exact sensors: {100.0 * data.frequency_error:.2f} % off in "
+            f"frequency and {100.0 * data.damping_error:.2f} % in damping. The "
+            "scenario's own sensors (in a full report) differ more: echoes of cones "
+            "are not nearest points, and hearing has its noise and its silences."
+        ),
+        table(["", "rad/s", "damping ratio"], rows),
+        figure_html(plot_step(data), name, "A small step, predicted and simulated."),
+    ]

@@ -11,18 +11,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.linear.gang_of_four import GangOfFour, gang_of_four
+from analysis.linear.linear_plots import (
+    plot_bode,
+    plot_gang_of_four,
+    plot_nichols,
+    plot_nyquist,
+)
 from analysis.linear.loop_margins import (
     DiskMargin,
     LoopMargins,
     PointMargins,
     all_margins,
     loop_margins,
-)
-from analysis.linear.margin_plots import (
-    plot_bode,
-    plot_gang_of_four,
-    plot_nichols,
-    plot_nyquist,
 )
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BREAK_POINTS, target_loop
@@ -43,6 +43,17 @@ _EXPLANATION = (
 )
 #: Faster modes are those of motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
+#: Fields of ``LoopMargins`` by heading.
+_COLUMNS = {
+    "gain up (dB)": "gain_increase_margin_db",
+    "gain down (dB)": "gain_reduction_margin_db",
+    "phase (deg)": "phase_margin_deg",
+    "crossover (rad/s)": "crossover_rad_s",
+    "modulus": "modulus_margin",
+    "M_s": "sensitivity_peak",
+    "M_t": "complementary_peak",
+    "delay (s)": "delay_margin_s",
+}
 #: The loop whose margins stand for the implemented one.
 _MAIN = ("sensor", "along")
 
@@ -178,10 +189,7 @@ def _render(data: Margins, name: str) -> list[str]:
     tick_ms = 1e3 * data.at.loop.tick_s
     rows.append([f"Implemented loop, {tick_ms:g} ms, at the operating point"])
     rows += [_row(m.at, m.direction, m.margins) for m in data.implemented]
-    headings = [
-        "cut at", "direction", "gain up (dB)", "gain down (dB)", "phase (deg)",
-        "crossover (rad/s)", "modulus", "M_s", "M_t", "delay (s)",
-    ]  # fmt: skip
+    headings = ["cut at", "direction", *_COLUMNS]
     loops = [m.margins for m in data.implemented]
     disks: list[list[Cell]] = [
         [m.at, m.direction, *_disk_cells(m.margins.disks)] for m in data.implemented
@@ -217,18 +225,7 @@ def _render(data: Margins, name: str) -> list[str]:
 
 
 def _row(at: str, direction: str, margins: LoopMargins) -> list[Cell]:
-    return [
-        at,
-        direction,
-        margins.gain_increase_margin_db,
-        margins.gain_reduction_margin_db,
-        margins.phase_margin_deg,
-        margins.crossover_rad_s,
-        margins.modulus_margin,
-        margins.sensitivity_peak,
-        margins.complementary_peak,
-        margins.delay_margin_s,
-    ]
+    return [at, direction, *(getattr(margins, name) for name in _COLUMNS.values())]
 
 
 def _disk_cells(disks: Sequence[DiskMargin]) -> list[Cell]:

@@ -13,7 +13,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from analysis.design.attraction_search import attraction_damping_ratio, following_lag
+from analysis.design.attraction_search import (
+    attraction_damping_ratio,
+    following_lag,
+    with_attraction,
+)
 from analysis.linear.contact_mode import (
     contact_matrix,
     contact_spectral_radius,
@@ -21,7 +25,7 @@ from analysis.linear.contact_mode import (
     motion_chain,
 )
 from analysis.linear.loop_margins import all_margins, loop_margins
-from analysis.linear.loop_uncertainty import law_stiffness, with_values
+from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BreakPoint
@@ -278,7 +282,7 @@ def _best(choices: Sequence[GainChoice], K_r: float) -> GainFigures | None:
 
 
 def _whole_loop(scenario: Scenario, gains: GainFigures) -> WholeLoop:
-    chosen = _with_gains(scenario, gains.stiffness_n_m, gains.damping_n_s_m)
+    chosen = with_attraction(scenario, gains.stiffness_n_m, gains.damping_n_s_m)
     loops = [found.margins for found in all_margins(follow_equilibrium(chosen))]
     weakest = min(loops, key=lambda loop: loop.disk.alpha)
     return WholeLoop(
@@ -293,13 +297,13 @@ def _choice(scenario: Scenario, K_r: float, thresholds: GainThresholds) -> GainC
     critical = 2.0 * math.sqrt(K_r * scenario.robot.mass_kg)
 
     def meets(D_r: float) -> bool:
-        return _meets(_with_gains(scenario, K_r, D_r), thresholds)
+        return _meets(with_attraction(scenario, K_r, D_r), thresholds)
 
     below = 0.0
     for D_r in critical * _DAMPERS:
         if meets(D_r):
             least = _bisected(meets, below, float(D_r))
-            chosen = _with_gains(scenario, K_r, least)
+            chosen = with_attraction(scenario, K_r, least)
             return GainChoice(K_r, gain_figures(chosen, thresholds))
         below = float(D_r)
     return GainChoice(K_r, None)
@@ -312,13 +316,6 @@ def _bisected(meets: Callable[[float], bool], low: float, high: float) -> float:
         low, high = (low, middle) if meets(middle) else (middle, high)
     rounded = math.ceil(100.0 * high) / 100.0
     return rounded if meets(rounded) else high
-
-
-def _with_gains(scenario: Scenario, K_r: float, D_r: float) -> Scenario:
-    return with_values(
-        scenario,
-        {"attraction.stiffness_n_m": K_r, "attraction.damping_n_s_m": D_r},
-    )
 
 
 def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:

@@ -13,7 +13,7 @@ from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.report_page import stability_page
-from analysis.stability.verdicts import Verdict, compare_verdicts
+from analysis.stability.verdicts import compare_verdicts
 from diagrams import dump_scenario
 
 __all__ = ["stability_document", "stability_text", "write_stability"]
@@ -49,11 +49,7 @@ def stability_document(
 
 def comparison(analyses: Sequence[LawAnalysis]) -> tuple[Any, ...]:
     """Verdicts side by side; of one law too."""
-    return compare_verdicts({a.law: _verdicts(a) for a in analyses})
-
-
-def _verdicts(analysis: LawAnalysis) -> Sequence[Verdict]:
-    return analysis.data("verdicts") or ()
+    return compare_verdicts({a.law: a.verdicts for a in analyses})
 
 
 def _law_document(analysis: LawAnalysis) -> dict[str, Any]:

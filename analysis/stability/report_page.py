@@ -23,7 +23,7 @@ from analysis.reporting.html_page import (
 from analysis.run_error import failure_text
 from analysis.stability.law_analysis import Finding, LawAnalysis
 from analysis.stability.model_sheet import ModelSheet, ParameterRow
-from analysis.stability.verdicts import Verdict, VerdictRow, compare_verdicts
+from analysis.stability.verdicts import VerdictRow, compare_verdicts
 from systems.laws.catalogue import law_title
 from systems.laws.law import Equation
 
@@ -45,9 +45,7 @@ def stability_page(analyses: Sequence[LawAnalysis]) -> str:
 
 
 def _summary(analyses: Sequence[LawAnalysis]) -> str:
-    verdicts: dict[str, Sequence[Verdict]] = {
-        a.law: a.data("verdicts") or () for a in analyses
-    }
+    verdicts = {a.law: a.verdicts for a in analyses}
     rows = compare_verdicts(verdicts)
     sheet = analyses[0].sheet
     about = definitions(

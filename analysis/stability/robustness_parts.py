@@ -23,7 +23,7 @@ from analysis.linear.robustness import (
     slowest_pole,
 )
 from analysis.reporting.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.law_analysis import Part, Study
+from analysis.stability.law_analysis import Part
 from diagrams import Scenario
 
 __all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
@@ -44,7 +44,7 @@ class LoopRobustness:
         cloud = self.cloud
         return {
             "period_s": cloud.period_s,
-            "parameters": [vars(p) for p in cloud.parameters],
+            "parameters": cloud.parameters,
             "samples": len(cloud.values),
             "stable_share": cloud.stable_share,
             "nominal_radius": cloud.nominal_radius,
@@ -53,12 +53,7 @@ class LoopRobustness:
             "worst_values": cloud.worst_values,
             "worst_poles": cloud.worst_poles,
             "sensitivities": [
-                {
-                    "parameter": row.parameter.name,
-                    "pole": row.pole,
-                    "derivative": row.derivative,
-                    "per_interval": row.per_interval,
-                }
+                vars(row) | {"parameter": row.parameter.name}
                 for row in self.sensitivities
             ],
         }
@@ -101,41 +96,31 @@ def robustness_parts(*, full: bool) -> tuple[Part, ...]:
         Part(
             "robustness",
             "Robustness at the operating point",
-            lambda study: _following(study, samples),
+            lambda study: loop_robustness(
+                study.scenario,
+                following_poles(study.need("equilibria").at),
+                following_uncertainty(study.scenario),
+                samples=samples,
+            ),
             _render,
             fresh=True,
         ),
         Part(
             "contact_robustness",
             "Robustness before an obstacle",
-            lambda study: _contact(study, samples),
+            lambda study: loop_robustness(
+                study.scenario,
+                contact_poles(study.scenario),
+                contact_uncertainty(study.scenario),
+                samples=4 * samples,
+            ),
             _render,
         ),
     )
 
 
-def _following(study: Study, samples: int) -> LoopRobustness:
-    at = study.need("equilibria").at
-    return loop_robustness(
-        study.scenario,
-        following_poles(at),
-        following_uncertainty(study.scenario),
-        samples=samples,
-    )
-
-
-def _contact(study: Study, samples: int) -> LoopRobustness:
-    scenario = study.scenario
-    return loop_robustness(
-        scenario,
-        contact_poles(scenario),
-        contact_uncertainty(scenario),
-        samples=4 * samples,
-    )
-
-
 def _render(data: LoopRobustness, name: str) -> list[str]:
-    from analysis.linear.robustness_plots import plot_pole_cloud, plot_sensitivities
+    from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
 
     cloud = data.cloud
     slowest = slowest_pole(cloud.worst_poles)

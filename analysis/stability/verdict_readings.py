@@ -1,6 +1,6 @@
-"""What the verdicts of the stability report are about: numbers of its parts.
+"""What the verdicts of the stability report ask, and the numbers that they are about.
 
-Each function takes the study and returns a number, or says why there is none.
+Each reading takes the study and returns a number, or says why there is none.
 """
 
 from __future__ import annotations
@@ -13,8 +13,10 @@ from analysis.linear.contact_mode import contact_spectral_radius
 from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
+from analysis.stability.verdicts import Criterion
 
 __all__ = [
+    "CRITERIA",
     "Reading",
     "read_contact",
     "read_cycle",
@@ -34,6 +36,19 @@ __all__ = [
 
 #: A number, or why there is none.
 Reading = float | str
+
+
+def _of(
+    key: str, missing: str, number: Callable[[Any], float | None]
+) -> Callable[[Study], Reading]:
+    """Reads a number from a part's data; ``missing`` says why there is none."""
+
+    def read(study: Study) -> Reading:
+        data = study.found.get(key)
+        value = number(data) if data else None
+        return missing if value is None else float(value)
+
+    return read
 
 
 def _at(study: Study) -> Any:
@@ -75,21 +90,18 @@ def read_worst_margin(name: str, *, largest: bool) -> Callable[[Study], Reading]
     return read
 
 
-def read_delay(study: Study) -> Reading:
-    """Least exact delay margin, s."""
-    data = study.found.get("sampled")
-    if not data or not data.margins:
-        return "delay margins were not computed"
-    return float(min(margin.delay_s for margin in data.margins))
-
-
-def read_cycle(study: Study) -> Reading:
-    """Largest multiplier of the burst cycle with today's hold."""
-    data = study.found.get("burst_cycle")
-    if not data:
-        return "the burst cycle was not computed"
-    today = next(cycle for cycle in data.cycles if cycle.hold == data.today)
-    return today.largest
+#: Least exact delay margin, s.
+read_delay = _of(
+    "sampled",
+    "delay margins were not computed",
+    lambda data: min((m.delay_s for m in data.margins), default=None),
+)
+#: Largest multiplier of the burst cycle with today's hold.
+read_cycle = _of(
+    "burst_cycle",
+    "the burst cycle was not computed",
+    lambda data: next(c.largest for c in data.cycles if c.hold == data.today),
+)
 
 
 def read_jams(study: Study) -> Reading:
@@ -148,29 +160,148 @@ def read_passive(study: Study) -> Reading:
     return float(share)
 
 
-def read_start(study: Study) -> Reading:
-    """1 where no path that the energy allows leads from the start to contact."""
-    data = study.found.get("certificates")
-    if not data:
-        return "there is no energy certificate"
-    return float(data[0].certificate.start_certified)
+#: 1 where no path that the energy allows leads from the start to contact.
+read_start = _of(
+    "certificates",
+    "there is no energy certificate",
+    lambda data: data[0].certificate.start_certified,
+)
+#: Collisions of simulated certified starts.
+read_trials = _of(
+    "certificates",
+    "no certificate",
+    lambda data: data[0].trials.inside_collisions,
+)
+#: Largest difference of the two one-period matrices.
+read_routes = _of(
+    "linear_models", "no linear models", lambda data: data.routes.matrix_difference
+)
+#: Error of frequency or damping of a small step, per cent.
+read_prediction = _of(
+    "step",
+    "no step was simulated",
+    lambda data: 100.0 * max(abs(data.frequency_error), abs(data.damping_error)),
+)
 
+_MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
+_SENSITIVITY = "usual: M_s of 1.2 to 2.0 (Astrom and Murray)"
+_OURS = "ours"
 
-def read_trials(study: Study) -> Reading:
-    """Collisions of simulated certified starts."""
-    data = study.found.get("certificates")
-    return float(data[0].trials.inside_collisions) if data else "no certificate"
-
-
-def read_routes(study: Study) -> Reading:
-    """Largest difference of the two one-period matrices."""
-    data = study.found.get("linear_models")
-    return data.routes.matrix_difference if data else "no linear models"
-
-
-def read_prediction(study: Study) -> Reading:
-    """Error of frequency or damping of a small step, per cent."""
-    data = study.found.get("step")
-    if not data:
-        return "no step was simulated"
-    return 100.0 * max(abs(data.frequency_error), abs(data.damping_error))
+#: What is asked, and what is read for it.
+CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
+    Criterion(
+        "growth at rest", "1/s", "below", 0.0,
+        "small deviations from the follow point die out",
+        "small deviations from the follow point grow",
+        "stability",
+    ): read_decay,
+    Criterion(
+        "damping ratio at rest", "", "at least", 0.4,
+        "overshoots are small",
+        "it overshoots and swings for several cycles",
+        "usual: 0.4 to 0.8 (Astrom and Murray)",
+    ): read_damping,
+    Criterion(
+        "least phase margin", "deg", "at least", 45.0,
+        "every cut loop stands the usual extra phase, lag or lead",
+        "a small extra phase makes it oscillate",
+        _MARGINS,
+    ): read_worst_margin("phase_margin_deg", largest=False),
+    Criterion(
+        "least gain margin", "dB", "at least", 6.0,
+        "gains may double, or fall to half",
+        "a gain that is off by less than a factor of two, up or down, makes it "
+        "unstable",
+        _MARGINS,
+    ): read_worst_margin("gain_margin_db", largest=False),
+    Criterion(
+        "largest sensitivity peak", "", "at most", 2.0,
+        "disturbances are hardly amplified",
+        "disturbances near the crossover are amplified more than twice",
+        _SENSITIVITY,
+    ): read_worst_margin("sensitivity_peak", largest=True),
+    Criterion(
+        "least disk margin", "", "at least", 2.0 / 3.0,
+        "gain and phase may be off at once, by 6 dB and 37 deg",
+        "gain and phase that are off at once make it oscillate early",
+        "alpha = 2/3: 6 dB either way (Seiler, Packard and Gahinet 2020)",
+    ): read_worst_margin("disk", largest=False),
+    Criterion(
+        "least delay margin", "s", "at least", 0.1,
+        "four more ticks of delay do no harm",
+        "less than four more ticks of delay make it oscillate",
+        "ours: four ticks",
+    ): read_delay,
+    Criterion(
+        "left after a burst cycle", "", "below", 1.0,
+        "it settles although the source is silent most of the time",
+        "it swings ever farther because the source is silent most of the time",
+        "stability over a cycle of the sound",
+    ): read_cycle,
+    Criterion(
+        "growth where the law is stiffest", "1/s", "below", 0.0,
+        "it comes to rest however hard it is pressed against an obstacle",
+        "pressed to where the law is stiffest, it swings",
+        "stability of the contact mode at the law's largest slope",
+    ): lambda study: read_contact(study, 0),
+    Criterion(
+        "the same with echoes a tick late", "1/s", "below", 0.0,
+        "a processor may need one tick more",
+        "with one more tick of latency it swings where the law is stiffest",
+        _OURS,
+    ): lambda study: read_contact(study, 1),
+    Criterion(
+        "worst case at rest", "1/s", "below", 0.0,
+        "it stays stable with all parameters off",
+        "parameters that are off make it unstable",
+        "stability over the box of parameters",
+    ): read_worst_case("robustness"),
+    Criterion(
+        "worst case before an obstacle", "1/s", "below", 0.0,
+        "it comes to rest before an obstacle with all parameters off",
+        "parameters that are off make it swing where the law is stiffest",
+        "stability over the box of parameters",
+    ): read_worst_case("contact_robustness"),
+    Criterion(
+        "places to jam", "", "at most", 0.0,
+        "it rests near the follow distance only",
+        "it can come to rest away from the source",
+        "none is wanted; away: outside the goal of a run",
+    ): read_jams,
+    Criterion(
+        "offset at rest", "m", "at most", 0.1,
+        "it rests at the follow distance",
+        "what it avoids, the source's own body too, pushes it off that distance",
+        _OURS,
+    ): read_offset,
+    Criterion(
+        "start certified, 1 for yes", "", "at least", 1.0,
+        "from this scenario's start P touches nothing, in the certificate's model",
+        "energy alone does not exclude a contact from this start",
+        "energy certificate",
+    ): read_start,
+    Criterion(
+        "power that the velocity term gives", "of D_r", "at most", 1.0,
+        "the velocity term never gives more energy than D_r takes",
+        "the velocity term can drive the motion",
+        "passivity",
+    ): read_passive,
+    Criterion(
+        "collisions from certified starts", "", "at most", 0.0,
+        "simulation does not contradict the certificate",
+        "simulation contradicts the certificate",
+        "a proof has no exceptions",
+    ): read_trials,
+    Criterion(
+        "linear prediction of a small step", "% off", "at most", 2.0,
+        "frequency and damping are those of the nonlinear simulation",
+        "the velocity term's corner at rest, which no linear model has, shows",
+        "2 % in frequency and damping, exact sensors",
+    ): read_prediction,
+    Criterion(
+        "difference of two routes to the model", "", "at most", 1e-8,
+        "two independent computations of the linear model agree",
+        "two computations of the linear model differ",
+        "rounding",
+    ): read_routes,
+}  # fmt: skip

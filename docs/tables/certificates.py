@@ -203,10 +203,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _draw(rows: Sequence[CertificateRow], directory: Path) -> None:
     """Map, phase plane and region of each law."""
-    from analysis.certificates.energy_certificate_plots import plot_energy_certificate
-    from analysis.certificates.sos_region_plots import plot_sos_region
+    from analysis.certificates.certificate_plots import (
+        plot_energy_certificate,
+        plot_sos_region,
+    )
+    from analysis.nonlinear.nonlinear_plots import plot_phase_portrait
     from analysis.nonlinear.phase_portrait import phase_portrait
-    from analysis.nonlinear.phase_portrait_plots import plot_phase_portrait
 
     directory.mkdir(parents=True, exist_ok=True)
     for row in rows:

@@ -243,8 +243,7 @@ def tables(duration_s: float = 300.0) -> Iterator[str]:
 def draw(directory: Path) -> None:
     """The page's pictures."""
     from analysis.linear.burst_gaps import gap_chart
-    from analysis.linear.margin_plots import plot_nyquist
-    from analysis.linear.operating_point_plots import plot_equilibria
+    from analysis.linear.linear_plots import plot_equilibria, plot_nyquist
     from analysis.stability.chart_plots import plot_contact_limits, plot_gap_chart
 
     directory.mkdir(parents=True, exist_ok=True)

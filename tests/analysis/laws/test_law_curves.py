@@ -7,6 +7,7 @@ import pytest
 
 from analysis.laws.law_curves import law_curves, radial_forces
 from analysis.laws.law_curves_plots import plot_law_curves
+from analysis.reporting.plain_values import plain
 from diagrams.laws import LAWS, make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -96,7 +97,7 @@ def test_picture_draws_every_curve():
     np.testing.assert_array_equal(drawn, curves[2].force_n)
 
 
-def test_to_dict_holds_plain_numbers():
-    document = curves_by_law()["active"].to_dict()
+def test_plain_form_holds_lists():
+    document = plain(curves_by_law()["active"])
     assert document["push_n"][39] == pytest.approx(4.0 + 0.5 * 0.72)
     assert isinstance(document["speed_m_s"], list)

@@ -9,6 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
+from analysis.linear.linear_plots import plot_pole_cloud, plot_sensitivities
 from analysis.linear.robustness import (
     UncertainParameter,
     continuous,
@@ -17,7 +18,6 @@ from analysis.linear.robustness import (
     pole_sensitivities,
     slowest_pole,
 )
-from analysis.linear.robustness_plots import plot_pole_cloud, plot_sensitivities
 
 T = 0.025
 

@@ -7,29 +7,27 @@ import re
 import numpy as np
 import pytest
 
-from analysis.certificates.certificate_trials import try_certificate
-from analysis.certificates.disturbance_bound_plots import plot_disturbance_bounds
-from analysis.certificates.disturbance_bounds import disturbance_bounds
-from analysis.certificates.energy_certificate import certify_energy
-from analysis.certificates.energy_certificate_plots import (
+from analysis.certificates.certificate_plots import (
     plot_certificate_trials,
+    plot_disturbance_bounds,
     plot_energy_balance,
     plot_energy_certificate,
 )
+from analysis.certificates.certificate_trials import try_certificate
+from analysis.certificates.disturbance_bounds import disturbance_bounds
+from analysis.certificates.energy_certificate import certify_energy
 from analysis.nonlinear.contact_oscillation import contact_oscillation
-from analysis.nonlinear.equilibrium_map_plots import (
-    plot_equilibrium_maps,
-    plot_ratio_map,
-)
 from analysis.nonlinear.equilibrium_maps import gap_map
-from analysis.nonlinear.phase_portrait import phase_portrait
-from analysis.nonlinear.phase_portrait_plots import plot_phase_portrait
-from analysis.nonlinear.stiffness_ratio import stiffness_ratio_map
-from analysis.nonlinear.velocity_passivity import energy_balance
-from analysis.nonlinear.velocity_term_plots import (
+from analysis.nonlinear.nonlinear_plots import (
     plot_contact_oscillation,
+    plot_equilibrium_maps,
+    plot_phase_portrait,
+    plot_ratio_map,
     plot_velocity_terms,
 )
+from analysis.nonlinear.phase_portrait import phase_portrait
+from analysis.nonlinear.stiffness_ratio import stiffness_ratio_map
+from analysis.nonlinear.velocity_passivity import energy_balance
 from analysis.nonlinear.velocity_terms import velocity_term_analysis
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from analysis.linear import margin_plots, operating_point_plots
+from analysis.linear import linear_plots
 from analysis.linear.burst_gaps import GapChart
 from analysis.linear.contact_mode import contact_limits
 from analysis.linear.delayed_run import check_delay_margin
@@ -42,18 +42,18 @@ def drawn(figure: Figure) -> Figure:
 
 def test_bode_nyquist_and_nichols_show_every_loop(loops):
     names = [loop.name for loop in loops]
-    bode = drawn(margin_plots.plot_bode(loops))
+    bode = drawn(linear_plots.plot_bode(loops))
     assert bode.axes[0].get_legend_handles_labels()[1] == names
-    nyquist = drawn(margin_plots.plot_nyquist(loops))
+    nyquist = drawn(linear_plots.plot_nyquist(loops))
     assert [axes.get_title() for axes in nyquist.axes[: len(names)]] == names
-    nichols = drawn(margin_plots.plot_nichols(loops))
+    nichols = drawn(linear_plots.plot_nichols(loops))
     assert nichols.axes[0].get_legend_handles_labels()[1] == names
 
 
 def test_nyquist_curves_stay_out_of_the_disk(loops):
     """The disk's ends on the real axis are the disk gain margins."""
     for loop in loops:
-        low, high = margin_plots._disk_ends(loop.disk.alpha)
+        low, high = linear_plots._disk_ends(loop.disk.alpha)
         centre, radius = (low + high) / 2, (high - low) / 2
         assert np.abs(loop.response.L - centre).min() >= radius * (1 - 1e-6)
         if loop.disk.alpha < 2.0:
@@ -62,7 +62,7 @@ def test_nyquist_curves_stay_out_of_the_disk(loops):
 
 
 def test_gang_of_four_has_four_panels(point):
-    assert len(drawn(margin_plots.plot_gang_of_four(gang_of_four(point))).axes) == 4
+    assert len(drawn(linear_plots.plot_gang_of_four(gang_of_four(point))).axes) == 4
 
 
 def test_charts_mark_todays_design(scenario):
@@ -105,12 +105,12 @@ def test_delay_check_shows_both_runs(point):
 
 def test_equilibria_are_all_in_the_picture(scenario):
     search = find_equilibria(scenario)
-    axes = drawn(operating_point_plots.plot_equilibria(search)).axes[0]
+    axes = drawn(linear_plots.plot_equilibria(search)).axes[0]
     places = {tuple(np.asarray(line.get_xydata())[0]) for line in axes.lines}
     for found in search.points:
         assert tuple(found.p_WP) in places
 
 
 def test_step_shows_the_ideal_run(scenario):
-    figure = drawn(operating_point_plots.plot_step(check_step(scenario)))
+    figure = drawn(linear_plots.plot_step(check_step(scenario)))
     assert figure.axes[0].get_legend_handles_labels()[1] == ["all ideal"]

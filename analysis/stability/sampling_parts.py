@@ -1,7 +1,8 @@
-"""Parts of the stability report: delay margins of the sampled loop, burst cycle."""
+"""Parts of the stability report: delay, bursts, sample period, gains, contact."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,15 +18,44 @@ from analysis.linear.burst_cycle import (
     simulate_burst_cycle,
 )
 from analysis.linear.burst_gaps import GapChart, gap_chart
+from analysis.linear.contact_mode import ContactLimits, contact_limits
 from analysis.linear.delay_margin import DELAY_PLACES, DelayMargin, delay_margin
 from analysis.linear.delayed_run import DelayCheck, check_delay_margin
+from analysis.linear.root_locus import RootLocus, root_loci
+from analysis.linear.sampled_stability import (
+    ConditionCheck,
+    PolesAgainstPeriod,
+    StabilityChart,
+    check_conditions,
+    gain_chart,
+    gain_delay_chart,
+    poles_against_period,
+)
 from analysis.models.open_loops import DIRECTIONS
 from analysis.models.operating_points import OperatingPoint
-from analysis.reporting.html_page import Cell, figure_html, paragraph, table
-from analysis.stability.chart_plots import plot_delay_check, plot_gap_chart
+from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.stability.chart_plots import (
+    plot_chart,
+    plot_contact_limits,
+    plot_delay_check,
+    plot_gap_chart,
+    plot_poles_against_period,
+    plot_root_loci,
+)
 from analysis.stability.law_analysis import Part, Study
+from analysis.stability.recommended_gains import (
+    GainFigures,
+    RecommendedGains,
+    recommend_gains,
+)
 
-__all__ = ["BurstCycles", "SampledLoop", "sampled_parts"]
+__all__ = [
+    "BurstCycles",
+    "SampledLoop",
+    "SamplingCharts",
+    "gain_parts",
+    "sampling_parts",
+]
 
 #: Length of the runs that check delay margins in a short and a full report, s.
 _CHECK_S = (60.0, 300.0)
@@ -65,8 +95,12 @@ class BurstCycles:
     """Against the length of the silence."""
 
 
-def sampled_parts(*, full: bool) -> tuple[Part, ...]:
-    """Delay margins, exact and simulated; multipliers of the burst cycle."""
+def sampling_parts(*, full: bool) -> tuple[Part, ...]:
+    """Delay margins, burst cycle, charts over gains and period, contact mode.
+
+    Args:
+        full: Whether runs that check are long.
+    """
     duration_s, cycles = _CHECK_S[full], _CYCLES[full]
     return (
         Part(
@@ -82,6 +116,25 @@ def sampled_parts(*, full: bool) -> tuple[Part, ...]:
             lambda study: _bursts(study, cycles),
             _render_bursts,
             document=_burst_document,
+        ),
+        Part(
+            "root_loci",
+            "Root loci",
+            lambda study: root_loci(study.scenario),
+            _render_loci,
+        ),
+        Part(
+            "sampling",
+            "Sample period, gains and delay",
+            _sampling,
+            _render_sampling,
+            document=_sampling_document,
+        ),
+        Part(
+            "contact_mode",
+            "Contact mode",
+            lambda study: contact_limits(study.scenario),
+            _render_contact,
         ),
     )
 
@@ -221,3 +274,149 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
             "Growth against the silence between bursts, for each way to hold.",
         ),
     ]
+
+
+@dataclass(frozen=True)
+class SamplingCharts:
+    """How sampling, gains and delay decide, with today's design marked."""
+
+    conditions: tuple[ConditionCheck, ...]
+    """Closed forms of the sampled double integrator."""
+    period: PolesAgainstPeriod
+    charts: tuple[StabilityChart, ...]
+
+
+def _sampling_document(data: SamplingCharts) -> dict[str, Any]:
+    return {
+        "sampling": {
+            "conditions": data.conditions,
+            "longest_stable_period_s": data.period.longest_stable_s,
+            "charts": [
+                {**vars(c), "stable_share": c.stable_share} for c in data.charts
+            ],
+        }
+    }
+
+
+def _sampling(study: Study) -> SamplingCharts:
+    scenario = study.scenario
+    return SamplingCharts(
+        check_conditions(seed=scenario.seed, tick_s=scenario.tick_s),
+        poles_against_period(scenario),
+        (gain_chart(scenario), gain_delay_chart(scenario)),
+    )
+
+
+def _render_loci(data: Sequence[RootLocus], name: str) -> list[str]:
+    rows: list[list[Cell]] = [
+        [f"`{locus.parameter}`", locus.loop, locus.today, locus.limit] for locus in data
+    ]
+    return [
+        paragraph(
+            "Poles as one gain varies, ln(z)/T of the sampled loop: of the loop to the "
+            "target, and of the contact mode where the law is stiffest."
+        ),
+        table(["gain", "loop", "today", "stability ends at"], rows),
+        figure_html(plot_root_loci(data), name, "Root loci; today's poles are marked."),
+    ]
+
+
+def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
+    conditions: list[list[Cell]] = [
+        [c.scheme, c.condition, c.pairs, c.stable, c.mismatches]
+        for c in data.conditions
+    ]
+    return [
+        table(
+            ["scheme", "stable exactly for", "pairs tried", "stable", "mismatches"],
+            conditions,
+            caption="Sampled double integrator: closed form against eigenvalues",
+        ),
+        paragraph(
+            f"The loop to the target stays stable up to a sample period of "
+            f"{data.period.longest_stable_s:.3g} s; today {data.period.today_s:g} s."
+        ),
+        figure_html(
+            plot_poles_against_period(data.period),
+            f"{name}-period",
+            "Poles against the sample period.",
+        ),
+        *(
+            figure_html(
+                plot_chart(chart), f"{name}-chart{k}", f"Growth: {chart.title}."
+            )
+            for k, chart in enumerate(data.charts)
+        ),
+    ]
+
+
+def _render_contact(data: ContactLimits, name: str) -> list[str]:
+    headings = ["motor lag (s)", *(f"{t} ticks" for t in data.latency_ticks)]
+    rows: list[list[Cell]] = [
+        [lag, *(float(value) for value in row)]
+        for lag, row in zip(data.motor_lags_s, data.stiffness_n_m, strict=True)
+    ]
+    caption = (
+        "Largest slope -df/dc of a law, N/m: K_0 of the conventional law (today "
+        f"{number(data.stiffness_today_n_m)}), k_ref/e\u00b2 of the active law of 2019 "
+        f"(today {number(data.reference_stiffness_today_n_m / math.e**2)})"
+    )
+    lag, ticks = data.today
+    return [
+        paragraph(
+            "Before an obstacle the law's spring adds to K_r, while the damping is "
+            "still D_r. The largest springs that come to rest, against the motors' lag "
+            f"and the age of an echo (ticks of {data.tick_s * 1e3:g} ms). "
+            f"This scenario: {lag:g} s and {ticks} ticks."
+        ),
+        table(headings, rows, caption=caption),
+        figure_html(plot_contact_limits(data), name, "Limits of the contact mode."),
+    ]
+
+
+def gain_parts() -> tuple[Part, ...]:
+    """Gains that meet the usual thresholds, and what they cost."""
+    return (
+        Part(
+            "recommended_gains",
+            "Recommended gains",
+            lambda study: recommend_gains(study.scenario),
+            _render_gains,
+        ),
+    )
+
+
+def _render_gains(data: RecommendedGains, name: str) -> list[str]:
+    t, today = data.thresholds, data.today
+    headings = [
+        "K_r", "D_r", "damping ratio", "phase (deg)", "gain (dB)", "M_s", "disk",
+        "delay (s)", "lag (m)", "to 2 % (s)", "stiffest law (N/m)",
+    ]  # fmt: skip
+    rows: list[list[Cell]] = [["Today"], _figures(today), ["Least D_r that meets all"]]
+    rows += [
+        _figures(choice.figures)
+        if choice.figures
+        else [choice.stiffness_n_m, "none", *([None] * 9)]
+        for choice in data.choices
+    ]
+    return [
+        paragraph(
+            f"Asked for: damping ratio {t.damping_ratio:g}, phase margin "
+            f"{t.phase_margin_deg:g} deg, M_s {t.sensitivity_peak:g}, disk margin "
+            f"{t.disk_margin:.2f}, at sensor and actuator, and rest before an obstacle "
+            f"with echoes {t.spare_ticks} tick late. The loop is the attraction's, "
+            "sampled, with motor lag; margins count both ways. Lag: how far P stays "
+            "behind the follow point of a source that moves as this scenario's. "
+            "Stiffest law: the largest spring to obstacles that comes to rest."
+        ),
+        table(headings, rows),
+        paragraph(data.advice),
+    ]
+
+
+def _figures(f: GainFigures) -> list[Cell]:
+    return [
+        f.stiffness_n_m, f.damping_n_s_m, f.damping_ratio, f.phase_margin_deg,
+        f.gain_margin_db, f.sensitivity_peak, f.disk_margin, f.delay_margin_s,
+        f.following_lag_m, f.settling_s, f.largest_law_stiffness_n_m,
+    ]  # fmt: skip

@@ -1,0 +1,347 @@
+"""Pictures of operating points, of loops, and of what uncertainty does to poles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, Polygon
+from matplotlib.ticker import MaxNLocator
+from numpy.typing import NDArray
+
+from analysis.linear.gang_of_four import GangOfFour
+from analysis.linear.loop_margins import LoopMargins
+from analysis.linear.robustness import PoleCloud, PoleSensitivity
+from analysis.linear.step_response import StepCheck
+from analysis.models.equilibria import EquilibriumSearch
+from analysis.models.equilibrium_search import CellSearch
+from analysis.models.force_field import ForceField
+from analysis.models.ideal_loop import ideal_loop
+from analysis.reporting.palette import COLOURS, draw_grid
+from systems.world.geometry import rectangle_corners
+
+__all__ = [
+    "plot_bode",
+    "plot_equilibria",
+    "plot_gang_of_four",
+    "plot_nichols",
+    "plot_nyquist",
+    "plot_pole_cloud",
+    "plot_sensitivities",
+    "plot_step",
+]
+
+#: How each kind is drawn: marker, colour, title.
+_KINDS = {
+    "sink": ("o", COLOURS["robot"], "sink"),
+    "saddle": ("X", COLOURS["echo"], "saddle"),
+    "source": ("^", COLOURS["source"], "source"),
+}
+
+
+def plot_equilibria(search: EquilibriumSearch) -> Figure:
+    """Bodies, directions of the force on P at rest, and all equilibria."""
+    figure = Figure(figsize=(8.2, 6.2), layout="constrained")
+    axes = figure.subplots()
+    x0, x1, y0, y1 = search.area_m
+    field = CellSearch(ForceField(ideal_loop(search.scenario)))
+    x, y = np.meshgrid(np.linspace(x0, x1, 90), np.linspace(y0, y1, 80))
+    force = field.forces(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 2)
+    axes.streamplot(
+        x, y, force[..., 0], force[..., 1], color="#C8C8C8", linewidth=0.6,
+        arrowsize=0.7, density=1.6,
+    )  # fmt: skip
+    for name, body in search.scenario.bodies().items():
+        colour = COLOURS["source" if name == "source" else "obstacle"]
+        corners = rectangle_corners(body.rectangle(0.0))
+        axes.add_patch(Polygon(corners, facecolor=colour, alpha=0.8))
+    drawn = set()
+    for point in search.points:
+        marker, colour, title = _KINDS[point.kind]
+        label = None if title in drawn else title
+        drawn.add(title)
+        axes.plot(
+            *point.p_WP, marker, color=colour, markersize=9, label=label,
+            markeredgecolor="black", linestyle="none", zorder=4,
+        )  # fmt: skip
+        if point.continuum:
+            angle = np.linspace(0.0, 2.0 * np.pi, 200)
+            px, py = point.p_WS
+            radius = point.source_distance_m
+            axes.plot(
+                px + radius * np.cos(angle), py + radius * np.sin(angle), "--",
+                color=colour, linewidth=1.0, label="continuum",
+            )  # fmt: skip
+    for number, switch in enumerate(search.switching):
+        axes.plot(
+            *switch.p_WP, "s", color=COLOURS["estimate"], markersize=7, zorder=4,
+            markeredgecolor="black", linestyle="none",
+            label=None if number else "nearest body changes",
+        )  # fmt: skip
+    axes.set_aspect("equal")
+    axes.set_xlim(x0, x1)
+    axes.set_ylim(y0, y1)
+    axes.set_xlabel("x in W (m)")
+    axes.set_ylabel("y in W (m)")
+    axes.set_title(f"Forces on P at rest, law: {search.scenario.law}", fontsize=10)
+    axes.legend(fontsize=8, loc="upper right", framealpha=1.0)
+    return figure
+
+
+def plot_step(check: StepCheck) -> Figure:
+    """Distance from the source after a small step, in both builds."""
+    figure = Figure(figsize=(7.5, 3.8), layout="constrained")
+    axes = figure.subplots()
+    if check.full_m is not None:
+        axes.plot(
+            check.time_s,
+            check.full_m,
+            color=COLOURS["echo"],
+            label="the scenario's build",
+        )
+    axes.plot(check.time_s, check.ideal_m, color=COLOURS["robot"], label="all ideal")
+    axes.set_xlabel("time (s)")
+    axes.set_ylabel("distance of P from the source (m)")
+    axes.set_title(
+        f"predicted {check.predicted.frequency_rad_s:.4f} rad/s, damping "
+        f"{check.predicted.damping_ratio:.4f}; simulated "
+        f"{check.ideal.frequency_rad_s:.4f} rad/s, {check.ideal.damping_ratio:.4f}",
+        fontsize=9,
+    )
+    axes.legend(fontsize=8)
+    return figure
+
+
+_CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+#: Part of the plane about -1 that is shown.
+_NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
+#: Closed-loop gains whose contours a Nichols chart shows, dB.
+_CONTOURS_DB = (-12.0, -6.0, -3.0, 0.0, 1.0, 3.0, 6.0, 12.0)
+
+
+def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
+    """Size and phase of each loop; crossovers with their phase margins."""
+    figure = Figure(figsize=(8.0, 6.0), layout="constrained")
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    for loop, colour in zip(loops, _cycle(loops), strict=True):
+        omega, L = loop.response.omega, loop.response.L
+        upper.loglog(omega, np.abs(L), color=colour, label=loop.name)
+        phase = _phase_deg(L)
+        lower.semilogx(omega, phase, color=colour)
+        if math.isfinite(loop.phase_margin_deg):
+            at = loop.crossover_rad_s
+            reached = float(np.interp(at, omega, phase))
+            upper.plot(at, 1.0, "o", color=colour, markersize=5)
+            lower.plot([at, at], [-180.0, reached], color=colour, linewidth=2.5)
+    upper.axhline(1.0, color=COLOURS["empty"], linewidth=0.8)
+    lower.axhline(-180.0, color=COLOURS["empty"], linewidth=0.8)
+    upper.set_ylabel("|L|")
+    upper.set_ylim(1e-4, 1e4)
+    lower.set_ylabel("phase (deg)")
+    lower.set_ylim(-370.0, 10.0)
+    lower.set_yticks(np.arange(-360.0, 1.0, 90.0))
+    lower.set_xlabel("frequency (rad/s)")
+    upper.legend(fontsize=8)
+    for axes in (upper, lower):
+        axes.grid(visible=True, which="major", linewidth=0.4)
+    return figure
+
+
+def plot_nyquist(loops: Sequence[LoopMargins]) -> Figure:
+    """Each loop about -1, with the balanced disk that it stays out of."""
+    figure, cells = panels(len(loops), columns=3, size=(3.6, 3.8))
+    for axes, loop in zip(cells, loops, strict=True):
+        L = loop.response.L
+        axes.plot(L.real, L.imag, color=_CYCLE[0], label="L")
+        axes.plot(L.real, -L.imag, color=_CYCLE[0], linewidth=0.7, linestyle=":")
+        axes.plot(-1.0, 0.0, "+", color=COLOURS["source"], markersize=9)
+        low, high = _disk_ends(loop.disk.alpha)
+        axes.add_patch(
+            Circle(
+                ((low + high) / 2.0, 0.0),
+                (high - low) / 2.0,
+                facecolor=COLOURS["source"],
+                alpha=0.25,
+                label=f"disk, $\\alpha$ = {loop.disk.alpha:.2f}",
+            )
+        )
+        angle = np.linspace(0.0, 2.0 * np.pi, 200)
+        axes.plot(np.cos(angle), np.sin(angle), color="#D0D0D0", linewidth=0.7)
+        axes.set_xlim(*_NYQUIST_X)
+        axes.set_ylim(*_NYQUIST_Y)
+        axes.set_aspect("equal")
+        axes.set_title(loop.name, fontsize=9)
+        axes.set_xlabel("Re L")
+        axes.set_ylabel("Im L")
+        axes.legend(loc="upper right", fontsize=7)
+    return figure
+
+
+def panels(
+    count: int, *, columns: int, size: tuple[float, float]
+) -> tuple[Figure, list[Axes]]:
+    """A figure of rows of panels; places that are left over stay empty.
+
+    Args:
+        count: Number of panels.
+        columns: Most panels in a row.
+        size: Of a panel, inches.
+
+    Returns:
+        The figure, and its panels row by row.
+    """
+    columns = min(columns, count)
+    rows = math.ceil(count / columns)
+    figure = Figure(figsize=(size[0] * columns, size[1] * rows), layout="constrained")
+    cells = figure.subplots(rows, columns, squeeze=False).ravel().tolist()
+    for axes in cells[count:]:
+        axes.set_axis_off()
+    return figure, cells[:count]
+
+
+def _phase_deg(L: NDArray[np.complex128]) -> NDArray[np.float64]:
+    """(n,) continuous, in the turn in which a loop's crossover is looked for."""
+    phase: NDArray[np.float64] = np.degrees(np.unwrap(np.angle(L)))
+    return phase - 360.0 * round((phase[len(phase) // 2] + 150.0) / 360.0)
+
+
+def _disk_ends(alpha: float) -> tuple[float, float]:
+    """Where the disk of skew 0 meets the real axis, left and right of -1."""
+    left = -(2.0 + alpha) / (2.0 - alpha) if alpha < 2.0 else -1e3
+    return left, -(2.0 - alpha) / (2.0 + alpha)
+
+
+def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
+    """Size against phase, over contours of equal closed-loop size."""
+    figure = Figure(figsize=(7.5, 5.6), layout="constrained")
+    axes = figure.subplots()
+    _contours(axes)
+    for loop, colour in zip(loops, _cycle(loops), strict=True):
+        L = loop.response.L
+        phase = _phase_deg(L)
+        size = 20.0 * np.log10(np.maximum(np.abs(L), 1e-12))
+        axes.plot(phase, size, color=colour, label=loop.name)
+    axes.plot(-180.0, 0.0, "+", color=COLOURS["source"], markersize=11)
+    axes.set_xlim(-360.0, 0.0)
+    axes.set_ylim(-40.0, 40.0)
+    axes.set_xticks(np.arange(-360.0, 1.0, 45.0))
+    axes.set_xlabel("phase of L (deg)")
+    axes.set_ylabel("|L| (dB)")
+    axes.legend(fontsize=8, loc="lower left")
+    return figure
+
+
+def _contours(axes: Axes) -> None:
+    phase, size = np.meshgrid(np.linspace(-359.5, -0.5, 400), np.linspace(-40, 40, 400))
+    L = 10.0 ** (size / 20.0) * np.exp(1j * np.radians(phase))
+    drawn = axes.contour(
+        phase,
+        size,
+        20.0 * np.log10(np.abs(L / (1.0 + L))),
+        levels=_CONTOURS_DB,
+        colors="#BBBBBB",
+        linewidths=0.6,
+        linestyles="solid",
+    )
+    axes.clabel(drawn, fmt="%g dB", fontsize=7)
+
+
+def plot_gang_of_four(gang: GangOfFour) -> Figure:
+    """Sizes of S, T, PS and CS."""
+    figure = Figure(figsize=(8.0, 5.4), layout="constrained")
+    titles = {
+        "S": "S: error of the estimate that is left",
+        "PS": "PS: push to position, m / (m/s$^2$)",
+        "CS": "CS: error to acceleration, (m/s$^2$) / m",
+        "T": "T = 1 - S",
+    }
+    for axes, (name, title) in zip(
+        figure.subplots(2, 2, sharex=True).ravel(), titles.items(), strict=True
+    ):
+        size = np.abs(getattr(gang, name))
+        axes.loglog(gang.omega, np.maximum(size, 1e-9), color=_CYCLE[0])
+        peak = int(size.argmax())
+        axes.plot(gang.omega[peak], size[peak], "o", color=COLOURS["source"])
+        axes.annotate(
+            f"{size[peak]:.2f}",
+            (gang.omega[peak], size[peak]),
+            textcoords="offset points",
+            xytext=(8, -3),
+            fontsize=8,
+        )
+        axes.set_title(title, fontsize=9)
+        axes.set_ylim(bottom=max(1e-5, 0.3 * size.min()), top=3.0 * size.max())
+        axes.grid(visible=True, linewidth=0.4)
+        if axes.get_subplotspec().is_last_row():
+            axes.set_xlabel("frequency (rad/s)")
+    return figure
+
+
+def _cycle(loops: Sequence[LoopMargins]) -> list[str]:
+    return [_CYCLE[k % len(_CYCLE)] for k in range(len(loops))]
+
+
+#: Faster poles than this do not shape the motion and are not shown, 1/s.
+_SLOW_1_S = 12.0
+
+
+def plot_pole_cloud(cloud: PoleCloud) -> Figure:
+    """Poles over the box, in the s plane (ln z / T), with the worst case."""
+    figure = Figure(figsize=(8.0, 4.4), layout="constrained")
+    axes = figure.subplots()
+    everything = _s(cloud, np.concatenate(cloud.poles))
+    for poles, marker, size, colour, label in (
+        (everything, ".", 3, COLOURS["left"], "random values"),
+        (_s(cloud, cloud.worst_poles), "x", 8, COLOURS["source"], "worst case"),
+        (_s(cloud, cloud.nominal_poles), "o", 6, COLOURS["robot"], "nominal"),
+    ):
+        slow = poles[np.abs(poles) < _SLOW_1_S]
+        axes.plot(
+            slow.real,
+            slow.imag,
+            marker,
+            markersize=size,
+            color=colour,
+            fillstyle="full" if marker == "." else "none",
+            label=label,
+        )
+    axes.axvline(0.0, color="black", linewidth=0.8)
+    axes.set_xlabel("real part of ln(z)/T (1/s); left of 0 decays")
+    axes.set_ylabel("imaginary part (rad/s)")
+    axes.grid(color="#E5E5E5", linewidth=0.6)
+    axes.legend(
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+        ncols=3,
+        fontsize=9,
+        frameon=False,
+    )
+    return figure
+
+
+def _s(cloud: PoleCloud, poles: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    kept = poles[np.abs(poles) > 0.0].astype(complex)
+    return np.asarray(np.log(kept) / cloud.period_s)
+
+
+def plot_sensitivities(rows: Sequence[PoleSensitivity]) -> Figure:
+    """What each parameter's interval does to the slowest pole, to first order."""
+    figure = Figure(figsize=(8.0, 0.4 * len(rows) + 1.2), layout="constrained")
+    left, right = figure.subplots(1, 2, sharey=True)
+    ordered = sorted(rows, key=lambda row: abs(row.per_interval))
+    names = [f"{row.parameter.symbol}" for row in ordered]
+    for axes, part, title in (
+        (left, "real", "decay: change of the real part (1/s)"),
+        (right, "imag", "frequency: change of the imaginary part (rad/s)"),
+    ):
+        changes = [getattr(row.per_interval, part) for row in ordered]
+        colours = [COLOURS["source" if x > 0 else "robot"] for x in changes]
+        axes.barh(names, changes, color=colours)
+        axes.axvline(0.0, color="black", linewidth=0.8)
+        axes.set_title(title, fontsize=10)
+        draw_grid(axes, "x")
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+    return figure

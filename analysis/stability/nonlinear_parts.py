@@ -1,0 +1,364 @@
+"""Parts of the stability report: corners at rest, energy, proofs, maps."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from analysis.certificates.certificate_plots import (
+    plot_certificate_trials,
+    plot_disturbance_bounds,
+    plot_energy_balance,
+    plot_energy_certificate,
+    plot_sos_region,
+)
+from analysis.certificates.certificate_trials import CertificateTrials, try_certificate
+from analysis.certificates.diagram_trials import DiagramTrials, try_diagram
+from analysis.certificates.disturbance_bounds import disturbance_bounds
+from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
+from analysis.certificates.sos_region import sos_region
+from analysis.nonlinear.contact_oscillation import (
+    ContactOscillation,
+    contact_oscillation,
+)
+from analysis.nonlinear.equilibrium_maps import (
+    EquilibriumMap,
+    gap_map,
+    offset_map,
+)
+from analysis.nonlinear.nonlinear_plots import (
+    plot_contact_oscillation,
+    plot_equilibrium_maps,
+    plot_phase_portrait,
+    plot_ratio_map,
+    plot_velocity_terms,
+)
+from analysis.nonlinear.phase_portrait import phase_portrait
+from analysis.nonlinear.stiffness_ratio import RatioMap, stiffness_ratio_map
+from analysis.nonlinear.velocity_passivity import EnergyBalance, energy_balance
+from analysis.nonlinear.velocity_terms import (
+    VelocityTermAnalysis,
+    velocity_term_analysis,
+)
+from analysis.reporting.fact_tables import fact_table, row_table
+from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
+from analysis.reporting.plain_values import plain
+from analysis.stability.law_analysis import Part, Study
+from systems.framework.input_error import InputError
+
+__all__ = ["extended_parts", "nonlinear_parts"]
+
+
+def nonlinear_parts(*, full: bool) -> tuple[Part, ...]:
+    """Velocity terms, oscillation before an obstacle, certified starts, energy.
+
+    Args:
+        full: Ten times the starts, and runs of the full diagram.
+    """
+    return (
+        Part(
+            "velocity_terms",
+            "Velocity terms at rest",
+            lambda study: velocity_term_analysis(study.scenario),
+            _render_terms,
+            fresh=True,
+        ),
+        Part(
+            "contact_oscillation",
+            "Oscillation before an obstacle",
+            lambda study: contact_oscillation(study.scenario),
+            _render_oscillation,
+        ),
+        Part(
+            "certificates",
+            "Certified starts",
+            lambda study: (_certified(study, full=full),),
+            _render_certificates,
+            fresh=True,
+        ),
+        Part(
+            "energy_balance",
+            "Energy of the velocity term",
+            lambda study: energy_balance(study.scenario),
+            _render_balance,
+        ),
+    )
+
+
+def _render_terms(data: VelocityTermAnalysis, name: str) -> list[str]:
+    facts = plain(data)
+    sides = [
+        {"velocity_term": term, **{k: v for k, v in side.items() if k != "poles"}}
+        for term, variant in facts["variants"].items()
+        for side in variant["sides"]
+    ]
+    return [
+        paragraph(
+            "The laws see s = |dC/dt| (`printed`) or the closing speed (`closing`), "
+            "which both have a corner at rest. A linear model holds on one side of it. "
+            "Over a whole oscillation the printed term damps on the way in what it "
+            "drives on the way out; what is left is a push away from the obstacle."
+        ),
+        fact_table(facts, skip=["variants"]),
+        row_table(sides, caption="One-sided linear models, M x'' + D x' + K x = 0"),
+        figure_html(
+            plot_velocity_terms(data),
+            name,
+            "Describing functions at the equilibrium: damping by the first harmonic "
+            "and bias, against the amplitude of the speed.",
+        ),
+    ]
+
+
+def _render_oscillation(data: ContactOscillation, name: str) -> list[str]:
+    rows: list[list[Cell]] = []
+    for term, run in data.runs.items():
+        cycle = data.predictions[term].limit_cycle
+        amplitude, centre, frequency = cycle or (None, None, None)
+        moving = len(run.amplitudes_m) > 0
+        rows.append([term, "predicted", amplitude, centre, frequency, ""])
+        rows.append(
+            [
+                term,
+                "simulated",
+                run.settled_amplitude_m,
+                float(run.centres_m[-1]) if moving else None,
+                float(run.frequencies_rad_s[-1]) if moving else None,
+                run.cause,
+            ]
+        )
+    headings = [
+        "velocity term",
+        "",
+        "amplitude (m)",
+        "centre (m)",
+        "rad/s",
+        "run ended",
+    ]
+    return [
+        paragraph(
+            "P runs head-on against a wide box with the goal behind it. Harmonic "
+            "balance with the sampled chain from acceleration to motion predicts how "
+            "an oscillation of each amplitude grows; a limit cycle is where growth "
+            "turns to decay. No prediction: the oscillation decays at all amplitudes, "
+            "or grows until the speed limit stops it."
+        ),
+        table(headings, rows),
+        figure_html(
+            plot_contact_oscillation(data),
+            name,
+            "The oscillation before an obstacle, predicted and simulated.",
+        ),
+    ]
+
+
+#: Simulated starts on each side of the certificate's border.
+STARTS = 300
+#: Starts of the full diagram, with exact hearing.
+DIAGRAM_STARTS = 24
+
+
+@dataclass(frozen=True)
+class CertifiedStarts:
+    """The energy certificate, and what simulation says to it."""
+
+    certificate: EnergyCertificate
+    trials: CertificateTrials
+    """In the certificate's own model."""
+    diagram: DiagramTrials | None
+    """In the diagram of all blocks; none: left out of a short report."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``certificates``."""
+        parts = {"trials": self.trials, "diagram": self.diagram}
+        return self.certificate.to_dict() | parts
+
+
+def _certified(study: Study, *, full: bool) -> CertifiedStarts:
+    certificate = certify_energy(study.scenario)
+    return CertifiedStarts(
+        certificate,
+        try_certificate(certificate, starts=10 * STARTS if full else STARTS),
+        try_diagram(certificate, starts=DIAGRAM_STARTS) if full else None,
+    )
+
+
+def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[str]:
+    (found,) = data
+    facts = plain(found)
+    return [
+        paragraph(
+            "In the model of the certificate (P alone, continuous time, exact nearest "
+            "points, bodies at rest) the energy V cannot grow. A start whose energy is "
+            "below that of every path to contact never collides. The full diagram has "
+            "cones, a rectangular body and motor lag, which the certificate leaves "
+            "out: a full report has its collision rate from certified starts."
+        ),
+        fact_table(facts, skip=["passivity", "trials", "diagram", "kind"]),
+        figure_html(
+            plot_energy_certificate(found.certificate),
+            f"{name}-map",
+            "Largest certified speed of P over the floor. White: not even rest is "
+            "certified.",
+        ),
+        fact_table(facts["trials"], caption="Simulated starts, certificate's model"),
+        figure_html(
+            plot_certificate_trials(found.trials),
+            f"{name}-trials",
+            "Simulated starts by outcome, over the certified region.",
+        ),
+        fact_table(facts["diagram"], caption="Certified starts in the full diagram")
+        if found.diagram
+        else "",
+    ]
+
+
+def _render_balance(data: EnergyBalance, name: str) -> list[str]:
+    return [
+        paragraph(
+            "The velocity term gives energy when it pushes along the motion. It is "
+            "covered where the attraction's damping takes at least as much at every "
+            "speed."
+        ),
+        fact_table(plain(data)),
+        figure_html(
+            plot_energy_balance(data),
+            name,
+            "Energy along a run of the point model, and the work of its parts.",
+        ),
+    ]
+
+
+#: Ways to sense two boxes, and one.
+_GAP_SENSING = ("exact nearest", "exact sum", "cones")
+_OFFSET_SENSING = ("exact nearest", "cones")
+
+
+def extended_parts() -> tuple[Part, ...]:
+    """What only a full report holds."""
+    return (
+        Part(
+            "gap_maps",
+            "Between two obstacles",
+            lambda study: tuple(
+                gap_map(study.scenario, sensing=sensing) for sensing in _GAP_SENSING
+            ),
+            _maps(
+                "Where P comes to rest before two boxes, against the gap between them. "
+                "With exact sensing: minima of the energy, of the nearest box alone or "
+                "of the sum of both. With cones: the ends of simulated runs."
+            ),
+            fresh=True,
+        ),
+        Part(
+            "offset_maps",
+            "Beside one obstacle",
+            lambda study: tuple(
+                offset_map(study.scenario, sensing=sensing)
+                for sensing in _OFFSET_SENSING
+            ),
+            _maps(
+                "Where P comes to rest before one box, against how far it stands off "
+                "the line to the source. To exact sensing a point, a disc or a corner "
+                "is a saddle, never a trap; a flat face holds P as wide as it is."
+            ),
+        ),
+        Part("stiffness_ratio_map", "Against k_ref/K_0", _ratio_map, _render_ratio_map),
+        _part(
+            "phase_portrait",
+            "Phase portrait, head-on",
+            lambda study: phase_portrait(study.scenario),
+            plot_phase_portrait,
+            "Distance to a wide face and its rate of change, with the goal behind it. "
+            "Of the starts on a grid: how many collide, and how many are certified.",
+        ),
+        _part(
+            "sos_region",
+            "Region of attraction by sums of squares",
+            lambda study: sos_region(study.scenario),
+            plot_sos_region,
+            "A polynomial model with motor lag, head-on, which the energy certificate "
+            "leaves out. Found with Clarabel, cross-checked with CSDP, and proved "
+            "once more in rational arithmetic.",
+            document=lambda data: {"certificates": [data]},
+        ),
+        _part(
+            "disturbance_bounds",
+            "Moving source and moving obstacle",
+            lambda study: disturbance_bounds(study.scenario),
+            plot_disturbance_bounds,
+            "How far a moving source pulls P off, and for how long a start stays "
+            "certified before a moving obstacle.",
+        ),
+    )
+
+
+def _maps(text: str) -> Callable[[tuple[EquilibriumMap, ...], str], list[str]]:
+    def render(data: tuple[EquilibriumMap, ...], name: str) -> list[str]:
+        rows: list[list[Cell]] = [
+            [found.sensing, len(found.values), _listed(found.jams),
+             _listed(found.collisions)]
+            for found in data
+        ]  # fmt: skip
+        headings = ["sensing", "values tried", "jams at (m)", "collisions at (m)"]
+        return [
+            paragraph(text),
+            table(headings, rows),
+            figure_html(plot_equilibrium_maps(data), name, "Where P comes to rest."),
+        ]
+
+    return render
+
+
+def _listed(values: tuple[float, ...]) -> str:
+    return ", ".join(number(value, 3) for value in values) or "none"
+
+
+def _ratio_map(study: Study) -> RatioMap:
+    if study.scenario.law != "active":
+        raise InputError(
+            "law", "the ratio k_ref/K_0 is one of the active law of 2019; choose active"
+        )
+    return stiffness_ratio_map(study.scenario)
+
+
+def _render_ratio_map(data: RatioMap, name: str) -> list[str]:
+    return [
+        paragraph(
+            "Head-on equilibria of the active law as k_ref/K_0 varies: the outer one, "
+            "at which P is held up, and the inner one, where the force that vanishes "
+            "at contact gives way. Where they meet, nothing holds P any more."
+        ),
+        figure_html(plot_ratio_map(data), name, "Equilibria against k_ref/K_0."),
+    ]
+
+
+def _part(
+    key: str,
+    title: str,
+    compute: Callable[[Study], Any],
+    plot: Callable[[Any], Figure],
+    text: str,
+    *,
+    document: Callable[[Any], dict[str, Any]] | None = None,
+) -> Part:
+    """A part of a paragraph, its numbers and one figure."""
+
+    def render(data: Any, name: str) -> list[str]:
+        facts = plain(data)
+        tables = [
+            row_table(value, caption=group.replace("_", " "))
+            for group, value in facts.items()
+            if isinstance(value, list) and value and isinstance(value[0], dict)
+        ]
+        return [
+            paragraph(text),
+            fact_table(facts),
+            *tables,
+            figure_html(plot(data), name, f"{title}."),
+        ]
+
+    return Part(key, title, compute, render, document=document)
