@@ -11,10 +11,11 @@ the blocks with state outputs do theirs, and the plant moves on by a tick.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from types import FunctionType
-from typing import Any
+from dataclasses import dataclass, field
+from functools import cache
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -22,8 +23,21 @@ from numpy.typing import NDArray
 
 from diagrams.robot import Parts
 from diagrams.scenario import Scenario
+from diagrams.stop_rules import (
+    BETWEEN_TICKS,
+    UNJUDGED,
+    JudgedTick,
+    RobotRules,
+    judge_tick,
+)
 from systems.framework.input_error import InputError
-from systems.framework.step_block import RunFacts, Step, compiled_numbers
+from systems.framework.step_block import (
+    RunFacts,
+    Step,
+    as_compiled,
+    compiled_numbers,
+)
+from systems.world.geometry import rectangle_clearance
 
 __all__ = ["CompiledLoop", "compile_loop", "why_not_compiled"]
 
@@ -50,24 +64,66 @@ class CompiledLoop:
 
     log: NDArray[np.float64]
     """(ticks + 1, columns) what the diagram logs, as far as the run has come."""
-    done: int
+    tick_s: float
+    rules: RobotRules
+    """Know why it ended, once it has."""
+    over: bool = False
+    """Whether the run has ended."""
+    done: int = 0
     """Ticks that are logged."""
-    _function: Any
-    _arguments: tuple[Any, ...]
+    _judged: NDArray[np.float64] = field(default_factory=lambda: np.array(UNJUDGED))
+    _columns: Sequence[str] = ()
+    _function: Any = None
+    _arguments: tuple[Any, ...] = ()
+
+    @property
+    def time_s(self) -> float:
+        """Of the last tick that is logged, s."""
+        return (self.done - 1) * self.tick_s
 
     def advance(self, ticks: int) -> None:
-        """Logs so many ticks more, to the end of the run at most."""
+        """Goes on for so many ticks, to the end of the run at most.
+
+        Raises:
+            ValueError: A value became NaN or infinite.
+        """
         end = min(self.done + ticks, len(self.log))
-        self._function(self.done, end, self.log, *self._arguments)
-        self.done = end
+        self.done, found, touched = self._function(
+            self.done, end, self.log, self._judged, *self._arguments
+        )
+        if not np.isfinite(self.log[self.done - 1]).all():
+            raise InputError(
+                "engine",
+                f"a value is not finite at {self.time_s:g} s; run with engine drake, "
+                "which names the block",
+            )
+        self.over = found > 0 or touched or self.done == len(self.log)
+        if self.over:
+            self.rules.take_over(self._last_tick(found, touched=touched))
+
+    def _last_tick(self, found: int, *, touched: bool) -> JudgedTick:
+        last = self.done - 1
+        names = [*self._columns]
+        pose = [names.index(name) for name in ("p_WB_x", "p_WB_y", "theta_WB")]
+        return JudgedTick(
+            last * self.tick_s,
+            max(last - 1, 0) * self.tick_s,
+            self.log[last, pose].tolist(),
+            self.log[last - 1, pose].tolist() if last else None,
+            bool(self.log[last, names.index("target_valid")] > 0.5),
+            self._judged.tolist(),
+            found,
+            touched,
+        )
 
 
-def compile_loop(scenario: Scenario, parts: Parts) -> CompiledLoop:
+def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> CompiledLoop:
     """The loop of a scenario that has one.
 
     Args:
         scenario: Of one robot.
         parts: Of its diagram, built with a log.
+        rules: When the run ends.
 
     Returns:
         The loop, before its first tick.
@@ -86,33 +142,75 @@ def compile_loop(scenario: Scenario, parts: Parts) -> CompiledLoop:
         _ORDERS[scenario.integrator.scheme],
         scenario.integrator.step_s,
     )
-    tables = _world(scenario, np.arange(ticks + 1) * scenario.tick_s)
+    times = np.arange(ticks + 1) * scenario.tick_s
+    tables = _world(scenario, times)
     signals = _Signals(
-        parts.blocks, {name: len(row[0]) for name, row in tables.items()}
+        parts.blocks, {name: row.shape[1] for name, row in tables.items()}
     )
     steps = {part: block.step_for(run) for part, block in parts.blocks.items()}
     order = _order(parts.blocks, steps, set(tables))
-    blocks = tuple(
-        (
-            np.array(steps[part].state, dtype=float),
-            tuple(signals.view(name) for name in _inputs(parts.blocks[part])),
-            tuple(signals.view(name) for name in _outputs(parts.blocks[part])),
-            compiled_numbers(steps[part].numbers),
-        )
-        for part in order
-    )
     logged = [signals.places[port] for _, port in parts.logged]
-    function = _loop([steps[part] for part in order])
     columns = np.concatenate([np.arange(place.start, place.stop) for place in logged])
+    watched = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
     arguments = (
         signals.values,
         columns,
-        tuple(signals.view(name) for name in tables),
+        tuple(map(signals.view, tables)),
         tuple(tables.values()),
-        blocks,
+        tuple(
+            (
+                np.array(steps[part].state, dtype=float),
+                tuple(map(signals.view, _inputs(parts.blocks[part]))),
+                tuple(map(signals.view, _outputs(parts.blocks[part]))),
+                compiled_numbers(steps[part].numbers),
+            )
+            for part in order
+        ),
+        (*map(signals.view, watched), np.array(scenario.start.pose)),
+        _contacts(scenario, rules, times),
     )
-    log = np.empty((ticks + 1, len(columns)))
-    return CompiledLoop(log, 0, function, arguments)
+    return CompiledLoop(
+        np.empty((ticks + 1, len(columns))),
+        scenario.tick_s,
+        rules,
+        _columns=[name for names in parts.logged.values() for name in names],
+        _function=_loop(tuple(steps[part][::3] for part in order)),
+        _arguments=arguments,
+    )
+
+
+class _Contacts(NamedTuple):
+    """What a tick is judged by."""
+
+    rules: Any
+    tick_s: float
+    size: tuple[float, float]
+    """Length and width of the robot, m."""
+    sizes: NDArray[np.float64]
+    """(n, 2) of the bodies, m."""
+    reach: NDArray[np.float64]
+    """(n,) m: farther away, a body does not touch the robot."""
+    poses: NDArray[np.float64]
+    """(n, 5 ticks + 1, 3) of the bodies, at ticks and in between."""
+
+
+def _contacts(
+    scenario: Scenario, rules: RobotRules, times: NDArray[np.float64]
+) -> _Contacts:
+    parts = np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS
+    between = times[:-1, None] + parts * (times[1:] - times[:-1])[:, None]
+    instants = np.concatenate([times[:1], between.ravel()])
+    poses = np.empty((len(rules.reach), len(instants), 3))
+    for row, (_, body, _) in zip(poses, rules.reach, strict=True):
+        row[:] = body.path.poses(instants if body.path.moves else instants[:1])
+    return _Contacts(
+        compiled_numbers(rules.numbers),
+        scenario.tick_s,
+        scenario.size,
+        np.array([body.size for _, body, _ in rules.reach]),
+        np.array([reach for _, _, reach in rules.reach]),
+        poses,
+    )
 
 
 def _world(
@@ -178,41 +276,49 @@ def _order(
     return [*order, *late]
 
 
-def _loop(steps: Sequence[Step]) -> Any:
-    """The function over ticks; compiled when it is first called."""
-    early = [k for k, step in enumerate(steps) if step.publish is None]
-    late = [k for k, step in enumerate(steps) if step.publish is not None]
-    publish = [f"    publish_{k}(blocks[{k}][0], *blocks[{k}][2:])" for k in late]
+@cache
+def _loop(steps: tuple[tuple[Any, Any], ...]) -> Any:
+    """The function over ticks, compiled when it is first called.
+
+    Args:
+        steps: Step and publish of each block, in the order of ``_order``.
+    """
+    early = [k for k, (_, publish) in enumerate(steps) if publish is None]
+    late = [k for k, (_, publish) in enumerate(steps) if publish is not None]
+    publish = [f"publish_{k}(blocks[{k}][0], *blocks[{k}][2:])" for k in late]
+    step = [f"step_{k}(tick, *blocks[{k}])" for k in range(len(steps))]
+    cleared = [f"clear(blocks[{k}][2]); {step[k]}" for k in early]
     lines = [
-        "def loop(begin, end, log, signals, columns, outside, tables, blocks):",
+        "def loop(",
+        "    begin, end, log, judged,",
+        "    signals, columns, outside, tables, blocks, watched, contacts",
+        "):",
         "    if begin == 0:",
-        *(f"    {line}" for line in publish),
+        *(f"        {line}" for line in publish),
         "    for tick in range(begin, end):",
         *(f"        fill(outside[{k}], tables[{k}], tick)" for k in range(3)),
-        *(
-            line
-            for k in early
-            for line in (
-                f"        clear(blocks[{k}][2])",
-                f"        step_{k}(tick, *blocks[{k}])",
-            )
-        ),
+        *(f"        {line}" for line in cleared),
         "        write(log, tick, signals, columns)",
-        *(f"        step_{k}(tick, *blocks[{k}])" for k in late[:-1]),
-        *(f"    {line}" for line in publish[:-1]),
-        f"        step_{late[-1]}(tick, *blocks[{late[-1]}])",
-        f"    {publish[-1]}",
+        "        found, touched = judge(tick, judged, watched, contacts)",
+        "        if found > 0 or touched:",
+        "            return tick + 1, found, touched",
+        *(f"        {step[k]}" for k in late[:-1]),
+        *(f"        {line}" for line in publish[:-1]),
+        f"        {step[late[-1]]}",
+        f"        {publish[-1]}",
+        "    return end, 0, False",
     ]
-    names: dict[str, Any] = {"fill": _fill, "clear": _clear, "write": _write}
-    for k, step in enumerate(steps):
-        names[f"step_{k}"] = _compilable(step.step)
-        names[f"publish_{k}"] = step.publish and _compilable(step.publish)
+    names: dict[str, Any] = {
+        "fill": _fill,
+        "clear": _clear,
+        "write": _write,
+        "judge": _judge,
+    }
+    for k, (function, publishing) in enumerate(steps):
+        names[f"step_{k}"] = as_compiled(function)
+        names[f"publish_{k}"] = publishing and as_compiled(publishing)
     exec("\n".join(lines), names)
     return njit(names["loop"])
-
-
-def _compilable(function: Any) -> Any:
-    return njit(function) if isinstance(function, FunctionType) else function
 
 
 @njit(cache=True)
@@ -234,3 +340,56 @@ def _write(
 ) -> None:  # pragma: no cover  (compiled)
     for k in range(len(columns)):
         log[tick, k] = signals[columns[k]]
+
+
+_judge_tick = njit(judge_tick)
+
+
+@njit
+def _judge(
+    tick: int, judged: Any, watched: Any, contacts: _Contacts
+) -> tuple[int, bool]:  # pragma: no cover  (compiled)
+    """Cause of the end by ``judge_tick``, and whether a body is touched."""
+    pose, velocity, pose_WS, valid, before = watched
+    for body in range(len(contacts.reach)):
+        if _touched(tick, pose, before, body, contacts):
+            return 0, True
+    found = _judge_tick(
+        tick * contacts.tick_s,
+        judged,
+        pose,
+        velocity,
+        pose_WS,
+        valid[0] > 0.5,
+        contacts.rules,
+    )
+    for k in range(3):
+        before[k] = pose[k]
+    return found, False
+
+
+@njit
+def _touched(
+    tick: int, pose: Any, before: Any, body: int, contacts: _Contacts
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether robot and body touch since the last tick, as ``RobotRules`` looks."""
+    poses, (length, width) = contacts.poses[body], contacts.size
+    at = BETWEEN_TICKS * tick
+    if (
+        math.hypot(poses[at, 0] - pose[0], poses[at, 1] - pose[1])
+        > contacts.reach[body]
+    ):
+        return False
+    mine, other = np.empty(5), np.empty(5)
+    mine[3], mine[4] = length, width
+    other[3], other[4] = contacts.sizes[body, 0], contacts.sizes[body, 1]
+    for number in range(1, BETWEEN_TICKS + 1):
+        row, part = at - BETWEEN_TICKS + number, number / BETWEEN_TICKS
+        if tick == 0:
+            row, part = 0, 0.0
+        for k in range(3):
+            mine[k] = before[k] + part * (pose[k] - before[k])
+            other[k] = poses[row, k]
+        if rectangle_clearance(mine, other) < 0.0:
+            return True
+    return False

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,10 @@ from diagrams.stop_rules import Collision, RobotRules, decisive_robot
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["RunResult", "gather_result"]
+__all__ = ["Engine", "RunResult", "gather_result", "logged_columns"]
+
+#: What carries a run out.
+Engine = Literal["drake", "compiled"]
 
 
 @dataclass(frozen=True)
@@ -45,6 +48,8 @@ class RunResult:
     loading what numba compiles, s."""
     name: str = ROBOT
     """Of the robot."""
+    engine: Engine = "drake"
+    """What carried the run out."""
     several: dict[str, RunResult] = field(default_factory=dict)
     """What each robot did, where there are several."""
     others: Surroundings | None = None
@@ -103,28 +108,27 @@ class RunResult:
 def gather_result(
     scenario: Scenario,
     rules: Mapping[str, RobotRules],
-    robots: Mapping[str, Parts],
-    context: Any,
+    logs: Mapping[str, dict[str, NDArray[np.float64]]],
     wall_s: float,
+    engine: Engine = "drake",
 ) -> RunResult:
     """The result of a run that has ended.
 
     Args:
         scenario: That was run.
         rules: Each robot's stop rules, with their causes.
-        robots: Each robot's parts, with their logs.
-        context: Of the whole diagram.
+        logs: Each robot's columns, with the time t.
         wall_s: Time that the simulation took, s.
+        engine: What carried the run out.
 
     Returns:
         Of the only robot, or of all with each in ``several``.
     """
-    logs = {name: _logged(parts, context) for name, parts in robots.items()}
     paths = {
         name: RecordedPath(log["t"], np.column_stack([log[key] for key in _POSE]))
         for name, log in logs.items()
     }
-    several = len(robots) > 1
+    several = len(logs) > 1
     results = {}
     for name, log in logs.items():
         around = scenario.surroundings(name, paths)
@@ -136,6 +140,7 @@ def gather_result(
             _completed(log, own, around),
             wall_s,
             name,
+            engine,
             others=None if own is scenario else around,
             whole=None if own is scenario else scenario,
         )
@@ -154,6 +159,7 @@ def gather_result(
         columns,
         wall_s,
         decisive.name,
+        engine,
         several=results,
     )
 
@@ -161,13 +167,21 @@ def gather_result(
 _POSE = ("p_WB_x", "p_WB_y", "theta_WB")
 
 
-def _logged(parts: Parts, context: Any) -> dict[str, NDArray[np.float64]]:
-    """The columns of a robot's log, and the time."""
-    assert parts.log is not None
-    log = parts.log.FindLog(context)
+def logged_columns(
+    parts: Parts, times: NDArray[np.float64], rows: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """The columns of a robot's log, and the time.
+
+    Args:
+        parts: Of the robot.
+        times: (n,) s.
+        rows: (columns, n) what was logged.
+
+    Returns:
+        (n,) each, by name.
+    """
     names = [name for columns in parts.logged.values() for name in columns]
-    rows = zip(names, np.array(log.data()), strict=True)
-    return {"t": np.array(log.sample_times()), **dict(rows)}
+    return {"t": times, **dict(zip(names, rows, strict=True))}
 
 
 def _completed(

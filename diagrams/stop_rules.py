@@ -23,12 +23,16 @@ from systems.world.geometry import (
 )
 
 __all__ = [
+    "BETWEEN_TICKS",
     "ROUNDING_S",
     "SUCCESSFUL",
+    "UNJUDGED",
     "Collision",
+    "JudgedTick",
     "RobotRules",
     "StopRules",
     "decisive_robot",
+    "judge_tick",
 ]
 
 #: Causes of runs that did what they should.
@@ -210,6 +214,24 @@ def judge_tick(time, state, pose, velocity, p_WS, valid, numbers):
     return 4 if time - state[0] >= stop.stuck_after_s else 0
 
 
+class JudgedTick(NamedTuple):
+    """The last tick of a compiled loop."""
+
+    time: float
+    time_before: float
+    """Of the tick before, s; 0 at the first one."""
+    pose: list[float]
+    pose_before: list[float] | None
+    valid: bool
+    """Whether there is a target."""
+    state: list[float]
+    """Of ``judge_tick``."""
+    found: int
+    """What that returned."""
+    touched: bool
+    """Whether a body was touched since the tick before."""
+
+
 @dataclass
 class RobotRules:
     """Why one robot's run ends."""
@@ -247,7 +269,7 @@ class RobotRules:
         )
         # Farther than this from the robot's centre, a body does not touch it.
         size = scenario.size
-        self._reach = [
+        self.reach = [
             (name, body, 0.5 * (math.hypot(*size) + math.hypot(*body.size)) + NEAR_M)
             for name, body in self.surroundings.bodies.items()
         ]
@@ -271,7 +293,7 @@ class RobotRules:
 
         Of several robots, one that has reached its goal can still be hit.
         """
-        places = {name: body.path.pose(time) for name, body, _ in self._reach}
+        places = {name: body.path.pose(time) for name, body, _ in self.reach}
         ended, self.collision = self.cause, self._find_collision(time, places)
         if self.collision is not None:
             self.cause = "collision"
@@ -287,6 +309,24 @@ class RobotRules:
             )
             self.cause = FOUND[found]
         self._pose, self._time = self._now, time
+
+    def take_over(self, tick: JudgedTick) -> None:
+        """Ends as a compiled loop has ended, which judges by the same functions.
+
+        Args:
+            tick: The last one.
+        """
+        self._state, self._valid = tick.state, tick.valid
+        self._now, self._pose, self._time = (
+            tick.pose,
+            tick.pose_before,
+            tick.time_before,
+        )
+        self.cause = FOUND[tick.found]
+        if tick.touched:
+            places = {name: body.path.pose(tick.time) for name, body, _ in self.reach}
+            self.collision = self._find_collision(tick.time, places)
+            self.cause = "collision"
 
     def final_cause(self) -> str:
         """Cause of the run, once the simulator has returned."""
@@ -308,7 +348,7 @@ class RobotRules:
     def _find_collision(self, time: float, places: _Places) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first, pose = None, self._now
-        for name, body, reach in self._reach:
+        for name, body, reach in self.reach:
             x, y, _ = places[name]
             if math.hypot(x - pose[0], y - pose[1]) > reach:
                 continue

@@ -16,7 +16,7 @@ from systems.framework.finite import read_lists
 from systems.framework.parameters import Parameters
 from systems.framework.scalar_math import float_of
 
-__all__ = ["RunFacts", "Step", "StepBlock", "compiled_numbers"]
+__all__ = ["RunFacts", "Step", "StepBlock", "as_compiled", "compiled_numbers"]
 
 
 class Step(NamedTuple):
@@ -66,6 +66,12 @@ def _tuple_type(model: type[Parameters]) -> Any:
     return namedtuple(f"{model.__name__}Numbers", [*model.model_fields, *derived])
 
 
+@cache
+def as_compiled(function: Any) -> Any:
+    """A function for compiled code; what is compiled already stays as it is."""
+    return njit(function) if isinstance(function, FunctionType) else function
+
+
 def compiled_numbers(value: Any) -> Any:
     """What a step depends on, as compiled code takes it.
 
@@ -83,7 +89,7 @@ def compiled_numbers(value: Any) -> Any:
         parts = [compiled_numbers(part) for part in value]
         return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if isinstance(value, FunctionType):
-        return njit(value)
+        return as_compiled(value)
     if isinstance(value, list):
         return np.array(value)
     return 0.0 if value is None else value
