@@ -78,9 +78,8 @@ def simulate(
         InputError: The sound file cannot be played, or a value became NaN.
         InputError: The scenario cannot be compiled (``why_not_compiled``).
     """
-    if engine == "compiled":
-        if reason := why_not_compiled(scenario):
-            raise InputError("engine", reason)
+    if engine == "compiled" and (reason := why_not_compiled(scenario)):
+        raise InputError("engine", reason)
     follower = follower or build_sound_follower(scenario, log=True)
     logs = [parts.log for parts in follower.robots.values()]
     if follower.scenario != scenario or None in logs:
