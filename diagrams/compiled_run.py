@@ -19,6 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.core.errors import TypingError
 from numpy.typing import NDArray
 
 from diagrams.robot import Parts
@@ -30,7 +31,7 @@ from diagrams.stop_rules import (
     RobotRules,
     judge_tick,
 )
-from systems.framework.input_error import InputError
+from systems.framework.input_error import InputError, shortened
 from systems.framework.step_block import (
     RunFacts,
     Step,
@@ -88,9 +89,16 @@ class CompiledLoop:
             ValueError: A value became NaN or infinite.
         """
         end = min(self.done + ticks, len(self.log))
-        self.done, found, touched = self._function(
-            self.done, end, self.log, self._judged, *self._arguments
-        )
+        try:
+            self.done, found, touched = self._function(
+                self.done, end, self.log, self._judged, *self._arguments
+            )
+        except TypingError as error:
+            raise InputError(
+                "engine",
+                f"numba cannot compile law {self.rules.scenario.law!r} "
+                f"({_last_line(error)}); run with engine drake",
+            ) from None
         if not np.isfinite(self.log[self.done - 1]).all():
             raise InputError(
                 "engine",
@@ -115,6 +123,15 @@ class CompiledLoop:
             found,
             touched,
         )
+
+
+def _last_line(error: Exception) -> str:
+    """What numba complains of, without the way there."""
+    lines = [line.strip() for line in str(error).splitlines()]
+    known = [
+        line for line in lines if line and not line.startswith(("During", "raised"))
+    ]
+    return shortened(next(line for line in known if "Failed in" not in line), 120)
 
 
 def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> CompiledLoop:
@@ -144,9 +161,8 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
     )
     times = np.arange(ticks + 1) * scenario.tick_s
     tables = _world(scenario, times)
-    signals = _Signals(
-        parts.blocks, {name: row.shape[1] for name, row in tables.items()}
-    )
+    widths = {name: table.shape[1] for name, table in tables.items()}
+    signals = _Signals(parts.blocks, widths)
     steps = {part: block.step_for(run) for part, block in parts.blocks.items()}
     order = _order(parts.blocks, steps, set(tables))
     logged = [signals.places[port] for _, port in parts.logged]
@@ -375,10 +391,8 @@ def _touched(
     """Whether robot and body touch since the last tick, as ``RobotRules`` looks."""
     poses, (length, width) = contacts.poses[body], contacts.size
     at = BETWEEN_TICKS * tick
-    if (
-        math.hypot(poses[at, 0] - pose[0], poses[at, 1] - pose[1])
-        > contacts.reach[body]
-    ):
+    dx, dy = poses[at, 0] - pose[0], poses[at, 1] - pose[1]
+    if math.hypot(dx, dy) > contacts.reach[body]:
         return False
     mine, other = np.empty(5), np.empty(5)
     mine[3], mine[4] = length, width

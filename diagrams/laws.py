@@ -89,9 +89,7 @@ def _block(law: Law, parts: dict[str, Any]) -> Any:
     force = law.force
     assert force is not None, f"{law.name} has neither force nor block"
     arguments = law.arguments(parts["repulsion"], parts["sensors"].minimum_range_m)
-    return RadialLawController(
-        **parts, law=lambda c, s, repulsion: force(c, s, *arguments)
-    )
+    return RadialLawController(**parts, law=force, arguments=arguments)
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:

@@ -5,23 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.bodies import RecordedPath, Surroundings
 from diagrams.robot import Parts
+from diagrams.run_parameters import Engine
 from diagrams.scenario import ROBOT, Scenario
 from diagrams.stop_rules import Collision, RobotRules, decisive_robot
 
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["Engine", "RunResult", "gather_result", "logged_columns"]
-
-#: What carries a run out.
-Engine = Literal["drake", "compiled"]
+__all__ = ["RunResult", "gather_result", "logged_columns"]
 
 
 @dataclass(frozen=True)
@@ -192,8 +190,8 @@ def _completed(
     x_P = columns["p_WB_x"] + offset * np.cos(theta)
     y_P = columns["p_WB_y"] + offset * np.sin(theta)
     path = around.followed.path
-    pose_WS = np.array([path.pose(time) for time in columns["t"].tolist()]).T
-    columns["p_WS_x"], columns["p_WS_y"], columns["theta_WS"] = pose_WS
+    pose_WS = path.poses(columns["t"])
+    columns["p_WS_x"], columns["p_WS_y"], columns["theta_WS"] = pose_WS.T
     dx, dy = columns["p_WS_x"] - x_P, columns["p_WS_y"] - y_P
     bearing = np.arctan2(dy, dx) - theta
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P

@@ -16,7 +16,8 @@ from pydrake.systems.analysis import (
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.compiled_run import compile_loop, why_not_compiled
-from diagrams.run_result import Engine, RunResult, gather_result, logged_columns
+from diagrams.run_parameters import Engine
+from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import RobotRules, StopRules
 from systems.framework.input_error import InputError
@@ -56,7 +57,7 @@ def simulate(
     *,
     follower: SoundFollower | None = None,
     progress: Callable[[float], None] | None = None,
-    engine: Engine = "drake",
+    engine: Engine | None = None,
 ) -> RunResult:
     """Runs a scenario to its end.
 
@@ -66,9 +67,9 @@ def simulate(
             never frees blocks written in Python, so many runs in one process
             should share a build.
         progress: Called with the simulated time, s, once a simulated second.
-        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop, the
-            same run to 1e-9 m in a fiftieth of the time; it compiles for some ten
-            seconds where a process runs a kind of scenario for the first time.
+        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop, which
+            a process compiles for some 20 s when it first runs a kind of scenario;
+            none: that of the scenario.
 
     Returns:
         ``RunResult``.
@@ -78,6 +79,7 @@ def simulate(
         InputError: The sound file cannot be played, or a value became NaN.
         InputError: The scenario cannot be compiled (``why_not_compiled``).
     """
+    engine = engine or scenario.engine
     if engine == "compiled" and (reason := why_not_compiled(scenario)):
         raise InputError("engine", reason)
     follower = follower or build_sound_follower(scenario, log=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
 from typing import Annotated, Any, NamedTuple
 
@@ -228,6 +227,10 @@ def _velocities(state, numbers):
     return velocity, slip
 
 
+#: Drake's integrators stretch a last step by this factor at most.
+_STRETCH = 1.01
+
+
 class PlantStepNumbers(NamedTuple):
     """What the step of ``DiffDrivePlant`` depends on."""
 
@@ -237,8 +240,8 @@ class PlantStepNumbers(NamedTuple):
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
     order: int
     """Order of the Runge-Kutta steps, 2 or 3."""
-    steps: int
-    """In a tick."""
+    step_s: float
+    """Largest step, s."""
     tick_s: float
     left_rim_m: float
     right_rim_m: float
@@ -250,26 +253,35 @@ def plant_step(tick, state, inputs, outputs, numbers):
     """Moves the robot on by one tick, by Drake's explicit Runge-Kutta steps.
 
     Args:
-        tick: Not used.
+        tick: Number of the tick at which it begins.
         state: As of ``plant_derivatives`` or ``slipping_derivatives``.
         inputs: As the input port.
         outputs: Left as they are: they follow from the state.
         numbers: ``PlantStepNumbers``.
     """
     (commanded,) = inputs
-    h = numbers.tick_s / numbers.steps
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
-    for _ in range(numbers.steps):
+    time, end = tick * numbers.tick_s, (tick + 1) * numbers.tick_s
+    # Times, steps and sums are rounded as Drake does.
+    while time < end:
+        h = end - time
+        if h > _STRETCH * numbers.step_s:
+            h = numbers.step_s
         k1 = derivatives(state, commanded, *of_plant)
         if numbers.order == 2:
             k2 = derivatives(state + h * k1, commanded, *of_plant)
-            change = h * (0.5 * k1 + 0.5 * k2)
+            change = h * k1
+            correction = h / 2.0 * k2 + -h / 2.0 * k1
+            for k in range(len(state)):
+                state[k] = state[k] + change[k] + correction[k]
         else:
-            k2 = derivatives(state + 0.5 * h * k1, commanded, *of_plant)
-            k3 = derivatives(state + h * (2.0 * k2 - k1), commanded, *of_plant)
-            change = h * (k1 + 4.0 * k2 + k3) / 6.0
-        for k in range(len(state)):
-            state[k] += change[k]
+            k2 = derivatives(state + h / 2.0 * k1, commanded, *of_plant)
+            k3 = derivatives(state + (-h * k1 + 2.0 * h * k2), commanded, *of_plant)
+            part = h / 6.0
+            change = part * k1 + 4.0 * part * k2 + part * k3
+            for k in range(len(state)):
+                state[k] += change[k]
+        time += h
 
 
 def publish_plant(state, outputs, numbers):
@@ -351,7 +363,7 @@ def DiffDrivePlant_(T):
                 self._derivatives,
                 tuple(self._numbers),
                 3,
-                1,
+                TICK_S,
                 TICK_S,
                 *self._numbers[:2],
                 self._robot.wheel_radius_m,
@@ -412,7 +424,7 @@ def DiffDrivePlant_(T):
             """What the block does in each tick of a compiled loop, ``Step``."""
             numbers = self._step_numbers._replace(
                 order=run.order,
-                steps=math.ceil(run.tick_s / run.step_s - 1e-9),
+                step_s=run.step_s,
                 tick_s=run.tick_s,
             )
             at_rest = [0.0] * (7 if self._plant.friction is not None else 4)

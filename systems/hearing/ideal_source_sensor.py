@@ -300,9 +300,8 @@ def IdealSourceSensor_(T):
                 sounds = self._config["sound"].sounds((frames - 0.5) * frame_s)
             noise = np.empty((0, 2))
             if self._noisy:
-                noise = np.array(
-                    [tick_generator(seed, k).standard_normal(2) for k in frames]
-                )
+                generators = [tick_generator(seed, k) for k in frames.tolist()]
+                noise = np.array([rng.standard_normal(2) for rng in generators])
             numbers = IdealSourceNumbers(
                 self._config["robot"].control_point_m,
                 self._hearing,

@@ -45,27 +45,34 @@ def RadialLawController_(T):
             law: ``law(c, s, repulsion)``: force away from the obstacle in N at
                 distance c in m and speed s in m/s. Use pydrake.math, so that
                 it can be differentiated.
+            arguments: What the law takes after c and s in the place of repulsion.
         """
 
         def _construct(
-            self, *, law=no_force, repulsion=None, converter=None, **options
+            self,
+            *,
+            law=no_force,
+            arguments=None,
+            repulsion=None,
+            converter=None,
+            **options,
         ):
             super().__init__(converter=converter)
-            self._function = law
             repulsion = repulsion or RepulsionParameters()
+            self._function = law
+            self._arguments = (repulsion,) if arguments is None else arguments
             name = "radial_law_controller"
             self._declare_loop(T, name, repulsion=repulsion, **options)
 
         def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self, law=other._function, converter=converter, **other._options
-            )
+            law = {"law": other._function, "arguments": other._arguments}
+            Impl._construct(self, converter=converter, **law, **other._options)
 
         def _law(self):
-            return self._function, (self._repulsion,)
+            return self._function, self._arguments
 
         def radial_force(self, c, s):
-            return self._function(c, s, self._repulsion)
+            return self._function(c, s, *self._arguments)
 
     return Impl
 
