@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.recordings.source_levels import levels_contradict
+from analysis.recordings.channel_order import levels_contradict
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
 
