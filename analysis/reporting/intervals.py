@@ -55,12 +55,19 @@ def bootstrap_interval(
     Returns:
         Both ends, in the unit of the statistic.
     """
-    samples = np.asarray(values, dtype=float)
-    generator = np.random.default_rng(seed)
-    chosen = generator.integers(len(samples), size=(resamples, len(samples)))
-    tail = 0.5 * (1.0 - confidence)
-    spread = np.asarray(statistic(samples[chosen], axis=1))
-    return Interval(*np.quantile(spread, [tail, 1.0 - tail]).tolist())
+    from scipy.stats import bootstrap
+
+    # scipy refuses a single sample: twice the same has the same interval.
+    samples = np.resize(np.asarray(values, dtype=float), max(np.size(values), 2))
+    found = bootstrap(
+        (samples,),
+        statistic,
+        n_resamples=resamples,
+        confidence_level=confidence,
+        method="percentile",
+        rng=seed,
+    )
+    return Interval(*map(float, found.confidence_interval))
 
 
 def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
@@ -77,6 +84,7 @@ def median_interval(values: ArrayLike, *, confidence: float = 0.95) -> Interval:
     Returns:
         Two of the samples.
     """
+    # The same as quantile_test's, which takes 15 times as long.
     from scipy.stats import binom
 
     ordered = np.sort(np.asarray(values, dtype=float))

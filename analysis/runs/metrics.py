@@ -57,7 +57,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_effort_metrics(result),
         **_odometry_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
-        **_collision_metrics(result),
+        **collision_warning(result),
         **_hearing_metrics(result),
     }
 
@@ -151,10 +151,8 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
     errors = np.abs(following_error(result))
     following = errors <= result.scenario.stop.following_band_m
     since_heard = np.maximum.accumulate(columns["target_valid"] > 0.5)
-    error, bearing = (
-        errors[settled],
-        np.degrees(columns["source_bearing_true"][settled]),
-    )
+    error = errors[settled]
+    bearing = np.degrees(columns["source_bearing_true"][settled])
     return {
         "following_fraction": _mean(following[since_heard]),
         "following_error_rms_m": _rms(error),
@@ -276,16 +274,6 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
     first = np.flatnonzero(reacting)
     return float(nearest[first[0]]) if len(first) else None
-
-
-def _collision_metrics(result: RunResult) -> dict[str, float | None]:
-    """What the cones knew of the body that was hit."""
-    before = collision_warning(result)
-    return {
-        "contact_warning_s": before.warning_s if before else None,
-        "contact_unseen_s": before.unseen_s if before else None,
-        "contact_push_n": before.push_n if before else None,
-    }
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:

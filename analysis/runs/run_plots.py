@@ -82,13 +82,10 @@ def _map(result: RunResult) -> tuple[Figure, Axes]:
     axes = figure.add_axes(
         (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
     )
-    axes.set_aspect("equal")
-    axes.set_xlim(x_low, x_high)
-    axes.set_ylim(y_low, y_high)
+    axes.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
-    axes.set_xlabel("x in W (m)")
-    axes.set_ylabel("y in W (m)")
+    axes.set(xlabel="x in W (m)", ylabel="y in W (m)")
     return figure, axes
 
 
@@ -133,8 +130,10 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             frameon=False,
             handlelength=1.5,
         )
-    all_axes[-1].set_xlabel("time (s), shaded while the source sounds")
-    all_axes[-1].set_xlim(0.0, max(result.simulated_s, 1e-3))
+    all_axes[-1].set(
+        xlabel="time (s), shaded while the source sounds",
+        xlim=(0.0, max(result.simulated_s, 1e-3)),
+    )
     figure.suptitle(_title(result), fontsize=11)
     figure.align_ylabels(list(all_axes))
     return figure
@@ -170,14 +169,11 @@ def _range(axes: Axes, result: RunResult) -> None:
 
 
 def _bearing(axes: Axes, result: RunResult) -> None:
-    true, heard = (
-        np.degrees(result.columns[name])
-        for name in ("source_bearing_true", "source_bearing")
-    )
-    axes.plot(
-        result.time, _cut_at_wraps(true, 360.0), color=COLOURS["source"], label="true"
-    )
-    _heard(axes, result, heard)
+    true = np.degrees(result.columns["source_bearing_true"])
+    # Else a line would cross the whole panel where the bearing wraps.
+    true[1:][np.abs(np.diff(true)) > 180.0] = np.nan
+    axes.plot(result.time, true, color=COLOURS["source"], label="true")
+    _heard(axes, result, np.degrees(result.columns["source_bearing"]))
     axes.set_ylabel("bearing of\nsource (deg)")
 
 
@@ -228,10 +224,3 @@ def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) ->
     )
     axes.set_ylabel("clearance\n(m)")
     axes.set_ylim(bottom=min(0.0, 1.1 * float(clearance[least])))
-
-
-def _cut_at_wraps(values: NDArray[np.float64], turn: float) -> NDArray[np.float64]:
-    """The same values, NaN after which a line would cross the whole panel."""
-    cut = values.copy()
-    cut[1:][np.abs(np.diff(values)) > 0.5 * turn] = np.nan
-    return cut
