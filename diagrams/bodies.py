@@ -45,10 +45,7 @@ class RecordedPath:
     recorded: NDArray[np.float64]
     """(n, 3) x, y, theta in W, m and rad, not wrapped."""
 
-    @property
-    def moves(self) -> bool:
-        """A robot may move."""
-        return True
+    moves = True
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """(x, y, theta) at a time in s."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_code import asked_for, import_own, why
+from diagrams.own_code import import_own, made
 from diagrams.own_laws import checked_law, try_law
 from diagrams.scenario import Scenario
 from systems import (
@@ -101,14 +101,7 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
             f"{name!r} is a class, but no LeafSystem; write a function "
             "law(c, s, repulsion), or derive it from a controller of ours",
         )
-    try:
-        block = law(**asked_for(law, parts))
-    except (Exception, SystemExit) as error:  # whatever it raises
-        raise InputError(
-            "law",
-            f"{name!r} cannot be made ({why(error)}); it may ask for "
-            f"{', '.join(parts)}",
-        ) from error
+    block = made(name, "law", law, parts)
     _commanded(block, name)
     sizes = _output_sizes(block)
     for port, size in _TOLD.items():

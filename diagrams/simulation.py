@@ -7,11 +7,7 @@ from collections.abc import Callable
 from time import perf_counter
 from typing import Any
 
-from pydrake.systems.analysis import (
-    ApplySimulatorConfig,
-    Simulator,
-    SimulatorConfig,
-)
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.run_result import RunResult, gather_result

@@ -98,9 +98,7 @@ class StopRules:
         self._moving = self._paths if several else {}
         self.robots = {
             name: RobotRules(
-                scenario.of_robot(name),
-                scenario.surroundings(name, self._paths),
-                parts,
+                scenario.of_robot(name), scenario.surroundings(name, self._paths), parts
             )
             for name, parts in follower.robots.items()
         }

@@ -107,9 +107,7 @@ def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure
             panel.set_title(
                 f"{cell.label}, {example.kind}: {_ending(result)}", fontsize=9
             )
-            panel.set_aspect("equal")
-            panel.set_xlim(x_low, x_high)
-            panel.set_ylim(y_low, y_high)
+            panel.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     for panel in grid[-1]:
         panel.set_xlabel("x in W (m)")
     for panel in grid[:, 0]:

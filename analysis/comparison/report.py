@@ -12,13 +12,13 @@ from typing import Any
 from analysis.comparison.cells import LawCell, Mean, Median
 from analysis.comparison.compare import PreparedComparison
 from analysis.comparison.laws_in_pairs import Comparison, Pair
+from analysis.reporting.intervals import with_interval
 from analysis.reporting.plain_values import write_json
-from analysis.reporting.provenance import versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import RunResult, dump_scenario, simulate
 
 __all__ = ["compare_summary", "compare_text", "write_comparison"]
 
-SCHEMA_VERSION = 1
 #: Columns of the printed table: heading, metric, unit's factor, format.
 _COLUMNS = (
     ("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
@@ -134,9 +134,7 @@ def _command(out: Path, cell: LawCell, kind: str) -> str:
 
 
 def compare_text(
-    summary: dict[str, Any],
-    comparisons: dict[str, Comparison],
-    pooled: Sequence[Pair],
+    summary: dict[str, Any], comparisons: dict[str, Comparison], pooled: Sequence[Pair]
 ) -> str:
     """Tables for a terminal.
 
@@ -188,15 +186,13 @@ def _counts(counts: dict[str, int]) -> str:
 
 
 def _rate(rate: Mean) -> str:
-    low, high = 100.0 * rate.low, 100.0 * rate.high
-    return f"{100.0 * rate.estimate:.0f} ({low:.0f}, {high:.0f})"
+    return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
 
 
 def _median(median: Median | None, factor: float, form: str) -> str:
     if median is None:
         return "-"
-    value, low, high = (factor * x for x in (median.median, median.low, median.high))
-    return f"{value:{form}} ({low:{form}}, {high:{form}})"
+    return with_interval(median.median, median.low, median.high, form, factor=factor)
 
 
 def _pair_line(pair: Pair) -> Iterator[str]:
@@ -204,11 +200,9 @@ def _pair_line(pair: Pair) -> Iterator[str]:
     common = "".join(f", {value}" for value in pair.fields.values())
     text = f"{pair.first} less {pair.second}{common}:"
     for name, rate in (("success", pair.success), ("collision", pair.collision)):
-        low, high = 100.0 * rate.low, 100.0 * rate.high
-        text += (
-            f" {name} {100.0 * rate.difference:+.0f} ({low:+.0f}, {high:+.0f}) "
-            f"p {rate.p_value:.2g};"
-        )
+        figures = rate.difference, rate.low, rate.high
+        points = with_interval(*figures, "+.0f", factor=100.0)
+        text += f" {name} {points} p {rate.p_value:.2g};"
     yield text
     parts = []
     for metric in _PAIRED:

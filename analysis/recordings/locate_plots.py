@@ -95,13 +95,8 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     )
     if centre is not None:
         axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
-        axes.axhspan(
-            centre - std,
-            centre + std,
-            color=COLOURS["source"],
-            alpha=0.15,
-            linewidth=0,
-        )
+        ends = centre - std, centre + std
+        axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
 
 
@@ -126,17 +121,10 @@ def _plan(axes: Axes, result: LocateResult) -> None:
     axes.plot(*places.T, "o", color=COLOURS["robot"], markersize=4, label="microphones")
     for k, (x, y) in enumerate(places):
         axes.annotate(
-            f"{k + 1}",
-            (x, y),
-            xytext=(4, 4),
-            textcoords="offset points",
-            fontsize=8,
+            f"{k + 1}", (x, y), xytext=(4, 4), textcoords="offset points", fontsize=8
         )
-    axes.set_aspect("equal")
-    axes.set_xlim(-size, size)
-    axes.set_ylim(-size, size)
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set(aspect="equal", xlim=(-size, size), ylim=(-size, size))
+    axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(
         fontsize=8,
         frameon=False,

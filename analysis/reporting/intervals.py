@@ -8,7 +8,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["Interval", "bootstrap_interval", "median_interval", "wilson_interval"]
+__all__ = [
+    "Estimate",
+    "Interval",
+    "bootstrap_interval",
+    "median_interval",
+    "wilson_interval",
+    "with_interval",
+]
 
 
 class Interval(NamedTuple):
@@ -16,6 +23,40 @@ class Interval(NamedTuple):
 
     low: float
     high: float
+
+
+class Estimate(NamedTuple):
+    """A figure with its 95 % interval; NaN where nothing has one."""
+
+    value: float
+    low: float
+    high: float
+
+
+def with_interval(
+    value: float,
+    low: float,
+    high: float,
+    form: str,
+    *,
+    unit: str = "",
+    factor: float = 1.0,
+) -> str:
+    """A figure and its interval for readers.
+
+    Args:
+        value: The figure.
+        low: Lower end of its interval.
+        high: Upper end.
+        form: As ``format`` takes it.
+        unit: Stands behind the figure, with a space in front.
+        factor: What all are multiplied by.
+
+    Returns:
+        Text as '12.5 % (3.1, 22.0)'.
+    """
+    value, low, high = (factor * each for each in (value, low, high))
+    return f"{value:{form}}{unit} ({low:{form}}, {high:{form}})"
 
 
 def wilson_interval(successes: int, runs: int, *, confidence: float = 0.95) -> Interval:

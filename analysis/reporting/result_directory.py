@@ -12,12 +12,7 @@ from pathlib import Path
 
 from systems.framework.input_error import InputError, shortened
 
-__all__ = [
-    "ResultDirectory",
-    "check_directory",
-    "take_directory",
-    "whole_directory",
-]
+__all__ = ["ResultDirectory", "check_directory", "take_directory", "whole_directory"]
 
 
 class ResultDirectory:

@@ -73,7 +73,7 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
     least, contact = proximity.least, float(np.min(proximity.time_to_contact))
     return {
         "minimum_clearance_m": float(np.min(least)),
-        "minimum_obstacle_clearance_m": _least(least[:-1]),
+        "minimum_obstacle_clearance_m": min(least[:-1].tolist(), default=None),
         "clearance_p05_m": _quantile(proximity.clearance, 0.05),
         "minimum_time_to_contact_s": contact if np.isfinite(contact) else None,
     }
@@ -180,7 +180,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
     duration = result.simulated_s
     return {
         "jerk_rms_m_s3": _rms(linear),
-        "jerk_max_m_s3": float(np.max(linear)) if len(linear) else None,
+        "jerk_max_m_s3": max(linear.tolist(), default=None),
         "angular_jerk_rms_rad_s3": _rms(angular),
         "sparc": _quantile(sparc, 0.5),
         "ldlj": _quantile(ldlj, 0.5),
@@ -323,10 +323,6 @@ def _new_frames(result: RunResult) -> NDArray[np.bool_]:
     ticks = np.rint(result.time / tick_s)
     fresh: NDArray[np.bool_] = (ticks - 1.0) % ticks_a_frame == 0.0
     return fresh
-
-
-def _least(values: NDArray[np.float64]) -> float | None:
-    return float(np.min(values)) if len(values) else None
 
 
 def _mean(flags: NDArray[np.bool_]) -> float | None:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from diagrams import RunResult, Scenario
-from diagrams.bodies import robot_rectangle
+from diagrams.bodies import Path, robot_rectangle
 from diagrams.stop_rules import SUCCESSFUL
 from systems.framework.input_error import InputError
 from systems.sound.waveforms import SoundParameters
@@ -178,11 +178,9 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
         for own in result.robots.values()
         for body in ("WB", "WS")
     ]
-    sources = scenario.all_sources.values()
-    centres += [source.path().poses(times)[:, :2] for source in sources]
-    for obstacle in scenario.obstacles:
-        path = obstacle.path()
-        centres.append(np.array([path.pose(t)[:2] for t in times]))
+    paths: list[Path] = [each.path() for each in scenario.all_sources.values()]
+    paths += [obstacle.path() for obstacle in scenario.obstacles]
+    centres += [path.poses(times)[:, :2] for path in paths]
     points = np.concatenate(centres)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])

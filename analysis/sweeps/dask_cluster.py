@@ -18,12 +18,7 @@ from uuid import uuid4
 
 from analysis.reporting.provenance import versions
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
-from analysis.sweeps.processes import (
-    ATTEMPTS,
-    PULSE_S,
-    WorkerError,
-    WorkerProcess,
-)
+from analysis.sweeps.processes import ATTEMPTS, PULSE_S, WorkerError, WorkerProcess
 from systems.framework.input_error import InputError
 
 __all__ = ["connect", "run_on_cluster"]

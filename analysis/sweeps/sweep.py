@@ -119,7 +119,7 @@ def prepare_sweep(
     _build_each_kind(plan, points)
     runner: Runner
     if scheduler is None:
-        runner = partial(run_locally, workers=workers or _cores())
+        runner = partial(run_locally, workers=workers or len(os.sched_getaffinity(0)))
     else:
         from analysis.sweeps.dask_cluster import connect, run_on_cluster
 
@@ -186,9 +186,3 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> None:
         if point.index == 0 or not kinds <= seen:
             build_sound_follower(plan.scenario_of(point))
         seen |= kinds
-
-
-def _cores() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
