@@ -87,6 +87,10 @@ class RunResult:
         names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
         return np.stack([self.columns[name] for name in names], axis=1)
 
+    def vector(self, name: str) -> NDArray[np.float64]:
+        """(2, n) x and y of a column's quantity at the ticks, as of ``p_WP``."""
+        return np.stack([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
+
     @property
     def simulated_s(self) -> float:
         """Simulated time, s."""

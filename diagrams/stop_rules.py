@@ -130,13 +130,10 @@ class StopRules:
         for rules in self.robots.values():
             rules.judge(time)
         if self.over:
-            self._interrupt()
+            for rules in self.robots.values():
+                rules.cause = rules.cause or INTERRUPTED
             return EventStatus.ReachedTermination(self._diagram, self.cause)
         return _GO_ON
-
-    def _interrupt(self) -> None:
-        for rules in self.robots.values():
-            rules.cause = rules.cause or INTERRUPTED
 
 
 @dataclass

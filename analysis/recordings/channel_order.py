@@ -20,7 +20,13 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["FrameDelays", "exchanged_channels", "levels_contradict", "misfit"]
+__all__ = [
+    "FrameDelays",
+    "exchanged",
+    "exchanged_channels",
+    "levels_contradict",
+    "misfit",
+]
 
 # Delays fit where they are right to this part of a sample, or to this share of
 # what sound needs across the array.
@@ -100,7 +106,7 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
     d, levels = d[::every], levels[::every]
     found = [
         _fitting(
-            d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
+            d, levels, replace(shape, p_AM=exchanged(shape.p_AM, *pair)), tolerance
         )
         for pair in exchanges
     ]
@@ -129,10 +135,20 @@ def misfit(delays: FrameDelays) -> float | None:
     return 1.0 - share if share < _HOPELESS else None
 
 
-def _exchanged(p: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
-    order = np.arange(len(p))
+def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
+    """An array with two of its rows exchanged.
+
+    Args:
+        rows: (n, ...).
+        i: Number of one row, from 0.
+        j: Number of the other one.
+
+    Returns:
+        (n, ...), a copy.
+    """
+    order = np.arange(len(rows))
     order[[i, j]] = j, i
-    return p[order]
+    return rows[order]
 
 
 def _fitting(

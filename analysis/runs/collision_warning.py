@@ -32,7 +32,7 @@ def collision_warning(result: RunResult) -> dict[str, float | None]:
         if len(known):
             warning, unseen = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()
         if "repulsion_x" in columns:
-            push = math.hypot(columns["repulsion_x"][-1], columns["repulsion_y"][-1])
+            push = math.hypot(*result.vector("repulsion")[:, -1])
     return {
         "contact_warning_s": warning,
         "contact_unseen_s": unseen,

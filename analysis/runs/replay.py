@@ -132,7 +132,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         own, path = look.result, robot_path(look.result, result)
         _record_robot(meshcat, own, path, frames)
         _record_estimate(meshcat, own, estimate_path(path))
-        p_WP = np.stack([own.columns["p_WP_x"], own.columns["p_WP_y"]], axis=1)
+        p_WP = own.vector("p_WP").T
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
         if own.name in sounds:
             _record_rings(meshcat, result, path, sounds[own.name])
@@ -243,13 +243,10 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
 
 def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
     """The ball jumps when a frame is heard and rests in between."""
-    columns = result.columns
-    valid = columns["target_valid"] > 0.5
+    valid = result.columns["target_valid"] > 0.5
     _record_switch(meshcat, path, result.time, valid)
     height = replay_scene.SOURCE_HEIGHT_M + 0.12
-    places = np.stack(
-        [columns["p_WS_estimated_x"], columns["p_WS_estimated_y"]], axis=1
-    )
+    places = result.vector("p_WS_estimated").T
     for tick in np.flatnonzero(valid):
         if tick and valid[tick - 1] and np.allclose(places[tick], places[tick - 1]):
             continue

@@ -180,7 +180,7 @@ def _bearing(axes: Axes, result: RunResult) -> None:
 def _forces(axes: Axes, result: RunResult) -> None:
     said = "attraction_x" in result.columns
     for name in ("attraction", "repulsion") if said else ():
-        size = np.hypot(result.columns[f"{name}_x"], result.columns[f"{name}_y"])
+        size = np.hypot(*result.vector(name))
         axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
     axes.set_ylabel("force on P\n(N)")
     axes.set_ylim(bottom=0.0)

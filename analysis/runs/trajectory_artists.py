@@ -66,10 +66,6 @@ def _apart(
     return bool(np.linalg.norm(step[:2]) >= APART_M)
 
 
-def _seconds(time: float) -> str:
-    return f"{round(time, 1):g} s"
-
-
 def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
     """The path of P, and footprints with their microphones at some times, s.
 
@@ -80,8 +76,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
     """
     result, colour, scenario = look.result, look.colour, look.result.scenario
     axes.plot(
-        result.columns["p_WP_x"],
-        result.columns["p_WP_y"],
+        *result.vector("p_WP"),
         color=colour,
         linewidth=1.8,
         label=look.path_label,
@@ -116,7 +111,7 @@ def _write_time(
     dx, dy = rotate(pose[2], 0.0, aside)
     unit_x, unit_y = dx / abs(aside), dy / abs(aside)
     axes.annotate(
-        _seconds(time),
+        f"{round(time, 1):g} s",
         (pose[0] + dx, pose[1] + dy),
         xytext=(9.0 * unit_x, 7.0 * unit_y),
         textcoords="offset points",
@@ -189,9 +184,10 @@ def draw_estimates(axes: Axes, look: Look) -> None:
     colour = look.estimates
     part = result.time[heard] / max(result.simulated_s, 1e-9)
     colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
+    x, y = result.vector("p_WS_estimated")[:, heard]
     axes.scatter(
-        columns["p_WS_estimated_x"][heard],
-        columns["p_WS_estimated_y"][heard],
+        x,
+        y,
         c=colours,
         marker="x",
         s=16,

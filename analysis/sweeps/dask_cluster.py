@@ -104,7 +104,8 @@ def run_on_cluster(
     futures: dict[Any, Task] = {}
     try:
         while True:
-            room = TASKS_A_THREAD * _threads(client) - len(futures)
+            threads = max(1, sum(client.nthreads().values()))
+            room = TASKS_A_THREAD * threads - len(futures)
             for task in islice(tasks, max(0, room)):
                 key = f"phonotaxis-{sweep}-{task.point.index}"
                 futures[client.submit(_run_remotely, task, key=key)] = task
@@ -125,10 +126,6 @@ def run_on_cluster(
             client.run(_dismiss_idle, on_error="ignore")
         with suppress(OSError, CancelledError):
             client.close()
-
-
-def _threads(client: Any) -> int:
-    return max(1, sum(client.nthreads().values()))
 
 
 def _outcome(future: Any, task: Task) -> Outcome:
