@@ -42,9 +42,7 @@ class ResultDirectory:
             raise _cannot(path, error) from None
         if taken:
             self.undo()
-            raise InputError(
-                "out", f"another process writes to {path}; name another directory"
-            )
+            raise _refused(f"another process writes to {path}")
 
     def close(self) -> None:
         """Lets other processes have it."""
@@ -148,15 +146,11 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
         is_empty = parent or not path.is_dir() or not any(path.iterdir())
         is_fixed = not parent and (path == Path.cwd() or path.is_mount())
     except UnicodeEncodeError:
-        raise InputError(
-            "out", f"{shown} is not UTF-8; name another directory"
-        ) from None
+        raise _refused(f"{shown} is not UTF-8") from None
     except (OSError, RuntimeError, ValueError) as error:
         # Names too long, home directories of nobody, and zero bytes.
         reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            "out", f"{shown} is no usable path ({reason}); name another directory"
-        ) from None
+        raise _refused(f"{shown} is no usable path ({reason})") from None
     if is_file:
         raise InputError("out", f"{shown} is a file; name a directory")
     if is_fixed:
@@ -164,17 +158,15 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
             "out", f"{shown!r} cannot be replaced; name a directory that is not there"
         )
     if not is_empty:
-        raise InputError("out", f"{shown} is not empty; name another directory")
+        raise _refused(f"{shown} is not empty")
     above = path.parent
     while not above.exists():
         above = above.parent
     if not above.is_dir():
-        raise InputError("out", f"{above} is a file; name another directory")
+        raise _refused(f"{above} is a file")
     for folder in (path,) if parent and path.exists() else (above, path):
         if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(
-                "out", f"{folder} cannot be written; name another directory"
-            )
+            raise _refused(f"{folder} cannot be written")
     return path
 
 
@@ -206,9 +198,11 @@ def _make_number(base: Path) -> tuple[Path, list[Path]]:
 
 
 def _cannot(path: Path, error: OSError) -> InputError:
-    return InputError(
-        "out", f"{path} cannot be made ({error.strerror}); name another directory"
-    )
+    return _refused(f"{path} cannot be made ({error.strerror})")
+
+
+def _refused(why: str) -> InputError:
+    return InputError("out", f"{why}; name another directory")
 
 
 def _umask() -> int:

@@ -17,6 +17,7 @@ from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
+from diagrams.stop_rules import Collision
 from systems.framework.input_error import shortened
 
 __all__ = [
@@ -121,11 +122,13 @@ def _row(
         "seed": point.seed,
         "redraws": point.redraws,
         "fields": point.fields,
-        "cause": cause,
-        "collision_object": collision.object if collision else None,
-        "collision_fault": collision.fault if collision else None,
-        "collision_time_s": collision.time if collision else None,
-        "robots": _endings(result) if result else {},
+        **_ending(cause, collision),
+        "collision_time_s": collision and collision.time,
+        "robots": {
+            f"{name}.{key}": value
+            for name, own in (result.several if result else {}).items()
+            for key, value in _ending(own.cause, own.collision).items()
+        },
         "metrics": metrics,
         "simulated_s": result.simulated_s if result else None,
         "error": error,
@@ -133,15 +136,12 @@ def _row(
     }
 
 
-def _endings(result: RunResult) -> dict[str, str | None]:
-    """How each of several robots ended, by its name, a dot and the row's name."""
-    endings: dict[str, str | None] = {}
-    for name, own in result.several.items():
-        hit = own.collision
-        endings[f"{name}.cause"] = own.cause
-        endings[f"{name}.collision_object"] = hit.object if hit else None
-        endings[f"{name}.collision_fault"] = hit.fault if hit else None
-    return endings
+def _ending(cause: str, hit: Collision | None) -> dict[str, Any]:
+    return {
+        "cause": cause,
+        "collision_object": hit and hit.object,
+        "collision_fault": hit and hit.fault,
+    }
 
 
 def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
