@@ -23,9 +23,8 @@ from analysis.runs.scene import (
     tick_at,
 )
 from diagrams import RunResult
-from diagrams.bodies import robot_rectangle
+from diagrams.bodies import microphones_W, robot_rectangle
 from diagrams.participants import SourceParameters
-from systems.sound.mic_array import microphones_B
 from systems.world.geometry import rectangle_corners, rotate
 
 __all__ = [
@@ -82,7 +81,6 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
         label=look.path_label,
         zorder=4,
     )
-    microphones = microphones_B(scenario.robot)
     for index, time in enumerate(times):
         pose = result.poses("WB")[tick_at(result, time)]
         _draw_body(
@@ -95,7 +93,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
             label=look.body_label if index == 0 else None,
             zorder=3,
         )
-        bar = np.array([compose(pose, (x, y, 0.0))[:2] for x, y in microphones])
+        bar = microphones_W(pose, scenario.robot)
         axes.plot(*bar.T, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
         _write_time(axes, pose, -0.42, time, colour)
 
