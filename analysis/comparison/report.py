@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -76,7 +76,6 @@ def write_comparison(
     prepared: PreparedComparison,
     comparisons: dict[str, Comparison],
     summary: dict[str, Any],
-    progress: Callable[[int], None] | None = None,
 ) -> None:
     """Writes what belongs beside the runs into the comparison's directory.
 
@@ -87,24 +86,16 @@ def write_comparison(
         prepared: Its directory exists.
         comparisons: Cells and pairs by scenario.
         summary: From ``compare_summary``.
-        progress: Called with the number of example runs done.
     """
     from analysis.comparison.plots import plot_examples, plot_rates
 
     out = prepared.out
     (out / "examples").mkdir(exist_ok=True)
     plot_rates(list(comparisons.values())).savefig(out / "rates.png", dpi=150)
-    done = 0
     for name, comparison in comparisons.items():
-        rows: list[tuple[LawCell, list[RunResult]]] = []
-        for cell in comparison.cells:
-            results = []
-            for result in _run_examples(prepared, cell):
-                results.append(result)
-                done += 1
-                if progress is not None:
-                    progress(done)
-            rows.append((cell, results))
+        rows = [
+            (cell, list(_run_examples(prepared, cell))) for cell in comparison.cells
+        ]
         plot_examples(rows).savefig(out / f"{name}.png", dpi=150)
     write_json(summary, out / "summary.json")
 

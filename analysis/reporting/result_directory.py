@@ -14,6 +14,9 @@ from systems.framework.input_error import InputError, shortened
 
 __all__ = ["ResultDirectory", "check_directory", "take_directory", "whole_directory"]
 
+#: Parent of numbered directories.
+_BASE = "results"
+
 
 class ResultDirectory:
     """An empty directory that no other process can take; see ``take_directory``."""
@@ -64,15 +67,12 @@ class ResultDirectory:
         self.close()
 
 
-def take_directory(
-    out: str | Path | None, base: str | Path = "results"
-) -> ResultDirectory:
+def take_directory(out: str | Path | None) -> ResultDirectory:
     """Takes the directory that results go to, before anything runs.
 
     Args:
         out: A directory that does not exist yet, or is empty; none: the next
-            number under ``base``.
-        base: Parent of numbered directories.
+            number under ``results``.
 
     Returns:
         The directory, which exists, is empty, and belongs to this process.
@@ -83,13 +83,11 @@ def take_directory(
     if out is not None:
         path = check_directory(out)
         return ResultDirectory(path, _make(path))
-    return ResultDirectory(*_make_number(check_directory(base, parent=True)))
+    return ResultDirectory(*_make_number(check_directory(_BASE, parent=True)))
 
 
 @contextmanager
-def whole_directory(
-    out: str | Path | None, base: str | Path = "results"
-) -> Iterator[tuple[Path, Path]]:
+def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
     """The directory of ``take_directory``, with a hidden one to write to.
 
     The hidden one takes the other's place at the end. If the block raises,
@@ -98,7 +96,6 @@ def whole_directory(
 
     Args:
         out: As of ``take_directory``.
-        base: Parent of numbered directories.
 
     Yields:
         The directory as it will be called, and the hidden one.
@@ -106,9 +103,9 @@ def whole_directory(
     Raises:
         InputError: As ``take_directory``.
     """
-    taken = take_directory(out, base)
+    taken = take_directory(out)
     path, partial = taken.path, None
-    shown = Path(base) / path.name if out is None else Path(out).expanduser()
+    shown = Path(_BASE) / path.name if out is None else Path(out).expanduser()
     try:
         try:
             partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -211,18 +210,16 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
     return f"{value}{unit} ({low} to {high})"
 
 
-def cell_label(fields: dict[str, Any], names: Sequence[str] | None = None) -> str:
+def cell_label(fields: dict[str, Any]) -> str:
     """Fields of a cell in words: last part of each path, and value.
 
     Args:
         fields: Values of the grid by path.
-        names: Paths to show; None: all.
 
     Returns:
         ``all runs`` where there is nothing to show.
     """
-    chosen = fields if names is None else {name: fields[name] for name in names}
-    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in chosen.items()]
+    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 
