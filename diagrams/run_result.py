@@ -68,6 +68,15 @@ class RunResult:
         return self.others or self.scenario.surroundings()
 
     @property
+    def ending(self) -> str:
+        """Cause, and what was touched."""
+        return (
+            f"{self.cause} with {self.collision.object}"
+            if self.collision
+            else self.cause
+        )
+
+    @property
     def target_moves(self) -> bool:
         """Whether what is followed ever moves."""
         return self.surroundings.followed.path.moves

@@ -192,13 +192,8 @@ def _speeds(axes: Axes, result: RunResult) -> None:
     forward = columns["v_WB_x"] * np.cos(theta) + columns["v_WB_y"] * np.sin(theta)
     for side in ("left", "right"):
         rim = columns[f"wheel_speed_{side}"] * robot.wheel_radius_m
-        axes.plot(
-            result.time,
-            rim,
-            color=COLOURS[side],
-            lw=1.0,
-            label=f"{side} wheel, command",
-        )
+        label = f"{side} wheel, command"
+        axes.plot(result.time, rim, color=COLOURS[side], lw=1.0, label=label)
     axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
     axes.set_ylabel("speed (m/s)")
 
@@ -211,16 +206,9 @@ def _turning(axes: Axes, result: RunResult) -> None:
 
 
 def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) -> None:
-    axes.plot(
-        result.time, clearance, color=COLOURS["obstacle"], label="to nearest body"
-    )
-    least = int(np.argmin(clearance))
-    axes.plot(
-        result.time[least],
-        clearance[least],
-        "v",
-        color="black",
-        label=f"least: {clearance[least]:.2f} m",
-    )
+    time, colour = result.time, COLOURS["obstacle"]
+    axes.plot(time, clearance, color=colour, label="to nearest body")
+    at, least = time[np.argmin(clearance)], float(np.min(clearance))
+    axes.plot(at, least, "v", color="black", label=f"least: {least:.2f} m")
     axes.set_ylabel("clearance\n(m)")
-    axes.set_ylim(bottom=min(0.0, 1.1 * float(clearance[least])))
+    axes.set_ylim(bottom=min(0.0, 1.1 * least))

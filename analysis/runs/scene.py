@@ -99,12 +99,10 @@ def looks(result: RunResult) -> list[Look]:
 
 def run_title(result: RunResult) -> str:
     """What was run and how it ended, on one line."""
-    scenario, hit = result.full_scenario, result.collision
-    by = f" with {hit.object}" if hit else ""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
     laws = ", ".join(dict.fromkeys(own.scenario.law for own in result.robots.values()))
-    return f"{scenario.name}, law {laws}: {who}{result.cause}{by}"
+    return f"{result.full_scenario.name}, law {laws}: {who}{result.ending}"
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:

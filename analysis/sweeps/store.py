@@ -28,12 +28,8 @@ from systems.framework.input_error import InputError
 
 __all__ = ["StoreError", "SweepStore", "load_results", "trajectory_path"]
 
-JOURNAL, TABLE, MANIFEST, PLAN = (
-    "runs.jsonl",
-    "runs.parquet",
-    "sweep.json",
-    "sweep.yaml",
-)
+JOURNAL, TABLE = "runs.jsonl", "runs.parquet"
+MANIFEST, PLAN = "sweep.json", "sweep.yaml"
 
 
 class StoreError(RunError):
