@@ -116,12 +116,7 @@ def _row(
         if value is not None and not math.isfinite(value):
             raise ValueError(f"{name} is {value}")
     return {
-        "index": point.index,
-        "cell": point.cell,
-        "run": point.run,
-        "seed": point.seed,
-        "redraws": point.redraws,
-        "fields": point.fields,
+        **vars(point),
         **_ending(cause, collision),
         "collision_time_s": collision and collision.time,
         "robots": {
