@@ -1,18 +1,9 @@
 """Scenarios, the builder that wires blocks, and the run."""
 
 from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.loading import (
-    dump_scenario,
-    library_scenarios,
-    load_scenario,
-)
+from diagrams.loading import dump_scenario, library_scenarios, load_scenario
 from diagrams.scenario import Scenario
-from diagrams.simulation import (
-    RunResult,
-    load_compiled_code,
-    make_simulator,
-    simulate,
-)
+from diagrams.simulation import RunResult, load_compiled_code, make_simulator, simulate
 from systems.framework.input_error import InputError
 
 __all__ = [

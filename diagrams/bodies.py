@@ -11,6 +11,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters
+from systems.sound.mic_array import microphones_B
+from systems.world.geometry import rotate
 
 __all__ = [
     "Body",
@@ -18,6 +20,7 @@ __all__ = [
     "Path",
     "RecordedPath",
     "Surroundings",
+    "microphones_W",
     "robot_rectangle",
 ]
 
@@ -45,10 +48,7 @@ class RecordedPath:
     recorded: NDArray[np.float64]
     """(n, 3) x, y, theta in W, m and rad, not wrapped."""
 
-    @property
-    def moves(self) -> bool:
-        """A robot may move."""
-        return True
+    moves = True
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """(x, y, theta) at a time in s."""
@@ -131,6 +131,20 @@ class Surroundings:
     def obstacles(self) -> dict[str, Body]:
         """All but what is followed."""
         return {k: body for k, body in self.bodies.items() if k != self.target}
+
+
+def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:
+    """The robot's microphones.
+
+    Args:
+        pose_WB: (x, y, theta), m and rad.
+        robot: Their places in B.
+
+    Returns:
+        (n, 2) in W, m.
+    """
+    x, y, theta = np.asarray(pose_WB)
+    return np.array([x, y]) + np.stack(rotate(theta, *microphones_B(robot).T), axis=1)
 
 
 def robot_rectangle(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:

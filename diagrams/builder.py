@@ -9,13 +9,9 @@ from typing import Any
 
 import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
-from pydrake.systems.primitives import (
-    ConstantVectorSource,
-    Multiplexer,
-    VectorLogSink,
-)
+from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
-from diagrams.robot import Parts, make_robot, make_source, parts_of
+from diagrams.robot import Parts, make_robot, make_source, multiplexed, parts_of
 from diagrams.scenario import Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
@@ -124,11 +120,8 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
             listeners_frame_s=scenario.longest_frame_s,
             log=log,
         )
-    for name, system in (
-        *sources.items(),
-        ("obstacles", obstacles),
-        *followers.items(),
-    ):
+    systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
+    for name, system in systems:
         builder.AddNamedSystem(name, system)
     world = _World(builder, scenario, obstacles, sources, followers)
     for name in robots:
@@ -171,11 +164,7 @@ class _World:
         others = dict([*around.obstacles.items()][boxes:])
         poses = [self._pose(other) for other in others]
         sizes = [extent for body in others.values() for extent in body.size]
-        self._give(
-            name,
-            "poses_WO",
-            lambda: self._joined(name, "poses_WO", poses),
-        )
+        self._give(name, "poses_WO", lambda: self._joined(name, "poses_WO", poses))
         self._give(
             name,
             "sizes",
@@ -211,8 +200,4 @@ class _World:
         ports = [each for each in (first, *more) if each.size()]
         if len(ports) < 2:
             return ports[0] if ports else first
-        multiplexer = Multiplexer([each.size() for each in ports])
-        self.builder.AddNamedSystem(f"{port}_for_{name}", multiplexer)
-        for index, each in enumerate(ports):
-            self.builder.Connect(each, multiplexer.get_input_port(index))
-        return multiplexer.get_output_port(0)
+        return multiplexed(self.builder, f"{port}_for_{name}", ports)

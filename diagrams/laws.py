@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_code import asked_for, import_own, why
+from diagrams.own_code import import_own, made
 from diagrams.own_laws import checked_law, try_law
 from diagrams.scenario import Scenario
 from systems import (
@@ -55,19 +55,20 @@ def make_controller(scenario: Scenario) -> Any:
     Raises:
         InputError: There is no such law, or it does not do what a law does.
     """
+    sensors = scenario.ultrasonic
+    if scenario.obstacle_sensing == "ideal":
+        at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
+        sensors = sensors.model_copy(update=at_once)
     parts = {
         "robot": scenario.robot,
         "attraction": scenario.attraction,
         "repulsion": scenario.repulsion,
         "tick_s": scenario.tick_s,
+        "sensors": sensors,
     }
-    sensors = scenario.ultrasonic
-    if scenario.obstacle_sensing == "ideal":
-        at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
-        sensors = sensors.model_copy(update=at_once)
     name = scenario.law
     if name in LAWS:
-        return _block(LAWS[name], parts | {"sensors": sensors})
+        return _block(LAWS[name], parts)
     if ":" not in name:
         raise InputError(
             "law",
@@ -76,11 +77,11 @@ def make_controller(scenario: Scenario) -> Any:
         )
     law = import_own(name, "law")
     if inspect.isclass(law):
-        return _own_block(name, law, parts | {"sensors": sensors})
+        return _own_block(name, law, parts)
     function = checked_law(name, law)
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)
-    return RadialLawController(**parts, sensors=sensors, law=function)
+    return RadialLawController(**parts, law=function)
 
 
 def _block(law: Law, parts: dict[str, Any]) -> Any:
@@ -99,14 +100,7 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
             f"{name!r} is a class, but no LeafSystem; write a function "
             "law(c, s, repulsion), or derive it from a controller of ours",
         )
-    try:
-        block = law(**asked_for(law, parts))
-    except (Exception, SystemExit) as error:  # whatever it raises
-        raise InputError(
-            "law",
-            f"{name!r} cannot be made ({why(error)}); it may ask for "
-            f"{', '.join(parts)}",
-        ) from error
+    block = made(name, "law", law, parts)
     _commanded(block, name)
     sizes = _output_sizes(block)
     for port, size in _TOLD.items():

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
 from pydantic import ValidationError
-from ruamel.yaml import YAML
 
 from diagrams.explain import explain
 from diagrams.scenario import Scenario
-from diagrams.yaml_text import LARGEST_BYTES, parse_yaml
+from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
 
 __all__ = [
@@ -72,11 +70,7 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
 
 def dump_scenario(scenario: Scenario) -> str:
     """The whole scenario as YAML, loadable by ``load_scenario``."""
-    yaml = YAML()
-    yaml.default_flow_style = None
-    stream = StringIO()
-    yaml.dump(scenario.model_dump(mode="json"), stream)
-    return stream.getvalue()
+    return dump_yaml(scenario.model_dump(mode="json"))
 
 
 def _find(source: str | Path) -> Path:

@@ -1,4 +1,4 @@
-"""A user's own functions and classes, named in a scenario."""
+"""A user's own functions, classes and blocks, named in a scenario."""
 
 from __future__ import annotations
 
@@ -12,9 +12,12 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
 from systems.framework.input_error import InputError
 
-__all__ = ["asked_for", "import_own", "own_files", "why"]
+__all__ = ["import_own", "made", "own_files", "why", "with_own_blocks"]
 
 _OURS = ("analysis", "diagrams", "systems")
 
@@ -103,20 +106,82 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
     return tuple(sorted(found.values()))
 
 
-def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, Any]:
-    """Of what a user's class may ask for, that which its arguments name.
+def made(
+    name: str, field: str, maker: Callable[..., Any], parts: Mapping[str, Any]
+) -> Any:
+    """What a user's class makes of what its arguments ask for.
 
     Args:
-        maker: The class; of a scalar-templated one its ``_construct`` tells.
-        parts: What it may ask for, by name.
+        name: Of the class, for messages.
+        field: Of the scenario, which names it.
+        maker: The class; of a scalar-templated one its ``_construct`` tells what it
+            asks for.
+        parts: What it may ask for, by name; it gets all, where it takes any keyword.
 
     Returns:
-        Some of the parts; all, where it takes any keyword.
+        The object.
+
+    Raises:
+        InputError: It cannot be made.
     """
-    asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
-    if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
-        return dict(parts)
-    return {key: parts[key] for key in asked if key in parts}
+    try:
+        asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
+        if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
+            return maker(**parts)
+        return maker(**{key: parts[key] for key in asked if key in parts})
+    except (Exception, SystemExit) as error:  # whatever it raises
+        raise InputError(
+            field,
+            f"{name!r} cannot be made ({why(error)}); it may ask for "
+            f"{', '.join(parts)}",
+        ) from error
+
+
+def with_own_blocks(
+    blocks: Mapping[str, Any], names: tuple[str, ...], parts: Mapping[str, Any]
+) -> dict[str, Any]:
+    """A robot's blocks by part, a user's own among them.
+
+    Args:
+        blocks: Ours by part.
+        names: Of the user's own, ``package.module:Name`` or ``path/to/file.py:Name``;
+            one stands in the place of ours of its part.
+        parts: What its ``__init__`` may ask for, by the names of its arguments.
+
+    Returns:
+        Blocks by part: a copy with the user's own in their places.
+
+    Raises:
+        InputError: Two of them have one part, or there is no such block, it does not
+            say what it is, or it cannot be made.
+    """
+    joined, own = dict(blocks), set()
+    for name in names:
+        block = _own_block(name, parts)
+        part = block.FACTS.part
+        if part in own:
+            raise InputError(
+                "blocks", f"{name!r} is a second {part!r}; give each a part of its own"
+            )
+        own.add(part)
+        joined[part] = block
+    return joined
+
+
+def _own_block(name: str, parts: Mapping[str, Any]) -> Any:
+    found = import_own(name, "blocks")
+    if not (inspect.isclass(found) and issubclass(found, LeafSystem)):
+        raise InputError("blocks", f"{name!r} is no LeafSystem; derive it from that")
+    if not isinstance(getattr(found, "FACTS", None), BlockFacts):
+        raise InputError(
+            "blocks",
+            f"{name!r} does not say what it is; give it an attribute FACTS, "
+            "BlockFacts(part, stage)",
+        )
+    block = made(name, "blocks", found, parts)
+    if not block.get_name():
+        block.set_name(found.__name__)
+    return block
 
 
 def _is_users(module: ModuleType, file: str) -> bool:

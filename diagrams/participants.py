@@ -23,12 +23,7 @@ from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.sound.adc import MicArrayParameters, channel_skew
 from systems.sound.waveforms import SoundParameters
 
-__all__ = [
-    "FollowerParameters",
-    "SourceParameters",
-    "StartParameters",
-    "joined",
-]
+__all__ = ["FollowerParameters", "SourceParameters", "StartParameters", "joined"]
 
 
 class StartParameters(Parameters):

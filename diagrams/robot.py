@@ -12,7 +12,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from diagrams.laws import make_command, make_controller
-from diagrams.own_blocks import with_own_blocks
+from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.scenario import ROBOT, SOURCE, Scenario
 from systems import (
@@ -41,6 +41,7 @@ __all__ = [
     "connect_by_name",
     "make_robot",
     "make_source",
+    "multiplexed",
     "parts_of",
 ]
 
@@ -148,9 +149,7 @@ def make_robot(
     controller = make_controller(scenario)
     ours = [
         DiffDrivePlant(
-            robot=scenario.robot,
-            plant=scenario.plant,
-            initial_pose=scenario.start.pose,
+            robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
         ),
         WheelOdometry(
             robot=scenario.robot,
@@ -402,12 +401,22 @@ def _columns(block: Any) -> dict[str, tuple[str, ...]]:
 def _add_log(builder: DiagramBuilder, blocks: Sequence[Any], tick_s: float) -> None:
     """One sink behind a multiplexer: a third cheaper than a sink a port."""
     ports = [block.GetOutputPort(name) for block in blocks for name in _columns(block)]
-    multiplexer = builder.AddNamedSystem(
-        "log_multiplexer", Multiplexer([port.size() for port in ports])
-    )
+    joined = multiplexed(builder, "log_multiplexer", ports)
+    LogVectorOutput(joined, builder, publish_period=tick_s).set_name("log")
+
+
+def multiplexed(builder: DiagramBuilder, name: str, ports: Sequence[Any]) -> Any:
+    """One output port with the values of several, one after the other.
+
+    Args:
+        builder: That of the diagram.
+        name: Of the block that joins them.
+        ports: Output ports of vectors.
+
+    Returns:
+        The port.
+    """
+    block = builder.AddNamedSystem(name, Multiplexer([port.size() for port in ports]))
     for index, port in enumerate(ports):
-        builder.Connect(port, multiplexer.get_input_port(index))
-    sink = LogVectorOutput(
-        multiplexer.get_output_port(0), builder, publish_period=tick_s
-    )
-    sink.set_name("log")
+        builder.Connect(port, block.get_input_port(index))
+    return block.get_output_port(0)

@@ -71,6 +71,15 @@ class RunResult:
         return self.others or self.scenario.surroundings()
 
     @property
+    def ending(self) -> str:
+        """Cause, and what was touched."""
+        return (
+            f"{self.cause} with {self.collision.object}"
+            if self.collision
+            else self.cause
+        )
+
+    @property
     def target_moves(self) -> bool:
         """Whether what is followed ever moves."""
         return self.surroundings.followed.path.moves
@@ -89,6 +98,10 @@ class RunResult:
         """(n, 3) x, y, theta in W at the ticks, m and rad; body ``WB`` or ``WS``."""
         names = (f"p_{body}_x", f"p_{body}_y", f"theta_{body}")
         return np.stack([self.columns[name] for name in names], axis=1)
+
+    def vector(self, name: str) -> NDArray[np.float64]:
+        """(2, n) x and y of a column's quantity at the ticks, as of ``p_WP``."""
+        return np.stack([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
 
     @property
     def simulated_s(self) -> float:

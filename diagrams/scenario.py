@@ -11,10 +11,16 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any, TypeVar
 
-import numpy as np
 from pydantic import ValidationError, model_validator
 
-from diagrams.bodies import Body, LivePath, Path, Surroundings, robot_rectangle
+from diagrams.bodies import (
+    Body,
+    LivePath,
+    Path,
+    Surroundings,
+    microphones_W,
+    robot_rectangle,
+)
 from diagrams.explain import explain
 from diagrams.participants import FollowerParameters, SourceParameters, joined
 from diagrams.run_parameters import RunParameters
@@ -22,9 +28,8 @@ from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
-from systems.sound.mic_array import microphones_B
 from systems.sound.waveforms import SoundParameters
-from systems.world.geometry import rectangle_clearance, rotate
+from systems.world.geometry import rectangle_clearance
 
 __all__ = ["ROBOT", "SOURCE", "Scenario"]
 
@@ -301,10 +306,8 @@ class Scenario(FollowerParameters, RunParameters):
             group = f"sources.{name}" if self.sources else "source"
             places[f"{group}.waypoints_m"] = source.waypoints_m
         for prefix, robot in self._robot_fields():
-            x, y, theta = robot.start.pose
-            dx, dy = rotate(theta, *microphones_B(robot.robot).T)
-            field = f"{prefix}start.position_m"
-            places[field] = np.column_stack([x + dx, y + dy])
+            microphones = microphones_W(robot.start.pose, robot.robot)
+            places[f"{prefix}start.position_m"] = microphones
         for field, points in places.items():
             what = ", a microphone," if field.endswith("start.position_m") else ""
             for point in points:

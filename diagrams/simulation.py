@@ -8,11 +8,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from pydrake.systems.analysis import (
-    ApplySimulatorConfig,
-    Simulator,
-    SimulatorConfig,
-)
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.compiled_run import compile_loop, why_not_compiled

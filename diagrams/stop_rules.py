@@ -103,9 +103,7 @@ class StopRules:
         self._moving = self._paths if several else {}
         self.robots = {
             name: RobotRules(
-                scenario.of_robot(name),
-                scenario.surroundings(name, self._paths),
-                parts,
+                scenario.of_robot(name), scenario.surroundings(name, self._paths), parts
             )
             for name, parts in follower.robots.items()
         }
@@ -137,13 +135,10 @@ class StopRules:
         for rules in self.robots.values():
             rules.judge(time)
         if self.over:
-            self._interrupt()
+            for rules in self.robots.values():
+                rules.cause = rules.cause or INTERRUPTED
             return EventStatus.ReachedTermination(self._diagram, self.cause)
         return _GO_ON
-
-    def _interrupt(self) -> None:
-        for rules in self.robots.values():
-            rules.cause = rules.cause or INTERRUPTED
 
 
 class RuleNumbers(NamedTuple):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from io import StringIO
 from typing import Any
 
 from ruamel.yaml import YAML
@@ -17,7 +18,7 @@ from ruamel.yaml.parser import Parser
 
 from systems.framework.input_error import InputError
 
-__all__ = ["LARGEST_BYTES", "parse_yaml"]
+__all__ = ["LARGEST_BYTES", "dump_yaml", "parse_yaml"]
 
 #: The parser takes some seconds for so much.
 LARGEST_BYTES = 100_000
@@ -61,6 +62,15 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
     except (YAMLError, ValueError, ArithmeticError, LookupError, TypeError) as error:
         text = f"is not valid YAML: {type(error).__name__}: {error}; mend it"
         raise InputError(field, text) from None
+
+
+def dump_yaml(document: dict[str, Any]) -> str:
+    """Plain values as YAML, what is innermost on one line."""
+    yaml = YAML()
+    yaml.default_flow_style = None
+    stream = StringIO()
+    yaml.dump(document, stream)
+    return stream.getvalue()
 
 
 class _BoundedParser(Parser):

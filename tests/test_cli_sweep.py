@@ -16,10 +16,9 @@ import pandas as pd
 import pytest
 
 import phonotaxis
-from analysis.sweeps.one_run import Task, run_task
+from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.plan import load_sweep
 from analysis.sweeps.store import load_results
-from analysis.sweeps.table import results_table
 
 ROOT = Path(phonotaxis.__file__).parent
 SWEEP = """

@@ -61,8 +61,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(
     options: Namespace, take: Take
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
-    from analysis.comparison.compare import prepare_comparison
-    from analysis.comparison.options import comparison_plans
+    from analysis.comparison.compare import comparison_plans, prepare_comparison
     from analysis.comparison.report import (
         compare_summary,
         compare_text,

@@ -6,12 +6,7 @@ import json
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from analysis.commands.arguments import (
-    LAW_HELP,
-    overrides,
-    take_output,
-    take_scenario,
-)
+from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
 

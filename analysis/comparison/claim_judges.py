@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.intervals import wilson_interval, with_interval
 
 __all__ = [
     "FREE",
@@ -61,26 +61,22 @@ def _pair(
 
 
 def _percent(rate: dict[str, float]) -> str:
-    low, high = 100.0 * rate["low"], 100.0 * rate["high"]
-    return f"{100.0 * rate['estimate']:.1f} % ({low:.1f}, {high:.1f})"
+    figures = rate["estimate"], rate["low"], rate["high"]
+    return with_interval(*figures, ".1f", unit=" %", factor=100.0)
 
 
-def _points(rate: dict[str, Any]) -> str:
-    low, high = 100.0 * rate["low"], 100.0 * rate["high"]
-    return f"{100.0 * rate['difference']:+.1f} points ({low:+.1f}, {high:+.1f})"
-
-
-def _shift(median: dict[str, Any], unit: str) -> str:
-    return (
-        f"{median['difference']:+.2f} {unit} ({median['low']:+.2f}, "
-        f"{median['high']:+.2f}) in {median['pairs']} pairs"
-    )
+def _difference(
+    pair: dict[str, Any], form: str, unit: str = "", factor: float = 1.0
+) -> str:
+    figures = pair["difference"], pair["low"], pair["high"]
+    return with_interval(*figures, form, unit=unit, factor=factor)
 
 
 def _both(median: dict[str, Any], name: str, unit: str) -> str:
     return (
         f"{name} {median['first']:.2f} {unit} (conventional) and "
-        f"{median['second']:.2f} {unit} (active); {_shift(median, unit)}"
+        f"{median['second']:.2f} {unit} (active); "
+        f"{_difference(median, '+.2f', f' {unit}')} in {median['pairs']} pairs"
     )
 
 
@@ -91,6 +87,11 @@ def _sign(interval: dict[str, Any]) -> int:
 
 def _verdict(sign: int, *, wanted: int) -> str:
     return {wanted: "holds", -wanted: "the reverse holds", 0: "not shown"}[sign]
+
+
+def _agreed(signs: set[int]) -> str:
+    """The verdict where all figures have one sign; +1 is wanted."""
+    return _verdict(*signs, wanted=1) if len(signs) == 1 else "not shown"
 
 
 def _bound(rate: dict[str, float], most: float) -> str:
@@ -146,8 +147,9 @@ def avoids_more(scenario: str, law: str, baseline: str = "conventional") -> Judg
         )
         figure = (
             f"collisions: {baseline} {next(rates)}, {law} {next(rates)}; "
-            f"{_points(pair)}; {pair['only_first']} layouts where {baseline} alone "
-            f"collides, {pair['only_second']} where {law} alone does"
+            f"{_difference(pair, '+.1f', ' points', 100.0)}; "
+            f"{pair['only_first']} layouts where {baseline} alone collides, "
+            f"{pair['only_second']} where {law} alone does"
         )
         return figure, _verdict(_sign(pair), wanted=1)
 
@@ -162,15 +164,10 @@ def smoother(scenario: str) -> Judge:
         jerk, sparc = metrics.get("jerk_rms_m_s3"), metrics.get("sparc")
         if jerk is None or sparc is None:
             return "no layout on which both push and succeed", "not shown"
-        figure = (
-            f"{_both(jerk, 'rms jerk', 'm/s^3')}; SPARC "
-            f"{sparc['difference']:+.3f} ({sparc['low']:+.3f}, {sparc['high']:+.3f})"
-        )
-        signs = {_sign(jerk), -_sign(sparc)}
-        if signs == {1, -1}:
-            return figure, "jerk and SPARC disagree"
-        sign = 1 if 1 in signs else -1 if -1 in signs else 0
-        return figure, _verdict(sign, wanted=1)
+        both = _both(jerk, "rms jerk", "m/s^3")
+        figure = f"{both}; SPARC {_difference(sparc, '+.3f')}"
+        signs = {_sign(jerk), -_sign(sparc)} - {0}
+        return figure, "jerk and SPARC disagree" if len(signs) > 1 else _agreed(signs)
 
     return judge
 
@@ -217,7 +214,7 @@ def _on_floors(
     figure = f"{text}: {'; '.join(figures)}"
     if {1, -1} <= signs:
         return figure, "depends on the floor"
-    return figure, _verdict(signs.pop() if len(signs) == 1 else 0, wanted=1)
+    return figure, _agreed(signs)
 
 
 def earlier(summary: dict[str, Any]) -> tuple[str, str]:
@@ -255,13 +252,9 @@ def vibrates(summary: dict[str, Any]) -> tuple[str, str]:
     """Conventional moves less smoothly than active past a moving obstacle."""
     metrics = _pair(summary, ONE, "conventional", "active")["encounters"]
     jerk, turns = metrics["jerk_rms_m_s3"], metrics["turn_reversals_per_s"]
-    figure = (
-        f"{_both(jerk, 'rms jerk', 'm/s^3')}; reversals of turning "
-        f"{turns['difference']:+.3f} 1/s ({turns['low']:+.3f}, {turns['high']:+.3f})"
-    )
-    signs = {_sign(jerk), _sign(turns)} - {0}
-    sign = signs.pop() if len(signs) == 1 else 0
-    return figure, _verdict(sign, wanted=1)
+    reversals = _difference(turns, "+.3f", " 1/s")
+    figure = f"{_both(jerk, 'rms jerk', 'm/s^3')}; reversals of turning {reversals}"
+    return figure, _agreed({_sign(jerk), _sign(turns)} - {0})
 
 
 def blind(summary: dict[str, Any]) -> tuple[str, str]:

@@ -23,7 +23,7 @@ from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import load_scenario
 from diagrams.explain import explain
-from diagrams.loading import read_mapping, scenario_from_mapping
+from diagrams.loading import parse_setting, read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
@@ -31,6 +31,7 @@ __all__ = [
     "EXPERIMENTS",
     "PreparedComparison",
     "comparison_plan",
+    "comparison_plans",
     "library_layouts",
     "prepare_comparison",
 ]
@@ -45,6 +46,7 @@ EXPERIMENTS = (
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
 #: Fields of a sweep that a comparison sets itself.
 _OURS = ("grid", "runs", "pair")
+_VELOCITY_TERM = "repulsion.velocity_term"
 
 
 @dataclass(frozen=True)
@@ -145,6 +147,57 @@ def comparison_plan(
         raise explain(error, SweepPlan, "a comparison") from None
 
 
+def comparison_plans(
+    scenarios: Sequence[str] = (),
+    *,
+    laws: str | None = None,
+    velocity_terms: str | None = None,
+    runs: int = 50,
+    seed: str | None = None,
+    settings: Iterable[str] = (),
+    grid: Iterable[str] = (),
+) -> dict[str, SweepPlan]:
+    """A plan for each scenario, by its name.
+
+    Args:
+        scenarios: See ``comparison_plan``; none: the papers' experiments.
+        laws: Names parted by commas; none: all that come with the package.
+        velocity_terms: ``printed``, ``closing``, or both parted by a comma.
+        runs: Layouts a scenario.
+        seed: A whole number.
+        settings: ``key=value``.
+        grid: ``key=[value, ...]``.
+
+    Returns:
+        In the order of ``scenarios``; names without folder and ending.
+
+    Raises:
+        InputError: A word is no good; names the option or the field.
+    """
+    fields = dict(parse_setting(text) for text in settings)
+    varied = dict(_values(text) for text in grid)
+    if velocity_terms is not None:
+        terms = velocity_terms.split(",")
+        if len(terms) == 1:
+            fields[_VELOCITY_TERM] = terms[0]
+        else:
+            varied[_VELOCITY_TERM] = terms
+    plans: dict[str, SweepPlan] = {}
+    for scenario in scenarios or EXPERIMENTS:
+        name = Path(scenario).stem
+        if name in plans:
+            raise InputError("scenario", f"{name} stands there twice; drop one")
+        plans[name] = comparison_plan(
+            scenario,
+            laws=laws.split(",") if laws is not None else LAWS,
+            runs=runs,
+            seed=_seed(seed),
+            settings=fields,
+            grid=varied,
+        )
+    return plans
+
+
 def prepare_comparison(
     plans: dict[str, SweepPlan],
     out: str | Path | None = None,
@@ -207,3 +260,18 @@ def _layouts(scenario: str) -> SweepPlan:
             return load_sweep(path)
     load_scenario(scenario)
     return SweepPlan(name=path.stem, scenario=scenario)
+
+
+def _values(text: str) -> tuple[str, list[Any]]:
+    key, values = parse_setting(text)
+    if not isinstance(values, list):
+        raise InputError(key, f"{values!r} is no list of values; write [a, b]")
+    return key, values
+
+
+def _seed(text: str | None) -> int:
+    if text is None:
+        return 1
+    if not text.isdigit():
+        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
+    return int(text)

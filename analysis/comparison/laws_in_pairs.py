@@ -30,6 +30,7 @@ from analysis.runs.run_table import (
     column,
     successes,
 )
+from analysis.sweeps.estimates import by_cell
 from analysis.sweeps.plan import SweepPlan
 
 __all__ = ["Comparison", "Pair", "compare_runs", "pooled_pairs"]
@@ -112,8 +113,7 @@ class _Neighbours:
 
 def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
     """Each cell's rows in the order of the layouts."""
-    count = len(plan.cells())
-    return [table[table["cell"] == k].sort_values("run") for k in range(count)]
+    return by_cell(plan, table.sort_values("run"))
 
 
 def _neighbours(plan: SweepPlan, table: pd.DataFrame) -> Iterator[_Neighbours]:

@@ -104,12 +104,9 @@ def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure
             panel.set_axis_off()
         for panel, example, result in zip(panels, cell.examples, runs, strict=False):
             _example(panel, result)
-            panel.set_title(
-                f"{cell.label}, {example.kind}: {_ending(result)}", fontsize=9
-            )
-            panel.set_aspect("equal")
-            panel.set_xlim(x_low, x_high)
-            panel.set_ylim(y_low, y_high)
+            ending = f"{result.ending}, {result.simulated_s:.0f} s"
+            panel.set_title(f"{cell.label}, {example.kind}: {ending}", fontsize=9)
+            panel.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     for panel in grid[-1]:
         panel.set_xlabel("x in W (m)")
     for panel in grid[:, 0]:
@@ -129,9 +126,3 @@ def _example(axes: Axes, result: RunResult) -> None:
         if path.moves:
             body = np.array([*path.pose(end), *obstacle.size_m])
             axes.add_patch(Polygon(rectangle_corners(body), color=COLOURS["obstacle"]))
-
-
-def _ending(result: RunResult) -> str:
-    hit = result.collision
-    by = f" with {hit.object}" if hit else ""
-    return f"{result.cause}{by}, {result.simulated_s:.0f} s"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import shlex
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -12,13 +12,13 @@ from typing import Any
 from analysis.comparison.cells import LawCell, Mean, Median
 from analysis.comparison.compare import PreparedComparison
 from analysis.comparison.laws_in_pairs import Comparison, Pair
+from analysis.reporting.intervals import with_interval
 from analysis.reporting.plain_values import write_json
-from analysis.reporting.provenance import versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import RunResult, dump_scenario, simulate
 
 __all__ = ["compare_summary", "compare_text", "write_comparison"]
 
-SCHEMA_VERSION = 1
 #: Columns of the printed table: heading, metric, unit's factor, format.
 _COLUMNS = (
     ("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
@@ -76,7 +76,6 @@ def write_comparison(
     prepared: PreparedComparison,
     comparisons: dict[str, Comparison],
     summary: dict[str, Any],
-    progress: Callable[[int], None] | None = None,
 ) -> None:
     """Writes what belongs beside the runs into the comparison's directory.
 
@@ -87,24 +86,16 @@ def write_comparison(
         prepared: Its directory exists.
         comparisons: Cells and pairs by scenario.
         summary: From ``compare_summary``.
-        progress: Called with the number of example runs done.
     """
     from analysis.comparison.plots import plot_examples, plot_rates
 
     out = prepared.out
     (out / "examples").mkdir(exist_ok=True)
     plot_rates(list(comparisons.values())).savefig(out / "rates.png", dpi=150)
-    done = 0
     for name, comparison in comparisons.items():
-        rows: list[tuple[LawCell, list[RunResult]]] = []
-        for cell in comparison.cells:
-            results = []
-            for result in _run_examples(prepared, cell):
-                results.append(result)
-                done += 1
-                if progress is not None:
-                    progress(done)
-            rows.append((cell, results))
+        rows = [
+            (cell, list(_run_examples(prepared, cell))) for cell in comparison.cells
+        ]
         plot_examples(rows).savefig(out / f"{name}.png", dpi=150)
     write_json(summary, out / "summary.json")
 
@@ -134,9 +125,7 @@ def _command(out: Path, cell: LawCell, kind: str) -> str:
 
 
 def compare_text(
-    summary: dict[str, Any],
-    comparisons: dict[str, Comparison],
-    pooled: Sequence[Pair],
+    summary: dict[str, Any], comparisons: dict[str, Comparison], pooled: Sequence[Pair]
 ) -> str:
     """Tables for a terminal.
 
@@ -188,15 +177,13 @@ def _counts(counts: dict[str, int]) -> str:
 
 
 def _rate(rate: Mean) -> str:
-    low, high = 100.0 * rate.low, 100.0 * rate.high
-    return f"{100.0 * rate.estimate:.0f} ({low:.0f}, {high:.0f})"
+    return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
 
 
 def _median(median: Median | None, factor: float, form: str) -> str:
     if median is None:
         return "-"
-    value, low, high = (factor * x for x in (median.median, median.low, median.high))
-    return f"{value:{form}} ({low:{form}}, {high:{form}})"
+    return with_interval(median.median, median.low, median.high, form, factor=factor)
 
 
 def _pair_line(pair: Pair) -> Iterator[str]:
@@ -204,11 +191,9 @@ def _pair_line(pair: Pair) -> Iterator[str]:
     common = "".join(f", {value}" for value in pair.fields.values())
     text = f"{pair.first} less {pair.second}{common}:"
     for name, rate in (("success", pair.success), ("collision", pair.collision)):
-        low, high = 100.0 * rate.low, 100.0 * rate.high
-        text += (
-            f" {name} {100.0 * rate.difference:+.0f} ({low:+.0f}, {high:+.0f}) "
-            f"p {rate.p_value:.2g};"
-        )
+        figures = rate.difference, rate.low, rate.high
+        points = with_interval(*figures, "+.0f", factor=100.0)
+        text += f" {name} {points} p {rate.p_value:.2g};"
     yield text
     parts = []
     for metric in _PAIRED:

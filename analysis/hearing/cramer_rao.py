@@ -31,6 +31,7 @@ __all__ = [
     "SlopeEnergy",
     "arrival_information",
     "polar_gradients",
+    "polar_point",
     "position_bound",
 ]
 
@@ -115,11 +116,7 @@ class LocalizationBound:
 
 
 def arrival_information(
-    energy: SlopeEnergy,
-    begin: float,
-    end: float,
-    travel: ArrayLike,
-    weights: ArrayLike,
+    energy: SlopeEnergy, begin: float, end: float, travel: ArrayLike, weights: ArrayLike
 ) -> NDArray[np.float64]:
     """Fisher information of a frame on the times of arrival.
 
@@ -201,6 +198,20 @@ def _inverse(information: NDArray[np.float64]) -> NDArray[np.float64]:
     if np.linalg.cond(information) > _LARGEST_CONDITION:
         return np.full(information.shape, math.inf)
     return np.asarray(np.linalg.inv(information))
+
+
+def polar_point(range_m: float, bearing_deg: float) -> NDArray[np.float64]:
+    """A place in the plane.
+
+    Args:
+        range_m: From the origin, m.
+        bearing_deg: Azimuth, deg.
+
+    Returns:
+        (2,) m.
+    """
+    angle = math.radians(bearing_deg)
+    return range_m * np.array([math.cos(angle), math.sin(angle)])
 
 
 def polar_gradients(p: NDArray[np.float64]) -> list[NDArray[np.float64]]:

@@ -43,10 +43,12 @@ def plot_detection(
     left, right = figure.subplots(1, 2)
     for colour, (name, points) in zip(_COLOURS, curves.items(), strict=True):
         _curve(left, name.replace("_", " "), points, colour)
-    left.set_xlabel("level of the sound at the array over the noise (dB)")
-    left.set_ylabel("frames of 25 ms")
+    left.set(
+        xlabel="level of the sound at the array over the noise (dB)",
+        ylabel="frames of 25 ms",
+        ylim=(-0.03, 1.03),
+    )
     left.yaxis.set_major_formatter(PercentFormatter(1.0))
-    left.set_ylim(-0.03, 1.03)
     left.legend(fontsize=9, loc="center right")
     left.set_title("Sounds that are heard", fontsize=11)
     _false_alarms(right, alarms, default_rate)
@@ -61,22 +63,14 @@ def _curve(
     levels = [point.snr_db for point in points]
     ends = np.array([wilson_interval(point.heard, point.trials) for point in points])
     axes.fill_between(levels, *ends.T, color=colour, alpha=0.2, linewidth=0)
-    axes.plot(
-        levels,
-        [point.heard / point.trials for point in points],
-        "o-",
-        color=colour,
-        markersize=4.0,
-        label=f"{name}, heard",
-    )
-    axes.plot(
-        levels,
-        [point.wrong / point.trials for point in points],
-        "x:",
-        color=colour,
-        markersize=4.0,
-        label=f"{name}, in a wrong place",
-    )
+    heard = [point.heard / point.trials for point in points]
+    wrong = [point.wrong / point.trials for point in points]
+    for shares, line, what in (
+        (heard, "o-", "heard"),
+        (wrong, "x:", "in a wrong place"),
+    ):
+        label = f"{name}, {what}"
+        axes.plot(levels, shares, line, color=colour, markersize=4.0, label=label)
 
 
 def _false_alarms(
@@ -105,10 +99,7 @@ def _false_alarms(
     line = np.array([default_rate / 3.0, 1.0])
     axes.plot(line, line, color=COLOURS["empty"], linewidth=1.0, label="as set")
     axes.axvline(default_rate, color=COLOURS["source"], linestyle="--", label="default")
-    axes.set_xscale("log")
-    axes.set_yscale("log")
-    axes.set_xlim(*line)
-    axes.set_ylim(0.3 / alarms[0].frames, 1.3)
+    axes.set(xscale="log", yscale="log", xlim=line, ylim=(0.3 / alarms[0].frames, 1.3))
     axes.set_xlabel("false-alarm rate that is set")
     axes.set_ylabel("share of the frames in which a sound is heard")
     axes.legend(fontsize=9, loc="upper left", bbox_to_anchor=(0.06, 1.0))

@@ -8,26 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "CONFIDENCE",
-    "Consistency",
-    "RatioEstimate",
-    "consistency",
-    "rms_ratio",
-    "stated_ratio",
-]
+from analysis.reporting.intervals import Estimate
+
+__all__ = ["CONFIDENCE", "Consistency", "consistency", "rms_ratio", "stated_ratio"]
 
 #: Of all intervals.
 CONFIDENCE = 0.95
-
-
-@dataclass(frozen=True)
-class RatioEstimate:
-    """An estimate with its 95 % confidence interval."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -47,7 +33,7 @@ class Consistency:
         return self.low <= self.mean <= self.high
 
 
-def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
+def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> Estimate:
     """RMS of errors over the RMS of their standard deviations.
 
     The interval is that of a Gaussian's variance; without any error the ratio
@@ -64,10 +50,10 @@ def rms_ratio(errors: ArrayLike, stds: ArrayLike) -> RatioEstimate:
 
     errors = np.asarray(errors, dtype=float)
     if errors.size == 0:
-        return RatioEstimate(math.inf, 0.0, math.inf)
+        return Estimate(math.inf, 0.0, math.inf)
     square = float(np.mean(errors**2) / np.mean(np.square(stds)))
     low, high = chi2.interval(CONFIDENCE, errors.size) / np.array(errors.size)
-    return RatioEstimate(
+    return Estimate(
         math.sqrt(square), math.sqrt(square / high), math.sqrt(square / low)
     )
 

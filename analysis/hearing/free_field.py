@@ -14,20 +14,20 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
+from analysis.hearing.cramer_rao import (
+    LocalizationBound,
+    SlopeEnergy,
+    polar_point,
+    position_bound,
+)
 from analysis.hearing.estimation_errors import (
     Consistency,
-    RatioEstimate,
     consistency,
     rms_ratio,
     stated_ratio,
 )
-from systems.framework.signals import (
-    FRAME_SAMPLES,
-    SAMPLE_RATE_HZ,
-    TICK_S,
-    Emission,
-)
+from analysis.reporting.intervals import Estimate
+from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S, Emission
 from systems.hearing.localise import Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.adc import MicArrayParameters, convert
@@ -180,12 +180,12 @@ class FreeFieldCell:
         return self.unheard + self.rangeless + int(wild.sum())
 
     @property
-    def bearing_ratio(self) -> RatioEstimate:
+    def bearing_ratio(self) -> Estimate:
         """RMSE of the bearing over its bound."""
         return rms_ratio(self.bearing_errors, self.bearing_bounds)
 
     @property
-    def range_ratio(self) -> RatioEstimate:
+    def range_ratio(self) -> Estimate:
         """RMSE of the range over its bound."""
         return rms_ratio(self.range_errors, self.range_bounds)
 
@@ -248,8 +248,7 @@ def run_cell(
         A cell for each estimator.
     """
     rng = np.random.default_rng(seed)
-    angle = math.radians(bearing_deg)
-    p_AS = range_m * np.array([math.cos(angle), math.sin(angle)])
+    p_AS = polar_point(range_m, bearing_deg)
     noise_pa = loudspeaker.level_pa / range_m * 10.0 ** (-snr_db / 20.0)
     fixes: dict[str, list[SourceFix | None]] = {name: [] for name in estimators}
     bounds = []
@@ -294,8 +293,7 @@ def _cell(
     range_m: float,
     bearing_deg: float,
 ) -> FreeFieldCell:
-    angle = math.radians(bearing_deg)
-    p_AS = range_m * np.array([math.cos(angle), math.sin(angle)])
+    angle, p_AS = math.radians(bearing_deg), polar_point(range_m, bearing_deg)
     pairs = zip(fixes, bounds, strict=True)
     ranged = [(fix, b) for fix, b in pairs if fix is not None and fix.range_valid]
     found = [fix for fix, _ in ranged]

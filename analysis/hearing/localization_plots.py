@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse
 from numpy.typing import NDArray
 
+from analysis.hearing.cramer_rao import polar_point
 from analysis.hearing.localization import LocalizationCell
 from analysis.reporting.palette import COLOURS
 
@@ -59,10 +60,7 @@ def plot_localization(cells: Sequence[LocalizationCell]) -> Figure:
 
 def _floor(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
     """Microphones, true places, and arcs of equal range."""
-    axes.set_aspect("equal")
-    axes.set_xlim(*_X_M)
-    axes.set_ylim(*_Y_M)
-    axes.set_xlabel("x in B, ahead (m)")
+    axes.set(aspect="equal", xlim=_X_M, ylim=_Y_M, xlabel="x in B, ahead (m)")
     arc = np.radians(np.linspace(-5.0, 75.0, 80))
     for distance in sorted({cell.paper.range_m for cell in cells}):
         x, y = distance * np.cos(arc), distance * np.sin(arc)
@@ -76,21 +74,17 @@ def _floor(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
 
 
 def _truth(cell: LocalizationCell) -> NDArray[np.float64]:
-    angle = math.radians(cell.paper.bearing_deg)
-    return cell.paper.range_m * np.array([math.cos(angle), math.sin(angle)])
+    return polar_point(cell.paper.range_m, cell.paper.bearing_deg)
 
 
 def _to_scale(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
     label: str | None = "Han 2019, 2 standard deviations"
     for paper in dict.fromkeys(cell.paper for cell in cells):
-        angle = math.radians(paper.bearing_mean_deg)
+        x, y = polar_point(paper.range_mean_m, paper.bearing_mean_deg)
         across = paper.range_mean_m * math.radians(paper.bearing_std_deg)
         axes.add_patch(
             Ellipse(
-                (
-                    paper.range_mean_m * math.cos(angle),
-                    paper.range_mean_m * math.sin(angle),
-                ),
+                (x, y),
                 2.0 * _SIGMAS * paper.range_std_m,
                 2.0 * _SIGMAS * across,
                 angle=paper.bearing_mean_deg,
@@ -116,7 +110,11 @@ def _exaggerated(axes: Axes, cells: Sequence[LocalizationCell]) -> None:
     for distance in sorted({cell.paper.range_m for cell in drawn}):
         ring = [cell for cell in drawn if cell.paper.range_m == distance]
         factors = _factors(ring)
-        _write_factors(axes, distance, factors)
+        along, across = factors
+        text = f"along x{along:g}\nacross x{across:g}"
+        axes.annotate(
+            text, (distance, _LABELS_Y_M), ha="center", va="center", fontsize=8
+        )
         for cell in ring:
             _spread(axes, cell, factors)
     titles = [_STYLES[name] for name in _by_estimator(drawn)]
@@ -162,16 +160,6 @@ def _nice(value: float) -> float:
     return next(k * power for k in (5.0, 2.0, 1.0) if k * power <= value)
 
 
-def _write_factors(axes: Axes, distance: float, factors: NDArray[np.float64]) -> None:
-    axes.annotate(
-        f"along x{factors[0]:g}\nacross x{factors[1]:g}",
-        (distance, _LABELS_Y_M),
-        ha="center",
-        va="center",
-        fontsize=8,
-    )
-
-
 def _ellipse(centre: NDArray[np.float64], covariance: NDArray[np.float64]) -> Ellipse:
     values, vectors = np.linalg.eigh(covariance)
     width, height = 2.0 * _SIGMAS * np.sqrt(np.maximum(values, 0.0))
@@ -184,7 +172,5 @@ def _ellipse(centre: NDArray[np.float64], covariance: NDArray[np.float64]) -> El
 def _by_estimator(
     cells: Sequence[LocalizationCell],
 ) -> dict[str, list[LocalizationCell]]:
-    groups: dict[str, list[LocalizationCell]] = {}
-    for cell in cells:
-        groups.setdefault(cell.estimator, []).append(cell)
-    return groups
+    names = dict.fromkeys(cell.estimator for cell in cells)
+    return {name: [cell for cell in cells if cell.estimator == name] for name in names}

@@ -100,7 +100,7 @@ def localization_text(summary: dict[str, Any]) -> str:
     lines = [
         f"{cells[0]['trials']} frames a cell, {summary['sound']}, "
         f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
-        + (_tolerances_text(tolerances) if drawn else "no errors of the array"),
+        + (_tolerances_text(tolerances) if drawn else "no errors of the array")
     ]
     lines += [
         "Han 2019: on hardware; paper: its estimator here; (n): frames without result"

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.reporting.intervals import Interval, wilson_interval
+from diagrams.bodies import microphones_W
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S
@@ -25,7 +26,6 @@ from systems.hearing.tdoa_estimator import TDOAParameters, port_values, robot_lo
 from systems.hearing.tracker_model import Measurement, TrackerModel, TrackerParameters
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import MicArrayParameters, convert
-from systems.sound.mic_array import microphones_B
 from systems.sound.room import RoomParameters, room_images, room_impulse_responses
 from systems.sound.waveforms import SoundParameters, make_waveform
 from systems.world.geometry import rotate
@@ -115,18 +115,11 @@ def draw_layouts(
         ahead = rotate(theta, robot.control_point_m, 0.0)
         away = rotate(theta + bearing, distance, 0.0)
         p_WS = np.array([x + ahead[0] + away[0], y + ahead[1] + away[1]])
-        places = np.vstack((_microphones_W(np.array([x, y, theta]), robot), p_WS))
+        pose = np.array([x, y, theta])
+        places = np.vstack((microphones_W(pose, robot), p_WS))
         if ((places >= low) & (places <= high)).all():
             found += 1
-            pose = np.array([x, y, theta])
             yield Layout(pose, p_WS, distance, math.degrees(bearing))
-
-
-def _microphones_W(
-    pose: NDArray[np.float64], robot: RobotParameters
-) -> NDArray[np.float64]:
-    turned = [rotate(pose[2], x, y) for x, y in microphones_B(robot)]
-    return pose[:2] + np.array(turned)
 
 
 def locate_bursts(
@@ -164,7 +157,7 @@ def locate_bursts(
     tracker = TrackerModel(tracking, robot, 1.5 * TICK_S)
     errors = []
     for k, layout in enumerate(layouts):
-        p_WM = _microphones_W(layout.pose_WB, robot)
+        p_WM = microphones_W(layout.pose_WB, robot)
         response = room_impulse_responses(
             room, layout.p_WS, p_WM, _AIR.c, images=images
         )

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.hearing.cramer_rao import polar_gradients
+from analysis.hearing.cramer_rao import polar_gradients, polar_point
 from analysis.hearing.free_field import Estimator, Loudspeaker
 from analysis.hearing.paper_tables import PaperCell
 from systems.framework.signals import TICK_S
@@ -155,11 +155,6 @@ def _half_width(values: NDArray[np.float64]) -> float:
     return float(high - low) / 2.0
 
 
-def _finite(value: float) -> float | None:
-    """JSON has no infinity."""
-    return value if math.isfinite(value) else None
-
-
 def sensitivity_table(
     places: Sequence[PaperCell],
     shape: ArrayShape,
@@ -187,8 +182,7 @@ def sensitivity_table(
     for number, (errors, cell) in enumerate(
         (errors, cell) for cell in places for errors in UNIT_ERRORS
     ):
-        angle = math.radians(cell.bearing_deg)
-        p_AS = cell.range_m * np.array([math.cos(angle), math.sin(angle)])
+        p_AS = polar_point(cell.range_m, cell.bearing_deg)
         predicted = predicted_std(errors, p_AS, shape, c)
         measured = measured_std(
             errors,

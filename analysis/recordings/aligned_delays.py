@@ -75,26 +75,25 @@ def fit_aligned_delays(
     if not total.any():
         return None
     edges = _band_edges(total)
-    count = len(spectra)
-    tau = np.zeros(count - 1)
+    tau = np.zeros(len(spectra) - 1)
     even = np.ones(angular_frequency.size)
     while coarseness > 1.0:
         low = (angular_frequency * coarseness < angular_frequency[-1]).astype(float)
         if (low * total).sum() > 0.1 * total.sum():
-            tau = _climb(cross, low, angular_frequency, count, tau)
+            tau = _climb(cross, low, angular_frequency, tau)
         coarseness /= 2.0
-    tau = _climb(cross, even, angular_frequency, count, tau)
-    gain = _coherence_gain(cross, total, angular_frequency, count, tau, edges)
+    tau = _climb(cross, even, angular_frequency, tau)
+    gain = _coherence_gain(cross, total, angular_frequency, tau, edges)
     if not gain.any():
         return None
-    tau = _climb(cross, gain, angular_frequency, count, tau)
-    slope, curve, aligned = _sums(cross, gain, angular_frequency, count, tau, edges)
+    tau = _climb(cross, gain, angular_frequency, tau)
+    slope, curve, aligned = _sums(cross, gain, angular_frequency, tau, edges)
     bands = np.count_nonzero(gain[edges[:-1]])
     if bands < _LEAST_BANDS or np.linalg.eigvalsh(curve)[0] <= 0.0:
         return None
     inverse = np.linalg.inv(curve)
     scatter = slope.T @ slope * bands / (bands - 1)
-    scale = float(np.trace(inverse @ scatter)) / (count - 1)
+    scale = float(np.trace(inverse @ scatter)) / tau.size
     coherence = float(aligned / (len(first) * (gain * total).sum()))
     echo = 1.0 + _ECHO_ERROR * (1.0 - min(coherence, 1.0))
     return AlignedDelays(
@@ -113,13 +112,12 @@ def _coherence_gain(
     cross: NDArray[np.complex128],
     total: NDArray[np.float64],
     w: NDArray[np.float64],
-    count: int,
     tau: NDArray[np.float64],
     edges: NDArray[np.int64],
 ) -> NDArray[np.float64]:
     """(f,) weights of phases with coherence r: r / (1 - r^2)."""
     later = np.concatenate(([0.0], tau))
-    first, second = np.triu_indices(count, 1)
+    first, second = np.triu_indices(later.size, 1)
     turned = cross * np.exp(1j * np.outer(later[second] - later[first], w))
     in_phase = np.add.reduceat(turned.real.mean(axis=0), edges[:-1])
     whole = np.add.reduceat(total, edges[:-1])
@@ -134,7 +132,6 @@ def _climb(
     cross: NDArray[np.complex128],
     gain: NDArray[np.float64],
     w: NDArray[np.float64],
-    count: int,
     tau: NDArray[np.float64],
 ) -> NDArray[np.float64]:
     """Newton's method, kept within a quarter of the shortest period a step."""
@@ -142,7 +139,7 @@ def _climb(
     limit = 0.5 * math.pi / top
     edges = np.array([0, w.size])
     for _ in range(_STEPS):
-        slope, curve, _ = _sums(cross, gain, w, count, tau, edges)
+        slope, curve, _ = _sums(cross, gain, w, tau, edges)
         try:
             step = np.linalg.solve(curve, slope[0])
         except np.linalg.LinAlgError:
@@ -158,7 +155,7 @@ def _climb(
 
 @njit(cache=True)
 def _sums(  # pragma: no cover  (compiled)
-    cross: Any, gain: Any, w: Any, count: int, tau: Any, edges: Any
+    cross: Any, gain: Any, w: Any, tau: Any, edges: Any
 ) -> tuple[Any, Any, float]:
     """Derivatives of the agreement, sum over pairs of Re(cross e^(j w delay)).
 
@@ -166,7 +163,7 @@ def _sums(  # pragma: no cover  (compiled)
         The slope of each band (b, n - 1), minus the second derivative of all
         (n - 1, n - 1), and the agreement itself.
     """
-    bands = edges.size - 1
+    bands, count = edges.size - 1, tau.size + 1
     slope = np.zeros((bands, count - 1))
     curve = np.zeros((count - 1, count - 1))
     agreement = 0.0

@@ -15,11 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings.channel_order import (
-    agreeing_differences,
-    exchanged_channels,
-    misfit,
-)
+from analysis.recordings.channel_order import FrameDelays, exchanged_channels, misfit
 from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
 from systems.delays.copied_channels import copied_pairs
 from systems.delays.pair_correlations import PairCorrelations, correlate_pairs
@@ -112,18 +108,28 @@ def find_channel_faults(
         return found
     signs = np.ones(shape.count)
     signs[[k for fault in inverted for k in fault.channels]] = -1.0
-    metres_per_sample = c / sample_rate_hz
-    lags = _lags(measured, signs)
-    order = _order(measured, lags, shape, metres_per_sample)
+
+    def delays(measured: PairCorrelations) -> FrameDelays:
+        return FrameDelays(
+            _lags(measured, signs), measured.levels, shape, c / sample_rate_hz
+        )
+
+    as_given = delays(measured)
+    order = _order(as_given)
     if any(fault.kind == "swapped" for fault in order):
         return found + order
-    scale = delay_scale(lags, shape, metres_per_sample)
-    if not _fits(lags, measured, shape, metres_per_sample):
+    scale = delay_scale(as_given)
+    if not _fits(as_given):
         for reach_m in REACHES_M:
             seen = correlate_pairs(readable, reach_m / c, sample_rate_hz, band_hz)
             if seen is not None and scale is None:
-                scale = delay_scale(_lags(seen, signs), shape, metres_per_sample)
+                scale = delay_scale(delays(seen))
     return found + (order if scale is None else [_scale_fault(scale, shape)])
+
+
+def _dead(k: int, seen: str) -> ChannelFault:
+    remedy = "check its microphone, or leave it out of the geometry"
+    return ChannelFault("dead", (k,), f"channel {k + 1}: dead, {seen}; {remedy}")
 
 
 def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
@@ -136,12 +142,7 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
             "not); repair the file",
         )
     if channel.size and np.ptp(channel) == 0.0:
-        return ChannelFault(
-            "dead",
-            (k,),
-            f"channel {k + 1}: dead, all samples are {channel[0]:g}; check its "
-            "microphone, or leave it out of the geometry",
-        )
+        return _dead(k, f"all samples are {channel[0]:g}")
     return None
 
 
@@ -186,15 +187,9 @@ def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelF
         over = float(level[k] - np.median(others))
         # The loudest alone may have the source at its microphone.
         if level[k] - others[max(-2, -others.size)] < -_DEAD_DB:
-            faults.append(
-                ChannelFault(
-                    "dead",
-                    (channel,),
-                    f"channel {channel + 1}: dead, {-over:.0f} dB below the others; "
-                    "check its microphone, or leave it out of the geometry",
-                )
-            )
-        if over > _NEAR_DB and _lone(level, k):
+            faults.append(_dead(channel, f"{-over:.0f} dB below the others"))
+        # It is near alone, among others with levels like each other's.
+        if over > _NEAR_DB and np.ptp(others) < _NEAR_DB:
             faults.append(
                 ChannelFault(
                     "near",
@@ -205,11 +200,6 @@ def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelF
                 )
             )
     return faults
-
-
-def _lone(level: NDArray[np.float64], k: int) -> bool:
-    """Whether the channels but k have levels like each other's."""
-    return bool(np.ptp(np.delete(level, k)) < _NEAR_DB)
 
 
 def _strangers(
@@ -223,12 +213,7 @@ def _strangers(
     if use.size < 3 or best.max() < _COHERENT:
         return []
     return [
-        ChannelFault(
-            "dead",
-            (channel,),
-            f"channel {channel + 1}: dead, nothing in it belongs to the sound of the "
-            "others; check its microphone, or leave it out of the geometry",
-        )
+        _dead(channel, "nothing in it belongs to the sound of the others")
         for k, channel in enumerate(use.tolist())
         if best[k] < _INCOHERENT
     ]
@@ -273,15 +258,10 @@ def _lags(
     return np.where(upright, measured.lag_of_highest, measured.lag_of_lowest)
 
 
-def _fits(
-    lags: NDArray[np.float64],
-    measured: PairCorrelations,
-    shape: ArrayShape,
-    metres_per_sample: float,
-) -> bool:
+def _fits(delays: FrameDelays) -> bool:
     """Whether at least half of the frames agree on their delays, and some do."""
-    agreed, _ = agreeing_differences(lags, measured.levels, shape, metres_per_sample)
-    return len(agreed) >= max(_LEAST_FRAMES, len(lags) / 2)
+    agreed, _ = delays.agreeing()
+    return len(agreed) >= max(_LEAST_FRAMES, len(delays.lags) / 2)
 
 
 def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
@@ -314,14 +294,9 @@ def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
     )
 
 
-def _order(
-    measured: PairCorrelations,
-    lags: NDArray[np.float64],
-    shape: ArrayShape,
-    metres_per_sample: float,
-) -> list[ChannelFault]:
+def _order(delays: FrameDelays) -> list[ChannelFault]:
     """Exchanged channels, or a geometry that no exchange mends."""
-    exchanges = exchanged_channels(lags, measured.levels, shape, metres_per_sample)
+    exchanges = exchanged_channels(delays)
     if exchanges:
         names = " or ".join(f"{a + 1} and {b + 1}" for a, b in exchanges)
         return [
@@ -332,7 +307,7 @@ def _order(
                 "other way round; exchange them in 'channels'",
             )
         ]
-    share = misfit(lags, measured.levels, shape, metres_per_sample)
+    share = misfit(delays)
     if share is None:
         return []
     return [

@@ -9,18 +9,24 @@ exchange at all, for all its delays are alike.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings.source_levels import levels_contradict
 from systems.hearing.coherent import arrival_delays
 from systems.hearing.multilateration import locate_source
+from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["agreeing_differences", "exchanged_channels", "misfit"]
+__all__ = [
+    "FrameDelays",
+    "exchanged",
+    "exchanged_channels",
+    "levels_contradict",
+    "misfit",
+]
 
 # Delays fit where they are right to this part of a sample, or to this share of
 # what sound needs across the array.
@@ -37,27 +43,61 @@ _MOST_TRIALS = 20_000
 # least; shares nearer to each other than this are alike; and one that is hopeless.
 _WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
 
+# Spread of 1/R below which levels say nothing of a range, dB.
+_LEAST_SPREAD_DB = 3.0
 
-def exchanged_channels(
-    lags: NDArray[np.float64],
-    levels: NDArray[np.float64],
-    shape: ArrayShape,
-    metres_per_sample: float,
-) -> list[tuple[int, int]]:
+
+@dataclass(frozen=True)
+class FrameDelays:
+    """Delays of all pairs of microphones in f frames of a recording."""
+
+    lags: NDArray[np.float64]
+    """(f, p) of ``shape.pairs``, samples."""
+    levels: NDArray[np.float64]
+    """(f, n) of the channels, any unit."""
+    shape: ArrayShape
+    """The n microphones."""
+    metres_per_sample: float
+    """Speed of sound over the sample rate."""
+
+    @property
+    def tolerance_m(self) -> float:
+        """By how much delays may be off that fit a place, m."""
+        across = _FIT_SHARE * self.shape.aperture_m
+        return max(_FIT_SAMPLES * self.metres_per_sample, across)
+
+    def agreeing(
+        self, tolerance_m: float = np.inf
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Differences of range, and levels, of the frames in which all pairs agree.
+
+        Args:
+            tolerance_m: How well they agree, m, where that is less than what serves
+                to find a place.
+
+        Returns:
+            (k, n - 1) range from each microphone less that from microphone 0, m, and
+            levels (k, n); k frames of f.
+        """
+        i, j = self.shape.pairs.T
+        identity = np.eye(self.shape.count)
+        to_pairs = (identity[j] - identity[i])[:, 1:]
+        d = self.lags * self.metres_per_sample
+        differences = d @ np.linalg.pinv(to_pairs).T
+        errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
+        agree = errors < min(self.tolerance_m, tolerance_m)
+        return differences[agree], self.levels[agree]
+
+
+def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
     """Exchanges, each of two channels, of which one makes the delays fit.
-
-    Args:
-        lags: (f, p) delays of ``shape.pairs`` in f frames, samples.
-        levels: (f, n) levels of the channels, any unit.
-        shape: The n microphones.
-        metres_per_sample: Speed of sound over the sample rate.
 
     Returns:
         Pairs of numbers from 0. Empty where the delays fit as they are, or where
         no exchange helps.
     """
-    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
-    tolerance = _tolerance(shape, metres_per_sample)
+    (d, levels), shape = delays.agreeing(), delays.shape
+    tolerance = delays.tolerance_m
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance)[0] > _WRONG:
         return []
     exchanges = list(combinations(range(shape.count), 2))
@@ -66,7 +106,7 @@ def exchanged_channels(
     d, levels = d[::every], levels[::every]
     found = [
         _fitting(
-            d, levels, replace(shape, p_AM=_exchanged(shape.p_AM, *pair)), tolerance
+            d, levels, replace(shape, p_AM=exchanged(shape.p_AM, *pair)), tolerance
         )
         for pair in exchanges
     ]
@@ -82,71 +122,33 @@ def exchanged_channels(
     ]
 
 
-def misfit(
-    lags: NDArray[np.float64],
-    levels: NDArray[np.float64],
-    shape: ArrayShape,
-    metres_per_sample: float,
-) -> float | None:
+def misfit(delays: FrameDelays) -> float | None:
     """Share of the frames that fit no place, if it is hopeless; else None.
-
-    Args:
-        lags: As for ``exchanged_channels``.
-        levels: As there.
-        shape: The n microphones.
-        metres_per_sample: Speed of sound over the sample rate.
 
     Returns:
         0 to 1, or None where too few frames agree or enough of them fit.
     """
-    d, levels = agreeing_differences(lags, levels, shape, metres_per_sample)
+    d, levels = delays.agreeing()
     if len(d) < 2 * _LEAST_FRAMES:
         return None
-    share, _ = _fitting(d, levels, shape, _tolerance(shape, metres_per_sample))
+    share, _ = _fitting(d, levels, delays.shape, delays.tolerance_m)
     return 1.0 - share if share < _HOPELESS else None
 
 
-def _exchanged(p: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
-    order = np.arange(len(p))
-    order[[i, j]] = j, i
-    return p[order]
-
-
-def _tolerance(shape: ArrayShape, metres_per_sample: float) -> float:
-    return max(_FIT_SAMPLES * metres_per_sample, _FIT_SHARE * shape.aperture_m)
-
-
-def agreeing_differences(
-    lags: NDArray[np.float64],
-    levels: NDArray[np.float64],
-    shape: ArrayShape,
-    metres_per_sample: float,
-    tolerance_m: float = np.inf,
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Differences of range, and levels, of the frames in which all pairs agree.
+def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
+    """An array with two of its rows exchanged.
 
     Args:
-        lags: As for ``exchanged_channels``.
-        levels: As there, or any numbers of the frames.
-        shape: The n microphones.
-        metres_per_sample: Speed of sound over the sample rate.
-        tolerance_m: How well they agree, m, where that is less than what serves to
-            find a place.
+        rows: (n, ...).
+        i: Number of one row, from 0.
+        j: Number of the other one.
 
     Returns:
-        (k, n - 1) range from each microphone less that from microphone 0, m, and
-        levels (k, ...); k frames of f.
+        (n, ...), a copy.
     """
-    to_pairs = np.zeros((len(shape.pairs), shape.count))
-    rows = np.arange(len(shape.pairs))
-    to_pairs[rows, shape.pairs[:, 1]] = 1.0
-    to_pairs[rows, shape.pairs[:, 0]] = -1.0
-    to_pairs = to_pairs[:, 1:]
-    d = lags * metres_per_sample
-    differences = d @ np.linalg.pinv(to_pairs).T
-    errors = np.sqrt(np.mean((d - differences @ to_pairs.T) ** 2, axis=1))
-    agree = errors < min(_tolerance(shape, metres_per_sample), tolerance_m)
-    return differences[agree], levels[agree]
+    order = np.arange(len(rows))
+    order[[i, j]] = j, i
+    return rows[order]
 
 
 def _fitting(
@@ -172,3 +174,30 @@ def _fitting(
     if not errors:
         return 0.0, np.inf
     return len(errors) / len(differences), float(np.sqrt(np.mean(np.square(errors))))
+
+
+def levels_contradict(
+    levels: NDArray[np.float64], fix: SourceFix, shape: ArrayShape
+) -> bool:
+    """Whether a near source would be heard at other levels than these.
+
+    Exchanged neighbours in a row, for one, make the delays of a source very
+    near to the array. Its levels would fall as 1/R.
+
+    Args:
+        levels: (n,) RMS of the channels' sound, any unit.
+        fix: A fix, with a range or without.
+        shape: The n microphones.
+
+    Returns:
+        True where the levels follow less than half of what 1/R asks for.
+    """
+    if not fix.range_valid:
+        return False
+    ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
+    expected = -20.0 * np.log10(np.maximum(ranges, 1e-3))
+    if np.ptp(expected) < _LEAST_SPREAD_DB:
+        return False
+    expected -= expected.mean()
+    measured = 20.0 * np.log10(np.maximum(levels, 1e-300))
+    return bool(measured @ expected < 0.5 * (expected @ expected))

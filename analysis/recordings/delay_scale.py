@@ -10,10 +10,8 @@ from __future__ import annotations
 from typing import Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from analysis.recordings.channel_order import agreeing_differences
-from systems.sound.array_shape import ArrayShape
+from analysis.recordings.channel_order import FrameDelays
 
 __all__ = ["REACHES_M", "DelayScale", "delay_scale"]
 
@@ -46,23 +44,16 @@ class DelayScale(NamedTuple):
     """Where the source at least is, if the array is as large as it says, m."""
 
 
-def delay_scale(
-    lags: NDArray[np.float64], shape: ArrayShape, metres_per_sample: float
-) -> DelayScale | None:
+def delay_scale(delays: FrameDelays) -> DelayScale | None:
     """What is wrong with the size of delays, if anything.
-
-    Args:
-        lags: (f, p) delays of ``shape.pairs`` in f frames, samples.
-        shape: The n microphones.
-        metres_per_sample: Speed of sound over the sample rate.
 
     Returns:
         Delays over the longest ones possible, or None where they are of the array's
         size or too few agree.
     """
-    error = _SAMPLES * metres_per_sample
-    d, _ = agreeing_differences(lags, lags, shape, metres_per_sample, error)
-    if len(d) < max(_LEAST_FRAMES, _LEAST_SHARE * len(lags)):
+    shape, error = delays.shape, _SAMPLES * delays.metres_per_sample
+    d, _ = delays.agreeing(error)
+    if len(d) < max(_LEAST_FRAMES, _LEAST_SHARE * len(delays.lags)):
         return None
     later = np.hstack((np.zeros((len(d), 1)), d))
     i, j = shape.pairs.T
@@ -76,5 +67,5 @@ def delay_scale(
     if share > _NOTHING:
         return None
     # A wave front from R is off the plane by a share a / 8 R of the aperture a.
-    flat = max(share, 0.25 * metres_per_sample / shape.aperture_m)
+    flat = max(share, 0.25 * delays.metres_per_sample / shape.aperture_m)
     return DelayScale("nothing", share, shape.aperture_m / (8.0 * flat))

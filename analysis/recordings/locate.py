@@ -58,7 +58,9 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     geometry = geometry or ArrayGeometry()
     samples, rate = read_sound(path, "recording")
     where = repr(str(path))
-    _check_recording(samples, rate, geometry, where)
+    complaint = _complaint(samples, rate, geometry)
+    if complaint:
+        raise InputError("recording", f"{where} {complaint}")
     shape = ArrayShape.of(geometry.microphones)
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
@@ -133,23 +135,19 @@ def _estimates(
     return best
 
 
-def _check_recording(
-    samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, where: str
-) -> None:
+def _complaint(samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry) -> str:
+    """Why an array cannot have made a recording; empty if it can."""
     count, needed = len(samples), len(geometry.microphones)
     if geometry.channels is not None and max(geometry.channels) >= count >= needed:
-        raise InputError(
-            "recording",
-            f"{where} has {count} channels, numbers 0 to {count - 1}; 'channels' in "
-            f"the geometry file counts from 0 and names {max(geometry.channels)}",
+        return (
+            f"has {count} channels, numbers 0 to {count - 1}; 'channels' in the "
+            f"geometry file counts from 0 and names {max(geometry.channels)}"
         )
     if max(geometry.columns) >= count:
         what = "is mono" if count == 1 else f"has {count} channels"
-        raise InputError(
-            "recording",
-            f"{where} {what}, but the array needs "
-            f"{max(needed, max(geometry.columns) + 1)}; record every microphone on a "
-            "channel of its own",
+        return (
+            f"{what}, but the array needs {max(needed, max(geometry.columns) + 1)}; "
+            "record every microphone on a channel of its own"
         )
     if geometry.channels is None and count > needed:
         default = geometry.microphones == ArrayGeometry().microphones
@@ -160,19 +158,13 @@ def _check_recording(
             f"'channels: {list(range(needed))}'"
         )
         whose = "the robot's own array" if default else "the array"
-        raise InputError(
-            "recording",
-            f"{where} has {count} channels, but {whose} {needed} microphones; {remedy}",
-        )
+        return f"has {count} channels, but {whose} {needed} microphones; {remedy}"
     if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
-        raise InputError(
-            "recording",
-            f"{where} has a sample rate of {rate} Hz; record at {_RATES_HZ[0]} to "
-            f"{_RATES_HZ[1]} Hz",
-        )
+        low, high = _RATES_HZ
+        return f"has a sample rate of {rate} Hz; record at {low} to {high} Hz"
     if geometry.band is not None and rate < 2.0 * geometry.band[1]:
-        raise InputError(
-            "recording",
-            f"{where} has a sample rate of {rate} Hz, below twice the band's upper end "
-            f"of {geometry.band[1]:g} Hz; lower the band or record at a higher rate",
+        return (
+            f"has a sample rate of {rate} Hz, below twice the band's upper end of "
+            f"{geometry.band[1]:g} Hz; lower the band or record at a higher rate"
         )
+    return ""

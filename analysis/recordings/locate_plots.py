@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.hearing.cramer_rao import polar_point
 from analysis.recordings.locate_result import LocateResult
 from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
@@ -95,13 +96,8 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     )
     if centre is not None:
         axes.axhline(centre, color=COLOURS["source"], linewidth=1.2)
-        axes.axhspan(
-            centre - std,
-            centre + std,
-            color=COLOURS["source"],
-            alpha=0.15,
-            linewidth=0,
-        )
+        ends = centre - std, centre + std
+        axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
 
 
@@ -112,31 +108,24 @@ def _plan(axes: Axes, result: LocateResult) -> None:
     size = max(1.6 * float(np.abs(places).max()), 1.15 * max(ranges, default=0.0))
     for e in result.estimates:
         if e.bearing_deg is not None:
-            x, y = _ray(e.bearing_deg, e.range_m or 0.85 * size)
+            x, y = polar_point(e.range_m or 0.85 * size, e.bearing_deg)
             axes.plot((0, x), (0, y), color=COLOURS["estimate"], alpha=0.25)
     summary = result.summary()
     if summary["bearing_deg"] is not None:
-        x, y = _ray(summary["bearing_deg"], 0.95 * size)
+        x, y = polar_point(0.95 * size, summary["bearing_deg"])
         axes.plot((0, x), (0, y), color=COLOURS["source"], label="source")
         for other in summary["alternatives"]:
             if math.isclose(other["bearing_deg"], summary["bearing_deg"], abs_tol=0.5):
                 continue  # the mirror image lies below
-            x, y = _ray(other["bearing_deg"], 0.95 * size)
+            x, y = polar_point(0.95 * size, other["bearing_deg"])
             axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
     axes.plot(*places.T, "o", color=COLOURS["robot"], markersize=4, label="microphones")
     for k, (x, y) in enumerate(places):
         axes.annotate(
-            f"{k + 1}",
-            (x, y),
-            xytext=(4, 4),
-            textcoords="offset points",
-            fontsize=8,
+            f"{k + 1}", (x, y), xytext=(4, 4), textcoords="offset points", fontsize=8
         )
-    axes.set_aspect("equal")
-    axes.set_xlim(-size, size)
-    axes.set_ylim(-size, size)
-    axes.set_xlabel("x (m)")
-    axes.set_ylabel("y (m)")
+    axes.set(aspect="equal", xlim=(-size, size), ylim=(-size, size))
+    axes.set(xlabel="x (m)", ylabel="y (m)")
     axes.legend(
         fontsize=8,
         frameon=False,
@@ -144,8 +133,3 @@ def _plan(axes: Axes, result: LocateResult) -> None:
         bbox_to_anchor=(0.5, 1.0),
         ncols=3,
     )
-
-
-def _ray(bearing_deg: float, length: float) -> tuple[float, float]:
-    angle = math.radians(bearing_deg)
-    return length * math.cos(angle), length * math.sin(angle)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -37,19 +37,15 @@ _NEIGHBOURS, _HELP = 4, 0.5
 
 
 @dataclass(frozen=True)
-class Sighting:
-    """A stretch of the recording in which one place stands out."""
+class Sighting(AlignedDelays):
+    """A stretch of the recording in which one place stands out.
+
+    Its delays are whole, not what an alignment leaves; its coherence is the share of
+    the sound that comes straight from the source.
+    """
 
     t_s: float
     """Middle of the stretch, s."""
-    tau: NDArray[np.float64]
-    """(n - 1,) delays of channels 1 ... n - 1 against channel 0, s."""
-    covariance: NDArray[np.float64]
-    """(n - 1, n - 1), s^2."""
-    coherence: float
-    """Share of the sound that comes straight from the source, 0 to 1."""
-    response: float
-    """Steered response, 0 to 1."""
 
 
 @dataclass(frozen=True)
@@ -179,14 +175,8 @@ class RecordingSearch:
             return None
         recording = self.recording
         first, last = recording.starts[[stretch.start, stretch.stop - 1]]
-        return Sighting(
-            t_s=float(first + last + recording.window.size)
-            / (2.0 * recording.sample_rate_hz),
-            tau=fit.tau,
-            covariance=fit.covariance,
-            coherence=fit.coherence,
-            response=float(response[best]),
-        )
+        ends = float(first + last + recording.window.size)
+        return Sighting(**vars(fit), t_s=ends / (2.0 * recording.sample_rate_hz))
 
     def _threshold(self, place: int, stretch: slice) -> float:
         # Windows that overlap by half, with the shape used, are worth half as
@@ -211,10 +201,4 @@ class RecordingSearch:
             self.recording.angular_frequency,
             grid.coarseness,
         )
-        if fit is None:
-            return None
-        return AlignedDelays(
-            tau=fit.tau + (lags[1:] - lags[0]) / rate,
-            covariance=fit.covariance,
-            coherence=fit.coherence,
-        )
+        return fit and replace(fit, tau=fit.tau + (lags[1:] - lags[0]) / rate)

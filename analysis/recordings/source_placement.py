@@ -10,6 +10,7 @@ is believed where it is certain in spite of both.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,15 +120,7 @@ def _level(fix: SourceFix) -> SourceFix:
     """The azimuth alone, as of a source within the plane."""
     u = np.array([math.cos(fix.bearing), math.sin(fix.bearing)])
     across = np.array([-u[1], u[0]])
-    return SourceFix(
-        bearing=fix.bearing,
-        bearing_std=fix.bearing_std,
-        elevation=None,
-        elevation_std=None,
-        range=0.0,
-        range_valid=False,
-        range_std=math.inf,
-        p_AS=u,
-        covariance=fix.bearing_std**2 * np.outer(across, across),
-        chi_square=fix.chi_square,
+    covariance = fix.bearing_std**2 * np.outer(across, across)
+    return replace(
+        fix, elevation=None, elevation_std=None, p_AS=u, covariance=covariance
     )

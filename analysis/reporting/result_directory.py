@@ -12,12 +12,10 @@ from pathlib import Path
 
 from systems.framework.input_error import InputError, shortened
 
-__all__ = [
-    "ResultDirectory",
-    "check_directory",
-    "take_directory",
-    "whole_directory",
-]
+__all__ = ["ResultDirectory", "check_directory", "take_directory", "whole_directory"]
+
+#: Parent of numbered directories.
+_BASE = "results"
 
 
 class ResultDirectory:
@@ -47,9 +45,7 @@ class ResultDirectory:
             raise _cannot(path, error) from None
         if taken:
             self.undo()
-            raise InputError(
-                "out", f"another process writes to {path}; name another directory"
-            )
+            raise _refused(f"another process writes to {path}")
 
     def close(self) -> None:
         """Lets other processes have it."""
@@ -71,15 +67,12 @@ class ResultDirectory:
         self.close()
 
 
-def take_directory(
-    out: str | Path | None, base: str | Path = "results"
-) -> ResultDirectory:
+def take_directory(out: str | Path | None) -> ResultDirectory:
     """Takes the directory that results go to, before anything runs.
 
     Args:
         out: A directory that does not exist yet, or is empty; none: the next
-            number under ``base``.
-        base: Parent of numbered directories.
+            number under ``results``.
 
     Returns:
         The directory, which exists, is empty, and belongs to this process.
@@ -90,13 +83,11 @@ def take_directory(
     if out is not None:
         path = check_directory(out)
         return ResultDirectory(path, _make(path))
-    return ResultDirectory(*_make_number(check_directory(base, parent=True)))
+    return ResultDirectory(*_make_number(check_directory(_BASE, parent=True)))
 
 
 @contextmanager
-def whole_directory(
-    out: str | Path | None, base: str | Path = "results"
-) -> Iterator[tuple[Path, Path]]:
+def whole_directory(out: str | Path | None) -> Iterator[tuple[Path, Path]]:
     """The directory of ``take_directory``, with a hidden one to write to.
 
     The hidden one takes the other's place at the end. If the block raises,
@@ -105,7 +96,6 @@ def whole_directory(
 
     Args:
         out: As of ``take_directory``.
-        base: Parent of numbered directories.
 
     Yields:
         The directory as it will be called, and the hidden one.
@@ -113,9 +103,9 @@ def whole_directory(
     Raises:
         InputError: As ``take_directory``.
     """
-    taken = take_directory(out, base)
+    taken = take_directory(out)
     path, partial = taken.path, None
-    shown = Path(base) / path.name if out is None else Path(out).expanduser()
+    shown = Path(_BASE) / path.name if out is None else Path(out).expanduser()
     try:
         try:
             partial = Path(tempfile.mkdtemp(prefix=f".{path.name}.", dir=path.parent))
@@ -153,15 +143,11 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
         is_empty = parent or not path.is_dir() or not any(path.iterdir())
         is_fixed = not parent and (path == Path.cwd() or path.is_mount())
     except UnicodeEncodeError:
-        raise InputError(
-            "out", f"{shown} is not UTF-8; name another directory"
-        ) from None
+        raise _refused(f"{shown} is not UTF-8") from None
     except (OSError, RuntimeError, ValueError) as error:
         # Names too long, home directories of nobody, and zero bytes.
         reason = getattr(error, "strerror", None) or error
-        raise InputError(
-            "out", f"{shown} is no usable path ({reason}); name another directory"
-        ) from None
+        raise _refused(f"{shown} is no usable path ({reason})") from None
     if is_file:
         raise InputError("out", f"{shown} is a file; name a directory")
     if is_fixed:
@@ -169,17 +155,15 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
             "out", f"{shown!r} cannot be replaced; name a directory that is not there"
         )
     if not is_empty:
-        raise InputError("out", f"{shown} is not empty; name another directory")
+        raise _refused(f"{shown} is not empty")
     above = path.parent
     while not above.exists():
         above = above.parent
     if not above.is_dir():
-        raise InputError("out", f"{above} is a file; name another directory")
+        raise _refused(f"{above} is a file")
     for folder in (path,) if parent and path.exists() else (above, path):
         if folder.exists() and not os.access(folder, os.W_OK | os.X_OK):
-            raise InputError(
-                "out", f"{folder} cannot be written; name another directory"
-            )
+            raise _refused(f"{folder} cannot be written")
     return path
 
 
@@ -211,9 +195,11 @@ def _make_number(base: Path) -> tuple[Path, list[Path]]:
 
 
 def _cannot(path: Path, error: OSError) -> InputError:
-    return InputError(
-        "out", f"{path} cannot be made ({error.strerror}); name another directory"
-    )
+    return _refused(f"{path} cannot be made ({error.strerror})")
+
+
+def _refused(why: str) -> InputError:
+    return InputError("out", f"{why}; name another directory")
 
 
 def _umask() -> int:

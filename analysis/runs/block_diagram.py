@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from html import escape
+from itertools import cycle
 from pathlib import Path
 from typing import Any
 
@@ -108,17 +109,13 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
     """
     connections = wires(diagram, flat=flat)
     layout = _arrange(blocks(diagram, flat=flat), connections)
-    names = list(layout.boxes)
-    size = f"{layout.width:.0f} {layout.height:.0f}"
-    width, height = size.split()
+    width, height = f"{layout.width:.0f}", f"{layout.height:.0f}"
     head = (
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
-        f'viewBox="0 0 {size}" font-family="Helvetica, Arial, sans-serif">'
+        f'viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, sans-serif">'
     )
     parts = [head, '<rect width="100%" height="100%" fill="white"/>']
-    colours = {
-        name: WIRE_COLOURS[k % len(WIRE_COLOURS)] for k, name in enumerate(names)
-    }
+    colours = dict(zip(layout.boxes, cycle(WIRE_COLOURS), strict=False))
     parts += [_direct(layout, w, colours[w.source]) for w in layout.direct]
     for key, along in layout.bus.items():
         parts += [_along_bus(layout, key, wire, colours[key[0]]) for wire in along]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,41 +10,34 @@ from numpy.typing import NDArray
 from diagrams.simulation import RunResult
 from systems.ranging.ultrasonic_array import cone_ranges
 
-__all__ = ["CollisionWarning", "collision_warning"]
+__all__ = ["collision_warning"]
 
 #: An echo is a body's if the range that was read is so near to that body's, m.
 SAME_M = 0.03
 
 
-@dataclass(frozen=True)
-class CollisionWarning:
-    """How a collision came about, as far as the sensors are concerned."""
+def collision_warning(result: RunResult) -> dict[str, float | None]:
+    """How a collision came about, as far as the sensors are concerned.
 
-    warning_s: float | None
-    """From the first echo of the body to the contact, s; none: never heard of."""
-    unseen_s: float | None
-    """From its last echo to the contact, s."""
-    push_n: float | None
-    """Push of the law at the last tick, N, whatever it was that pushed; none of a
-    law that does not say."""
-
-
-def collision_warning(result: RunResult) -> CollisionWarning | None:
-    """Echoes of the body that was hit; none without a collision or cones."""
+    Returns:
+        ``contact_warning_s`` and ``contact_unseen_s``, from the first and from the
+        last echo of the body to the contact, none: never heard of; and
+        ``contact_push_n``, the law's push at the last tick, whatever it was that
+        pushed, none of a law that does not say. All none without a collision or cones.
+    """
     hit, columns = result.collision, result.columns
-    if hit is None or "range_1" not in columns:
-        return None
-    known = np.flatnonzero(_echoes(result, hit.object))
-    first = result.time[known[0]] if len(known) else None
-    last = result.time[known[-1]] if len(known) else None
-    push = None
-    if "repulsion_x" in columns:
-        push = math.hypot(columns["repulsion_x"][-1], columns["repulsion_y"][-1])
-    return CollisionWarning(
-        warning_s=None if first is None else float(max(hit.time - first, 0.0)),
-        unseen_s=None if last is None else float(max(hit.time - last, 0.0)),
-        push_n=push,
-    )
+    warning = unseen = push = None
+    if hit is not None and "range_1" in columns:
+        known = result.time[_echoes(result, hit.object)]
+        if len(known):
+            warning, unseen = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()
+        if "repulsion_x" in columns:
+            push = math.hypot(*result.vector("repulsion")[:, -1])
+    return {
+        "contact_warning_s": warning,
+        "contact_unseen_s": unseen,
+        "contact_push_n": push,
+    }
 
 
 def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:

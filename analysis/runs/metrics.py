@@ -57,7 +57,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_effort_metrics(result),
         **_odometry_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
-        **_collision_metrics(result),
+        **collision_warning(result),
         **_hearing_metrics(result),
     }
 
@@ -73,7 +73,7 @@ def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
     least, contact = proximity.least, float(np.min(proximity.time_to_contact))
     return {
         "minimum_clearance_m": float(np.min(least)),
-        "minimum_obstacle_clearance_m": _least(least[:-1]),
+        "minimum_obstacle_clearance_m": min(least[:-1].tolist(), default=None),
         "clearance_p05_m": _quantile(proximity.clearance, 0.05),
         "minimum_time_to_contact_s": contact if np.isfinite(contact) else None,
     }
@@ -84,8 +84,7 @@ def _goal_metrics(result: RunResult) -> dict[str, float | None]:
     columns, moves = result.columns, result.target_moves
     inside = columns["source_range_true"] <= result.goal_radius_m
     entries = np.flatnonzero(inside)
-    steps = np.hypot(np.diff(columns["p_WB_x"]), np.diff(columns["p_WB_y"]))
-    length = float(np.sum(steps))
+    length = float(np.sum(np.hypot(*np.diff(result.vector("p_WB")))))
     shortest = None if moves else _shortest_path(result)
     return {
         "time_to_goal_s": float(result.time[entries[0]]) if len(entries) else None,
@@ -112,10 +111,10 @@ def _settling_time(result: RunResult, inside: NDArray[np.bool_]) -> float | None
 
 def _speed_of_P(result: RunResult) -> NDArray[np.float64]:
     """(n,) m/s."""
-    columns = result.columns
-    velocity = columns["v_WB_x"], columns["v_WB_y"], columns["omega_WB"]
+    theta, turning = result.columns["theta_WB"], result.columns["omega_WB"]
+    velocity = *result.vector("v_WB"), turning
     offset = result.scenario.robot.control_point_m
-    return np.hypot(*control_point_velocity(columns["theta_WB"], velocity, offset))
+    return np.hypot(*control_point_velocity(theta, velocity, offset))
 
 
 def _shortest_path(result: RunResult) -> float | None:
@@ -151,10 +150,8 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
     errors = np.abs(following_error(result))
     following = errors <= result.scenario.stop.following_band_m
     since_heard = np.maximum.accumulate(columns["target_valid"] > 0.5)
-    error, bearing = (
-        errors[settled],
-        np.degrees(columns["source_bearing_true"][settled]),
-    )
+    error = errors[settled]
+    bearing = np.degrees(columns["source_bearing_true"][settled])
     return {
         "following_fraction": _mean(following[since_heard]),
         "following_error_rms_m": _rms(error),
@@ -167,10 +164,10 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
 def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
     """Of the origin of B and of the heading."""
     columns, tick_s = result.columns, result.scenario.tick_s
-    velocity = np.stack([columns["v_WB_x"], columns["v_WB_y"]], axis=1)
-    linear = np.hypot(*jerk(velocity, tick_s).T)
+    velocity = result.vector("v_WB")
+    linear = np.hypot(*jerk(velocity.T, tick_s).T)
     angular = jerk(columns["omega_WB"], tick_s)
-    speed = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
+    speed = np.hypot(*velocity)
     movements = windows(speed, round(WINDOW_S / tick_s))
     moving = np.max(movements, axis=1, initial=0.0) >= MOVING_M_S
     movements = movements[moving & np.any(np.diff(movements, 2) != 0.0, axis=1)]
@@ -182,7 +179,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
     duration = result.simulated_s
     return {
         "jerk_rms_m_s3": _rms(linear),
-        "jerk_max_m_s3": float(np.max(linear)) if len(linear) else None,
+        "jerk_max_m_s3": max(linear.tolist(), default=None),
         "angular_jerk_rms_rad_s3": _rms(angular),
         "sparc": _quantile(sparc, 0.5),
         "ldlj": _quantile(ldlj, 0.5),
@@ -198,7 +195,7 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     columns, robot = result.columns, result.scenario.robot
     wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
-    pulling = np.hypot(columns["v_WP_x"], columns["v_WP_y"])
+    pulling = np.hypot(*result.vector("v_WP"))
     full = 0.999
     saturated = np.max(np.abs(wheels), axis=0) >= full * robot.top_wheel_speed
     saturated |= pulling >= full * robot.top_speed_m_s
@@ -214,12 +211,11 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
 
 def _force_metrics(result: RunResult) -> dict[str, float | None]:
     """Of a law that says its forces."""
-    columns = result.columns
-    if "repulsion_x" not in columns:
+    if "repulsion_x" not in result.columns:
         return {"control_effort_rms_n": None, "push_work_j": None}
-    force = [columns[f"attraction_{k}"] + columns[f"repulsion_{k}"] for k in "xy"]
-    push = columns["repulsion_x"] * columns["v_WP_x"]
-    push = push + columns["repulsion_y"] * columns["v_WP_y"]
+    repulsion = result.vector("repulsion")
+    force = result.vector("attraction") + repulsion
+    push = np.sum(repulsion * result.vector("v_WP"), axis=0)
     return {
         "control_effort_rms_n": _rms(np.hypot(*force)),
         "push_work_j": float(np.sum(push)) * result.scenario.tick_s,
@@ -238,10 +234,7 @@ def _impossible_speeds(result: RunResult) -> int | None:
 def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
     """How far the robot is from where its wheels tell it to be."""
     columns = result.columns
-    error = np.hypot(
-        columns["p_WB_estimated_x"] - columns["p_WB_x"],
-        columns["p_WB_estimated_y"] - columns["p_WB_y"],
-    )
+    error = np.hypot(*(result.vector("p_WB_estimated") - result.vector("p_WB")))
     turned = columns["theta_WB_estimated"] - columns["theta_WB"]
     slip = None
     if result.scenario.plant.friction is not None:
@@ -258,7 +251,7 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
 
 def _reaction_distance(proximity: Proximity) -> float | None:
     """From P to the nearest obstacle when the law first pushes back from it."""
-    columns = proximity.result.columns
+    result, columns = proximity.result, proximity.result.columns
     distances = proximity.distances_from_P()
     if len(distances) < 2 or "repulsion_x" not in columns:
         return None
@@ -266,26 +259,16 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     echoes = [
         np.where(
             columns[f"feature_{k}"] > 0.5,
-            np.hypot(columns[f"collision_{k}_B_x"], columns[f"collision_{k}_B_y"]),
+            np.hypot(*result.vector(f"collision_{k}_B")),
             np.inf,
         )
         for k in (1, 2, 3)
     ]
     seen = np.min(np.abs(np.stack(echoes) - nearest), axis=0) <= ECHO_M
-    push = np.hypot(columns["repulsion_x"], columns["repulsion_y"])
+    push = np.hypot(*result.vector("repulsion"))
     reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
     first = np.flatnonzero(reacting)
     return float(nearest[first[0]]) if len(first) else None
-
-
-def _collision_metrics(result: RunResult) -> dict[str, float | None]:
-    """What the cones knew of the body that was hit."""
-    before = collision_warning(result)
-    return {
-        "contact_warning_s": before.warning_s if before else None,
-        "contact_unseen_s": before.unseen_s if before else None,
-        "contact_push_n": before.push_n if before else None,
-    }
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:
@@ -293,10 +276,7 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
     columns, sounding = result.columns, frames_with_sound(result)
     heard = (columns["detected"] > 0.5) & _new_frames(result)
     ranged = heard & (columns["range_valid"] > 0.5)
-    error = np.hypot(
-        columns["p_WS_estimated_x"] - columns["p_WS_x"],
-        columns["p_WS_estimated_y"] - columns["p_WS_y"],
-    )
+    error = np.hypot(*(result.vector("p_WS_estimated") - result.vector("p_WS")))
     off = error[ranged] > OUTLIER_M
     return {
         "frames_with_sound": int(np.count_nonzero(sounding)),
@@ -335,10 +315,6 @@ def _new_frames(result: RunResult) -> NDArray[np.bool_]:
     ticks = np.rint(result.time / tick_s)
     fresh: NDArray[np.bool_] = (ticks - 1.0) % ticks_a_frame == 0.0
     return fresh
-
-
-def _least(values: NDArray[np.float64]) -> float | None:
-    return float(np.min(values)) if len(values) else None
 
 
 def _mean(flags: NDArray[np.bool_]) -> float | None:

@@ -82,18 +82,17 @@ class Proximity:
         Every rectangle keeps its heading and the velocity of its centre;
         infinite where nothing would touch.
         """
-        columns, time = self.result.columns, self.result.time
+        time = self.result.time
         if len(time) < 2:
             return np.full(len(time), np.inf)
-        robot = np.stack([columns["v_WB_x"], columns["v_WB_y"]], axis=1)
+        robot = self.result.vector("v_WB").T
         bodies = np.gradient(self.bodies[:, :, :2], time, axis=1)
-        return _contact_times(self.robot, self.bodies, robot[None] - bodies)
+        return _contact_times(self.robot, self.bodies, robot - bodies)
 
     def distances_from_P(self) -> NDArray[np.float64]:
         """(m, n) distance from P to each body's rectangle at the ticks, m."""
-        columns = self.result.columns
-        p_WP = columns["p_WP_x"], columns["p_WP_y"]
-        return np.hypot(*beyond_rectangle(p_WP, np.moveaxis(self.bodies, 2, 0)))
+        p_WP, bodies = self.result.vector("p_WP"), np.moveaxis(self.bodies, 2, 0)
+        return np.hypot(*beyond_rectangle(p_WP, bodies))
 
 
 def _rectangles(result: RunResult, poses: NDArray[np.float64]) -> NDArray[np.float64]:

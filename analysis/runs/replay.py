@@ -6,7 +6,7 @@ import html
 import logging
 import math
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -16,9 +16,10 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
-from analysis.runs.replay_scene import upright
+from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
 from analysis.runs.scene import looks, moving_and_static, run_title, sound_bursts
 from diagrams import RunResult, Scenario
+from diagrams.bodies import RecordedPath
 from systems.sound.waveforms import SoundParameters
 
 __all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
@@ -131,39 +132,38 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         own, path = look.result, robot_path(look.result, result)
         _record_robot(meshcat, own, path, frames)
         _record_estimate(meshcat, own, estimate_path(path))
-        p_WP = np.stack([own.columns["p_WP_x"], own.columns["p_WP_y"]], axis=1)
+        p_WP = own.vector("p_WP").T
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
         if own.name in sounds:
             _record_rings(meshcat, result, path, sounds[own.name])
     for name, source in scenario.all_sources.items():
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
-        _record_source(meshcat, result, path, poses, frames)
+        seen = frames if np.ptp(poses, axis=0).any() else frames[:1]
+        _record_path(meshcat, path, seen, _at_frames(result, poses, seen))
         _record_rings(meshcat, result, path, sounds[name])
         _record_trail(meshcat, result, f"trail/{path}", poses[:, :2], COLOURS["source"])
-    _record_obstacles(meshcat, result, frames)
+    for obstacle in moving_and_static(scenario)[0]:
+        path, height = f"obstacles/{obstacle.name}", 0.5 * OBSTACLE_HEIGHT_M
+        _record_path(meshcat, path, frames, obstacle.path().poses(frames), height)
 
 
 def _at_frames(
     result: RunResult, values: NDArray[np.float64], frames: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """(n, 3) poses at the ticks, interpolated to the frames."""
-    columns = [
-        np.interp(frames, result.time, values[:, 0]),
-        np.interp(frames, result.time, values[:, 1]),
-        np.interp(frames, result.time, np.unwrap(values[:, 2])),
-    ]
-    return np.stack(columns, axis=1)
+    unwrapped = np.column_stack([values[:, :2], np.unwrap(values[:, 2])])
+    return RecordedPath(result.time, unwrapped).poses(frames)
 
 
 def _record_path(
     meshcat: Meshcat,
     path: str,
     frames: NDArray[np.float64],
-    pose_at: Iterable[tuple[float, float, float]] | NDArray[np.float64],
+    poses: NDArray[np.float64],
     height: float = 0.0,
 ) -> None:
-    for time, (x, y, theta) in zip(frames, pose_at, strict=True):
+    for time, (x, y, theta) in zip(frames, poses, strict=True):
         meshcat.SetTransform(path, upright(x, y, height, theta), float(time))
 
 
@@ -215,19 +215,6 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
     }
 
 
-def _record_source(
-    meshcat: Meshcat,
-    result: RunResult,
-    path: str,
-    poses: NDArray[np.float64],
-    frames: NDArray[np.float64],
-) -> None:
-    places = _at_frames(result, poses, frames)
-    if not np.ptp(poses, axis=0).any():
-        frames, places = frames[:1], places[:1]
-    _record_path(meshcat, path, frames, places)
-
-
 def _record_rings(
     meshcat: Meshcat, result: RunResult, path: str, sound: SoundParameters
 ) -> None:
@@ -256,13 +243,10 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
 
 def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
     """The ball jumps when a frame is heard and rests in between."""
-    columns = result.columns
-    valid = columns["target_valid"] > 0.5
+    valid = result.columns["target_valid"] > 0.5
     _record_switch(meshcat, path, result.time, valid)
     height = replay_scene.SOURCE_HEIGHT_M + 0.12
-    places = np.stack(
-        [columns["p_WS_estimated_x"], columns["p_WS_estimated_y"]], axis=1
-    )
+    places = result.vector("p_WS_estimated").T
     for tick in np.flatnonzero(valid):
         if tick and valid[tick - 1] and np.allclose(places[tick], places[tick - 1]):
             continue
@@ -274,17 +258,6 @@ def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
             meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
         time = float(result.time[tick])
         meshcat.SetTransform(path, upright(x, y, height, 0.0), time)
-
-
-def _record_obstacles(
-    meshcat: Meshcat, result: RunResult, frames: NDArray[np.float64]
-) -> None:
-    moving, _ = moving_and_static(result.full_scenario)
-    for obstacle in moving:
-        pose: Callable[[float], tuple[float, float, float]] = obstacle.path().pose
-        places = [pose(float(time)) for time in frames]
-        height = 0.5 * replay_scene.OBSTACLE_HEIGHT_M
-        _record_path(meshcat, f"obstacles/{obstacle.name}", frames, places, height)
 
 
 def _record_trail(

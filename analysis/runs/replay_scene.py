@@ -76,6 +76,12 @@ def _plain(values: ArrayLike) -> Any:
     return np.asfortranarray(values)
 
 
+def _put(meshcat: Meshcat, path: str, shape: Any, rgba: Rgba, *place: float) -> None:
+    """A body; its place is what ``upright`` takes."""
+    meshcat.SetObject(path, shape, rgba)
+    meshcat.SetTransform(path, upright(*place))
+
+
 def _ribbon(
     meshcat: Meshcat, path: str, points: ArrayLike, rgba: Rgba, z: float, width: float
 ) -> None:
@@ -102,10 +108,9 @@ def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
         title: Stands in the far left corner.
     """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
-    middle = upright((x_low + x_high) / 2.0, (y_low + y_high) / 2.0, -0.011)
+    x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
     slab = Box(x_high - x_low, y_high - y_low, 0.02)
-    meshcat.SetObject("floor/slab", slab, Rgba(1.0, 1.0, 0.99))
-    meshcat.SetTransform("floor/slab", middle)
+    _put(meshcat, "floor/slab", slab, Rgba(1.0, 1.0, 0.99), x, y, -0.011)
     along = np.arange(x_low, x_high + 0.5)
     across = np.arange(y_low, y_high + 0.5)
     starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
@@ -171,9 +176,8 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
     robot = scenario.robot
     width = BODY_WIDTH_FRACTION * robot.width_m
     body = Box(robot.length_m, width, ROBOT_HEIGHT_M - 0.04)
-    meshcat.SetObject(f"{path}/body", body, _colour(look.colour))
-    middle = upright(0.0, 0.0, 0.5 * ROBOT_HEIGHT_M + 0.02)
-    meshcat.SetTransform(f"{path}/body", middle)
+    middle = 0.5 * ROBOT_HEIGHT_M + 0.02
+    _put(meshcat, f"{path}/body", body, _colour(look.colour), 0.0, 0.0, middle)
     for side, y in (("left", 0.5), ("right", -0.5)):
         place = y * robot.wheel_separation_m
         _add_wheel(meshcat, scenario, f"{path}/{side}", place)
@@ -198,18 +202,15 @@ def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> Non
 
 def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:
     robot = scenario.robot
-    bar = Box(0.02, robot.width_m, 0.02)
-    x = robot.control_point_m - 0.01
-    meshcat.SetObject(f"{path}/bar", bar, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform(f"{path}/bar", upright(x, 0.0, MICROPHONE_HEIGHT_M - 0.03))
-    mast = Cylinder(0.012, MICROPHONE_HEIGHT_M - ROBOT_HEIGHT_M)
-    middle = 0.5 * (MICROPHONE_HEIGHT_M + ROBOT_HEIGHT_M) - 0.02
-    meshcat.SetObject(f"{path}/mast", mast, Rgba(0.35, 0.35, 0.38))
-    meshcat.SetTransform(f"{path}/mast", upright(x, 0.0, middle))
-    for number, (x_M, y_M) in enumerate(microphones_B(scenario.robot), start=1):
-        microphone = f"{path}/microphone_{number}"
-        meshcat.SetObject(microphone, Sphere(0.028), Rgba(0.05, 0.05, 0.05))
-        meshcat.SetTransform(microphone, upright(x_M, y_M, MICROPHONE_HEIGHT_M))
+    bar, grey = Box(0.02, robot.width_m, 0.02), Rgba(0.35, 0.35, 0.38)
+    x, height = robot.control_point_m - 0.01, MICROPHONE_HEIGHT_M
+    _put(meshcat, f"{path}/bar", bar, grey, x, 0.0, height - 0.03)
+    mast = Cylinder(0.012, height - ROBOT_HEIGHT_M)
+    middle = 0.5 * (height + ROBOT_HEIGHT_M) - 0.02
+    _put(meshcat, f"{path}/mast", mast, grey, x, 0.0, middle)
+    ball, black = Sphere(0.028), Rgba(0.05, 0.05, 0.05)
+    for number, place in enumerate(microphones_B(robot), start=1):
+        _put(meshcat, f"{path}/microphone_{number}", ball, black, *place, height)
 
 
 def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> None:
@@ -238,17 +239,16 @@ def add_source(meshcat: Meshcat, source: SourceParameters, path: str) -> None:
     """
     if source.body:
         body = Box(source.length_m, source.width_m, SOURCE_HEIGHT_M)
-        meshcat.SetObject(f"{path}/body", body, _colour("source"))
-        middle = upright(0.0, 0.0, 0.5 * SOURCE_HEIGHT_M)
-        meshcat.SetTransform(f"{path}/body", middle)
+        middle = 0.5 * SOURCE_HEIGHT_M
+        _put(meshcat, f"{path}/body", body, _colour("source"), 0.0, 0.0, middle)
     _add_loudspeaker(meshcat, path, SOURCE_HEIGHT_M, COLOURS["source"])
 
 
 def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) -> None:
     """On a body of some height, m, with rings of its colour."""
     horn = Cylinder(0.07, 0.06)
-    meshcat.SetObject(f"{path}/loudspeaker", horn, Rgba(0.15, 0.15, 0.15))
-    meshcat.SetTransform(f"{path}/loudspeaker", upright(0.0, 0.0, height + 0.03))
+    dark, above = Rgba(0.15, 0.15, 0.15), height + 0.03
+    _put(meshcat, f"{path}/loudspeaker", horn, dark, 0.0, 0.0, above)
     turns = np.linspace(0.0, 2.0 * math.pi, 73)
     for number, radius in enumerate(RINGS, start=1):
         circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
@@ -264,11 +264,10 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
         scenario: Has the obstacles.
     """
     for obstacle in scenario.obstacles:
-        path = f"obstacles/{obstacle.name}"
-        box = Box(*obstacle.size_m, OBSTACLE_HEIGHT_M)
-        meshcat.SetObject(path, box, _colour("obstacle"))
+        path, height = f"obstacles/{obstacle.name}", OBSTACLE_HEIGHT_M
         x, y, theta = obstacle.path().pose(0.0)
-        meshcat.SetTransform(path, upright(x, y, 0.5 * OBSTACLE_HEIGHT_M, theta))
+        box = Box(*obstacle.size_m, height)
+        _put(meshcat, path, box, _colour("obstacle"), x, y, 0.5 * height, theta)
 
 
 def add_trail(
@@ -292,11 +291,9 @@ def set_stage(meshcat: Meshcat, result: RunResult) -> None:
         meshcat: The scene.
         result: The run.
     """
-    for path in ("/Grid", "/Axes", "/Lights/SpotLight"):
+    lamps = ("SpotLight", "PointLightNegativeX", "PointLightPositiveX")
+    for path in ("/Grid", "/Axes", *(f"/Lights/{lamp}" for lamp in lamps)):
         meshcat.SetProperty(path, "visible", value=False)
-    for side in ("Negative", "Positive"):
-        lamp = f"/Lights/PointLight{side}X"
-        meshcat.SetProperty(lamp, "visible", value=False)
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.6)
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
     for end in ("top_color", "bottom_color"):

@@ -82,13 +82,10 @@ def _map(result: RunResult) -> tuple[Figure, Axes]:
     axes = figure.add_axes(
         (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
     )
-    axes.set_aspect("equal")
-    axes.set_xlim(x_low, x_high)
-    axes.set_ylim(y_low, y_high)
+    axes.set(aspect="equal", xlim=(x_low, x_high), ylim=(y_low, y_high))
     axes.xaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
     axes.yaxis.set_major_locator(MaxNLocator(steps=[1, 2, 5, 10]))
-    axes.set_xlabel("x in W (m)")
-    axes.set_ylabel("y in W (m)")
+    axes.set(xlabel="x in W (m)", ylabel="y in W (m)")
     return figure, axes
 
 
@@ -133,8 +130,10 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             frameon=False,
             handlelength=1.5,
         )
-    all_axes[-1].set_xlabel("time (s), shaded while the source sounds")
-    all_axes[-1].set_xlim(0.0, max(result.simulated_s, 1e-3))
+    all_axes[-1].set(
+        xlabel="time (s), shaded while the source sounds",
+        xlim=(0.0, max(result.simulated_s, 1e-3)),
+    )
     figure.suptitle(_title(result), fontsize=11)
     figure.align_ylabels(list(all_axes))
     return figure
@@ -170,21 +169,18 @@ def _range(axes: Axes, result: RunResult) -> None:
 
 
 def _bearing(axes: Axes, result: RunResult) -> None:
-    true, heard = (
-        np.degrees(result.columns[name])
-        for name in ("source_bearing_true", "source_bearing")
-    )
-    axes.plot(
-        result.time, _cut_at_wraps(true, 360.0), color=COLOURS["source"], label="true"
-    )
-    _heard(axes, result, heard)
+    true = np.degrees(result.columns["source_bearing_true"])
+    # Else a line would cross the whole panel where the bearing wraps.
+    true[1:][np.abs(np.diff(true)) > 180.0] = np.nan
+    axes.plot(result.time, true, color=COLOURS["source"], label="true")
+    _heard(axes, result, np.degrees(result.columns["source_bearing"]))
     axes.set_ylabel("bearing of\nsource (deg)")
 
 
 def _forces(axes: Axes, result: RunResult) -> None:
     said = "attraction_x" in result.columns
     for name in ("attraction", "repulsion") if said else ():
-        size = np.hypot(result.columns[f"{name}_x"], result.columns[f"{name}_y"])
+        size = np.hypot(*result.vector(name))
         axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
     axes.set_ylabel("force on P\n(N)")
     axes.set_ylim(bottom=0.0)
@@ -196,13 +192,8 @@ def _speeds(axes: Axes, result: RunResult) -> None:
     forward = columns["v_WB_x"] * np.cos(theta) + columns["v_WB_y"] * np.sin(theta)
     for side in ("left", "right"):
         rim = columns[f"wheel_speed_{side}"] * robot.wheel_radius_m
-        axes.plot(
-            result.time,
-            rim,
-            color=COLOURS[side],
-            lw=1.0,
-            label=f"{side} wheel, command",
-        )
+        label = f"{side} wheel, command"
+        axes.plot(result.time, rim, color=COLOURS[side], lw=1.0, label=label)
     axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
     axes.set_ylabel("speed (m/s)")
 
@@ -215,23 +206,9 @@ def _turning(axes: Axes, result: RunResult) -> None:
 
 
 def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) -> None:
-    axes.plot(
-        result.time, clearance, color=COLOURS["obstacle"], label="to nearest body"
-    )
-    least = int(np.argmin(clearance))
-    axes.plot(
-        result.time[least],
-        clearance[least],
-        "v",
-        color="black",
-        label=f"least: {clearance[least]:.2f} m",
-    )
+    time, colour = result.time, COLOURS["obstacle"]
+    axes.plot(time, clearance, color=colour, label="to nearest body")
+    at, least = time[np.argmin(clearance)], float(np.min(clearance))
+    axes.plot(at, least, "v", color="black", label=f"least: {least:.2f} m")
     axes.set_ylabel("clearance\n(m)")
-    axes.set_ylim(bottom=min(0.0, 1.1 * float(clearance[least])))
-
-
-def _cut_at_wraps(values: NDArray[np.float64], turn: float) -> NDArray[np.float64]:
-    """The same values, NaN after which a line would cross the whole panel."""
-    cut = values.copy()
-    cut[1:][np.abs(np.diff(values)) > 0.5 * turn] = np.nan
-    return cut
+    axes.set_ylim(bottom=min(0.0, 1.1 * least))

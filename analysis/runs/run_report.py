@@ -124,9 +124,8 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
 
 
 def _ended(result: RunResult) -> str:
-    hit = result.collision
-    by = f" with {hit.object}, the {hit.fault}'s fault" if hit else ""
-    return f"{result.cause}{by}"
+    fault = f", the {result.collision.fault}'s fault" if result.collision else ""
+    return f"{result.ending}{fault}"
 
 
 def _robot_rows(

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from diagrams import RunResult, Scenario
-from diagrams.bodies import robot_rectangle
+from diagrams.bodies import Path, robot_rectangle
 from diagrams.stop_rules import SUCCESSFUL
 from systems.framework.input_error import InputError
 from systems.sound.waveforms import SoundParameters
@@ -99,12 +99,10 @@ def looks(result: RunResult) -> list[Look]:
 
 def run_title(result: RunResult) -> str:
     """What was run and how it ended, on one line."""
-    scenario, hit = result.full_scenario, result.collision
-    by = f" with {hit.object}" if hit else ""
     told = result.several and result.cause not in SUCCESSFUL
     who = f"{result.name} " if told else ""
     laws = ", ".join(dict.fromkeys(own.scenario.law for own in result.robots.values()))
-    return f"{scenario.name}, law {laws}: {who}{result.cause}{by}"
+    return f"{result.full_scenario.name}, law {laws}: {who}{result.ending}"
 
 
 def sound_bursts(sound: SoundParameters, end: float) -> list[tuple[float, float]]:
@@ -178,11 +176,9 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
         for own in result.robots.values()
         for body in ("WB", "WS")
     ]
-    sources = scenario.all_sources.values()
-    centres += [source.path().poses(times)[:, :2] for source in sources]
-    for obstacle in scenario.obstacles:
-        path = obstacle.path()
-        centres.append(np.array([path.pose(t)[:2] for t in times]))
+    paths: list[Path] = [each.path() for each in scenario.all_sources.values()]
+    paths += [obstacle.path() for obstacle in scenario.obstacles]
+    centres += [path.poses(times)[:, :2] for path in paths]
     points = np.concatenate(centres)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
@@ -40,15 +39,16 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
         (m,) or (m, k), m/s^3: samples whose window is whole, 10 fewer than n at 25 ms;
         empty where there is none.
     """
+    from scipy.signal import savgol_filter
+
     velocity = np.asarray(velocity, dtype=float)
     half = max(2, round(JERK_HALF_WINDOW_S / period))
-    width = 2 * half + 1
-    if len(velocity) < width:
+    if len(velocity) <= 2 * half:
         return np.empty((0, *velocity.shape[1:]))
-    offsets = np.arange(-half, half + 1) * period
-    # The even part of the cubic is a + c t^2, and its second derivative 2 c.
-    c = np.linalg.pinv(np.stack([np.ones(width), offsets**2], axis=1))[1]
-    return 2.0 * sliding_window_view(velocity, width, axis=0) @ c
+    second: NDArray[np.float64] = savgol_filter(
+        velocity, 2 * half + 1, polyorder=3, deriv=2, delta=period, axis=0
+    )
+    return second[half:-half]
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:

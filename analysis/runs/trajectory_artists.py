@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Wedge
 from matplotlib.patheffects import withStroke
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import (
@@ -22,8 +23,8 @@ from analysis.runs.scene import (
     tick_at,
 )
 from diagrams import RunResult
-from diagrams.bodies import robot_rectangle
-from systems.sound.mic_array import microphones_B
+from diagrams.bodies import microphones_W, robot_rectangle
+from diagrams.participants import SourceParameters
 from systems.world.geometry import rectangle_corners, rotate
 
 __all__ = [
@@ -64,10 +65,6 @@ def _apart(
     return bool(np.linalg.norm(step[:2]) >= APART_M)
 
 
-def _seconds(time: float) -> str:
-    return f"{round(time, 1):g} s"
-
-
 def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
     """The path of P, and footprints with their microphones at some times, s.
 
@@ -78,31 +75,31 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
     """
     result, colour, scenario = look.result, look.colour, look.result.scenario
     axes.plot(
-        result.columns["p_WP_x"],
-        result.columns["p_WP_y"],
+        *result.vector("p_WP"),
         color=colour,
         linewidth=1.8,
         label=look.path_label,
         zorder=4,
     )
-    microphones = microphones_B(scenario.robot)
     for index, time in enumerate(times):
         pose = result.poses("WB")[tick_at(result, time)]
-        corners = rectangle_corners(robot_rectangle(pose, scenario.robot))
-        label = look.body_label if index == 0 else None
-        patch = Polygon(
-            corners,
+        _draw_body(
+            axes,
+            robot_rectangle(pose, scenario.robot),
+            gid=f"robot at {time:g}",
             facecolor=(*to_rgb(colour), 0.10),
             edgecolor=colour,
             linewidth=1.0,
-            label=label,
+            label=look.body_label if index == 0 else None,
             zorder=3,
         )
-        patch.set_gid(f"robot at {time:g}")
-        axes.add_patch(patch)
-        bar = np.array([compose(pose, (x, y, 0.0))[:2] for x, y in microphones])
+        bar = microphones_W(pose, scenario.robot)
         axes.plot(*bar.T, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
         _write_time(axes, pose, -0.42, time, colour)
+
+
+def _draw_body(axes: Axes, rectangle: ArrayLike, **style: Any) -> None:
+    axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
 
 
 def _write_time(
@@ -112,7 +109,7 @@ def _write_time(
     dx, dy = rotate(pose[2], 0.0, aside)
     unit_x, unit_y = dx / abs(aside), dy / abs(aside)
     axes.annotate(
-        _seconds(time),
+        f"{round(time, 1):g} s",
         (pose[0] + dx, pose[1] + dy),
         xytext=(9.0 * unit_x, 7.0 * unit_y),
         textcoords="offset points",
@@ -136,35 +133,31 @@ def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
     """
     sources = result.full_scenario.all_sources
     for name, source in sources.items():
-        path = source.path().poses(result.time)
-        size = source.length_m, source.width_m
         what = "the source" if len(sources) == 1 else name
-        _draw_source(axes, result, what, path, size, times)
+        _draw_source(axes, result, what, source, times)
 
 
 def _draw_source(
     axes: Axes,
     result: RunResult,
     what: str,
-    path: NDArray[np.float64],
-    size: tuple[float, float],
+    source: SourceParameters,
     times: list[float],
 ) -> None:
-    colour = COLOURS["source"]
-    axes.plot(
-        path[:, 0], path[:, 1], "--", color=colour, label=f"path of {what}", zorder=3
-    )
+    colour, path = COLOURS["source"], source.path().poses(result.time)
+    label = f"path of {what}"
+    axes.plot(*path[:, :2].T, "--", color=colour, label=label, zorder=3)
     ends = (0, len(path) - 1) if np.ptp(path[:, :2], axis=0).any() else (0,)
     for index in ends:
-        patch = Polygon(
-            rectangle_corners(np.array([*path[index], *size])),
+        _draw_body(
+            axes,
+            [*path[index], source.length_m, source.width_m],
+            gid="source",
             facecolor=(*to_rgb(colour), 0.25 if index == 0 else 0.6),
             edgecolor=colour,
             label=f"{what.removeprefix('the ')}, first and last" if not index else None,
             zorder=2.5,
         )
-        patch.set_gid("source")
-        axes.add_patch(patch)
     last = -math.inf
     for time in times:
         if math.isfinite(last) and not _apart(result, path, last, time):
@@ -172,7 +165,7 @@ def _draw_source(
         last = time
         pose = path[tick_at(result, time)]
         axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
-        _write_time(axes, pose, -0.5 * size[1], time, colour)
+        _write_time(axes, pose, -0.5 * source.width_m, time, colour)
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:
@@ -189,9 +182,10 @@ def draw_estimates(axes: Axes, look: Look) -> None:
     colour = look.estimates
     part = result.time[heard] / max(result.simulated_s, 1e-9)
     colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
+    x, y = result.vector("p_WS_estimated")[:, heard]
     axes.scatter(
-        columns["p_WS_estimated_x"][heard],
-        columns["p_WS_estimated_y"][heard],
+        x,
+        y,
         c=colours,
         marker="x",
         s=16,
@@ -212,11 +206,10 @@ def draw_obstacles(axes: Axes, result: RunResult) -> None:
     colour = COLOURS["obstacle"]
     moving, static = moving_and_static(result.full_scenario)
     for index, obstacle in enumerate(static):
-        pose = np.array([*obstacle.path().pose(0.0), *obstacle.size_m])
+        body = [*obstacle.path().pose(0.0), *obstacle.size_m]
         label = "obstacle at rest" if index == 0 else None
-        patch = Polygon(rectangle_corners(pose), color=colour, label=label, zorder=3.5)
-        patch.set_gid(f"obstacle {obstacle.name}")
-        axes.add_patch(patch)
+        gid = f"obstacle {obstacle.name}"
+        _draw_body(axes, body, gid=gid, color=colour, label=label, zorder=3.5)
     for index, obstacle in enumerate(moving):
         path, last = obstacle.path(), None
         for time in picture_times(result):
@@ -224,17 +217,16 @@ def draw_obstacles(axes: Axes, result: RunResult) -> None:
             if last is not None and np.linalg.norm(pose - last) < 0.5 * APART_M:
                 continue
             last = pose
-            patch = Polygon(
-                rectangle_corners(np.array([*pose, *obstacle.size_m])),
+            _draw_body(
+                axes,
+                [*pose, *obstacle.size_m],
+                gid=f"obstacle {obstacle.name} at {time:g}",
                 fill=False,
                 edgecolor=colour,
-                linestyle="-",
                 linewidth=1.1,
                 label="moving obstacle" if index == 0 and time == 0.0 else None,
                 zorder=3.5,
             )
-            patch.set_gid(f"obstacle {obstacle.name} at {time:g}")
-            axes.add_patch(patch)
             _write_time(axes, pose, -0.5 * obstacle.size_m[1], time, colour)
 
 
@@ -255,6 +247,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
         tick = tick_at(result, time)
         for sensor in range(result.scenario.ultrasonic.count):
             echo = bool(result.columns[f"echo_{sensor + 1}"][tick] > 0.5)
+            colour = to_rgb(COLOURS["echo" if echo else "empty"])
             pose = result.poses("WB")[tick]
             x, y, theta = compose(pose, sensor_pose(result.scenario, sensor))
             axis = math.degrees(theta)
@@ -263,11 +256,8 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
                 result.columns[f"range_{sensor + 1}"][tick],
                 axis - half,
                 axis + half,
-                facecolor=(
-                    *to_rgb(COLOURS["echo" if echo else "empty"]),
-                    0.35 if echo else 0.07,
-                ),
-                edgecolor=(*to_rgb(COLOURS["echo" if echo else "empty"]), 0.5),
+                facecolor=(*colour, 0.35 if echo else 0.07),
+                edgecolor=(*colour, 0.5),
                 linewidth=0.5,
                 label=None if echo in labelled else _CONE_LABELS[echo],
                 zorder=1.5,

@@ -18,12 +18,7 @@ from uuid import uuid4
 
 from analysis.reporting.provenance import versions
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
-from analysis.sweeps.processes import (
-    ATTEMPTS,
-    PULSE_S,
-    WorkerError,
-    WorkerProcess,
-)
+from analysis.sweeps.processes import ATTEMPTS, PULSE_S, WorkerError, WorkerProcess
 from systems.framework.input_error import InputError
 
 __all__ = ["connect", "run_on_cluster"]
@@ -109,7 +104,8 @@ def run_on_cluster(
     futures: dict[Any, Task] = {}
     try:
         while True:
-            room = TASKS_A_THREAD * _threads(client) - len(futures)
+            threads = max(1, sum(client.nthreads().values()))
+            room = TASKS_A_THREAD * threads - len(futures)
             for task in islice(tasks, max(0, room)):
                 key = f"phonotaxis-{sweep}-{task.point.index}"
                 futures[client.submit(_run_remotely, task, key=key)] = task
@@ -130,10 +126,6 @@ def run_on_cluster(
             client.run(_dismiss_idle, on_error="ignore")
         with suppress(OSError, CancelledError):
             client.close()
-
-
-def _threads(client: Any) -> int:
-    return max(1, sum(client.nthreads().values()))
 
 
 def _outcome(future: Any, task: Task) -> Outcome:

@@ -44,32 +44,31 @@ class Distribution(Parameters):
                 "",
                 f"{len(given)} distributions are given; give one of {', '.join(names)}",
             )
-        for name, low_high in (
-            ("uniform", self.uniform),
-            ("log_uniform", self.log_uniform),
-        ):
-            if low_high is not None and not low_high[0] < low_high[1]:
-                raise InputError(
-                    name,
-                    f"{list(low_high)} is empty; give [low, high] with low < "
-                    "high, or use set for one value",
-                )
-        if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
+        name, values = self._given
+        if name in ("uniform", "log_uniform") and not values[0] < values[1]:
             raise InputError(
-                "log_uniform", f"{list(self.log_uniform)} must be positive; raise low"
+                name,
+                f"{list(values)} is empty; give [low, high] with low < "
+                "high, or use set for one value",
             )
-        if self.normal is not None and self.normal[1] <= 0.0:
+        if name == "log_uniform" and values[0] <= 0.0:
+            raise InputError(name, f"{list(values)} must be positive; raise low")
+        if name == "normal" and values[1] <= 0.0:
             raise InputError(
-                "normal",
-                f"the standard deviation {self.normal[1]:g} must be positive; "
+                name,
+                f"the standard deviation {values[1]:g} must be positive; "
                 "give [mean, standard deviation]",
             )
-        if self.integers is not None and self.integers[0] > self.integers[1]:
+        if name == "integers" and values[0] > values[1]:
             raise InputError(
-                "integers",
-                f"{list(self.integers)} is empty; give [low, high] with low <= high",
+                name, f"{list(values)} is empty; give [low, high] with low <= high"
             )
         return self
+
+    @property
+    def _given(self) -> tuple[str, tuple[Any, ...]]:
+        """The one field that is set, and its values."""
+        return next((name, values) for name, values in self if values is not None)
 
     @property
     def numeric(self) -> bool:
@@ -78,16 +77,14 @@ class Distribution(Parameters):
 
     def draw(self, generator: np.random.Generator) -> Any:
         """One value, of a plain type."""
-        if self.uniform is not None:
-            return float(generator.uniform(*self.uniform))
-        if self.log_uniform is not None:
-            low, high = self.log_uniform
+        name, values = self._given
+        if name == "choice":
+            return values[int(generator.integers(len(values)))]
+        low, high = values
+        if name == "integers":
+            return int(generator.integers(low, high, endpoint=True))
+        if name == "log_uniform":
             value = math.exp(generator.uniform(math.log(low), math.log(high)))
             return min(max(value, low), high)
-        if self.normal is not None:
-            return float(generator.normal(*self.normal))
-        if self.integers is not None:
-            low_int, high_int = self.integers
-            return int(generator.integers(low_int, high_int, endpoint=True))
-        values = self.choice or ()
-        return values[int(generator.integers(len(values)))]
+        draw = generator.uniform if name == "uniform" else generator.normal
+        return float(draw(low, high))

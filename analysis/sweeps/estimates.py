@@ -4,26 +4,26 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from analysis.reporting.intervals import median_interval, wilson_interval
+from analysis.reporting.intervals import Estimate, median_interval, wilson_interval
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
 from diagrams.stop_rules import SUCCESSFUL
 
 __all__ = [
     "QUANTITIES",
-    "Estimate",
     "Marginal",
     "Quantity",
+    "by_cell",
     "cell_label",
     "ended",
+    "figure_table",
     "marginal",
     "quantities",
     "short",
@@ -32,14 +32,6 @@ __all__ = [
 
 #: A drawn number is cut into at most so many bins, of so many runs or more.
 MOST_BINS, LEAST_RUNS = 8, 20
-
-
-class Estimate(NamedTuple):
-    """A figure with its 95 % interval; NaN where no run has one."""
-
-    value: float
-    low: float
-    high: float
 
 
 @dataclass(frozen=True)
@@ -119,6 +111,39 @@ def ended(results: pd.DataFrame) -> pd.DataFrame:
     return results[results["cause"] != FAILED]
 
 
+def figure_table(
+    plan: SweepPlan, results: pd.DataFrame
+) -> tuple[list[str], list[list[str]]]:
+    """What pages show of each cell, with intervals.
+
+    Args:
+        plan: What was run.
+        results: See ``load_results``.
+
+    Returns:
+        Titles of the quantities, and for each cell its name and figures.
+    """
+    figured = quantities(results)
+    rows = [
+        [cell_label(fields), *(shown(q, q.estimate(ended(runs))) for q in figured)]
+        for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True)
+    ]
+    return [quantity.title for quantity in figured], rows
+
+
+def by_cell(plan: SweepPlan, results: pd.DataFrame) -> list[pd.DataFrame]:
+    """The runs of each cell of the grid.
+
+    Args:
+        plan: What was run.
+        results: See ``load_results``.
+
+    Returns:
+        A table for each of ``plan.cells()``.
+    """
+    return [results[results["cell"] == k] for k in range(len(plan.cells()))]
+
+
 @dataclass(frozen=True)
 class Marginal:
     """A quantity against one drawn field, whatever the others were."""
@@ -185,18 +210,16 @@ def shown(quantity: Quantity, estimate: Estimate) -> str:
     return f"{value}{unit} ({low} to {high})"
 
 
-def cell_label(fields: dict[str, Any], names: Sequence[str] | None = None) -> str:
+def cell_label(fields: dict[str, Any]) -> str:
     """Fields of a cell in words: last part of each path, and value.
 
     Args:
         fields: Values of the grid by path.
-        names: Paths to show; None: all.
 
     Returns:
         ``all runs`` where there is nothing to show.
     """
-    chosen = fields if names is None else {name: fields[name] for name in names}
-    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in chosen.items()]
+    pairs = [f"{path.rpartition('.')[2]} {short(v)}" for path, v in fields.items()]
     return ", ".join(pairs) or "all runs"
 
 

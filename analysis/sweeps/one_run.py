@@ -1,10 +1,11 @@
-"""One run of a sweep, and the row that it leaves."""
+"""One run of a sweep, the row that it leaves, and all rows as one table."""
 
 from __future__ import annotations
 
 import io
+import json
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from time import perf_counter
@@ -16,12 +17,23 @@ from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
+from diagrams.stop_rules import Collision
 from systems.framework.input_error import shortened
 
-__all__ = ["Outcome", "Task", "lost_outcome", "require_runs", "run_task"]
+__all__ = [
+    "Outcome",
+    "Task",
+    "lost_outcome",
+    "parquet_bytes",
+    "require_runs",
+    "results_table",
+    "run_task",
+]
 
 #: Cause in the row of a run that raised an error.
 FAILED = "failed"
+_FIRST = ("index", "cell", "run", "seed", "redraws")
+_TEXTS = ("cause", "collision_object", "collision_fault")
 
 
 @dataclass(frozen=True)
@@ -53,7 +65,7 @@ def run_task(task: Task) -> Outcome:
     try:
         result = simulate(task.scenario)
         row = _row(task.point, result.cause, start, result)
-        trajectory = _trajectory(result) if task.trajectory else None
+        trajectory = parquet_bytes(result.trajectory) if task.trajectory else None
     except (Exception, SystemExit) as error:  # noqa: BLE001  # the rest must go on
         text = " ".join(f"{type(error).__name__}: {error}".split())
         return Outcome(_row(task.point, FAILED, start, error=text))
@@ -104,17 +116,14 @@ def _row(
         if value is not None and not math.isfinite(value):
             raise ValueError(f"{name} is {value}")
     return {
-        "index": point.index,
-        "cell": point.cell,
-        "run": point.run,
-        "seed": point.seed,
-        "redraws": point.redraws,
-        "fields": point.fields,
-        "cause": cause,
-        "collision_object": collision.object if collision else None,
-        "collision_fault": collision.fault if collision else None,
-        "collision_time_s": collision.time if collision else None,
-        "robots": _endings(result) if result else {},
+        **vars(point),
+        **_ending(cause, collision),
+        "collision_time_s": collision and collision.time,
+        "robots": {
+            f"{name}.{key}": value
+            for name, own in (result.several if result else {}).items()
+            for key, value in _ending(own.cause, own.collision).items()
+        },
         "metrics": metrics,
         "simulated_s": result.simulated_s if result else None,
         "error": error,
@@ -122,18 +131,63 @@ def _row(
     }
 
 
-def _endings(result: RunResult) -> dict[str, str | None]:
-    """How each of several robots ended, by its name, a dot and the row's name."""
-    endings: dict[str, str | None] = {}
-    for name, own in result.several.items():
-        hit = own.collision
-        endings[f"{name}.cause"] = own.cause
-        endings[f"{name}.collision_object"] = hit.object if hit else None
-        endings[f"{name}.collision_fault"] = hit.fault if hit else None
-    return endings
+def _ending(cause: str, hit: Collision | None) -> dict[str, Any]:
+    return {
+        "cause": cause,
+        "collision_object": hit and hit.object,
+        "collision_fault": hit and hit.fault,
+    }
 
 
-def _trajectory(result: RunResult) -> bytes:
+def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
+    """The rows of ``Outcome`` by index, the same in whatever order they came.
+
+    Returns:
+        A column for each of the row's own values, for each field by its dotted
+        path, and for each metric; numbers are float64 but for indices and
+        seeds, missing ones NaN. Fields that are lists or mappings, or of
+        several kinds, are JSON text.
+    """
+    ordered = sorted(rows, key=lambda row: int(row["index"]))
+    columns: dict[str, Any] = {
+        name: pd.array([row[name] for row in ordered], dtype="int64") for name in _FIRST
+    }
+    for path in _keys(ordered, "fields"):
+        columns[path] = _field_column([row["fields"][path] for row in ordered])
+    for name in _TEXTS:
+        columns[name] = pd.array([row[name] for row in ordered], dtype="str")
+    for name in _keys(ordered, "robots"):
+        values = [row["robots"].get(name) for row in ordered]
+        columns[name] = pd.array(values, dtype="str")
+    columns["collision_time_s"] = _numbers(row["collision_time_s"] for row in ordered)
+    for metric in _keys(ordered, "metrics"):
+        columns[metric] = _numbers(row["metrics"].get(metric) for row in ordered)
+    for name in ("simulated_s", "wall_s"):
+        columns[name] = _numbers(row[name] for row in ordered)
+    columns["error"] = pd.array([row["error"] for row in ordered], dtype="str")
+    return pd.DataFrame(columns)
+
+
+def parquet_bytes(table: pd.DataFrame) -> bytes:
+    """The table as a Parquet file."""
     buffer = io.BytesIO()
-    result.trajectory.to_parquet(buffer, index=False)
+    table.to_parquet(buffer, index=False)
     return buffer.getvalue()
+
+
+def _keys(rows: Sequence[dict[str, Any]], group: str) -> list[str]:
+    """Keys of a mapping in the rows, in order; rows that failed lack some."""
+    return list(dict.fromkeys(key for row in rows for key in row[group]))
+
+
+def _numbers(values: Iterable[float | None]) -> Any:
+    return pd.Series(list(values), dtype="float64")
+
+
+def _field_column(values: list[Any]) -> Any:
+    for kind, dtype in ((bool, "bool"), (int, "int64"), (str, "str")):
+        if all(type(value) is kind for value in values):
+            return pd.Series(values, dtype=dtype)
+    if all(type(value) in (int, float) for value in values):
+        return pd.Series(values, dtype="float64")
+    return pd.Series([json.dumps(value) for value in values], dtype="str")

@@ -20,15 +20,10 @@ from analysis.reporting.html_page import (
     table,
 )
 from analysis.reporting.plain_values import write_json
-from analysis.sweeps.estimates import cell_label, ended, quantities, shown
+from analysis.sweeps.estimates import by_cell, cell_label, ended, figure_table
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
-from analysis.sweeps.plots import (
-    grid_axes,
-    plot_heat_maps,
-    plot_line,
-    plot_marginal,
-)
+from analysis.sweeps.plots import grid_axes, plot_heat_maps, plot_line, plot_marginal
 from analysis.sweeps.sweep import reproducing_command
 from diagrams.stop_rules import SUCCESSFUL
 
@@ -141,28 +136,15 @@ def _causes(plan: SweepPlan, results: pd.DataFrame) -> str:
     good = [cause for cause in SUCCESSFUL if cause in order]
     causes = [*good, *(cause for cause in order if cause not in good)]
     rows: list[list[Cell]] = []
-    for cell, fields in enumerate(plan.cells()):
-        runs = results[results["cell"] == cell]
-        counts = runs["cause"].value_counts()
-        rows.append(
-            [
-                cell_label(fields),
-                len(runs),
-                *(int(counts.get(cause, 0)) for cause in causes),
-            ]
-        )
+    for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True):
+        counts = [int((runs["cause"] == cause).sum()) for cause in causes]
+        rows.append([cell_label(fields), len(runs), *counts])
     return table(["cell", "runs", *causes], rows, caption="Runs by cause")
 
 
 def _figures(plan: SweepPlan, results: pd.DataFrame) -> str:
-    rows: list[list[Cell]] = []
-    figured = quantities(results)
-    for cell, fields in enumerate(plan.cells()):
-        runs = ended(results[results["cell"] == cell])
-        figures = [shown(quantity, quantity.estimate(runs)) for quantity in figured]
-        rows.append([cell_label(fields), *figures])
-    headings = ["cell", *(quantity.title for quantity in figured)]
-    return table(headings, rows, caption="Figures with 95 % intervals")
+    titles, rows = figure_table(plan, results)
+    return table(["cell", *titles], rows, caption="Figures with 95 % intervals")
 
 
 def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
@@ -172,7 +154,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     if len(axes) == 1 and len(plan.grid) == 1:
         caption = f"Every figure over `{axes[0]}`."
         return [figure_html(plot_line(plan, results, axes[0]), "line", caption)]
-    (x, y), others = _map_axes(plan, axes)
+    (x, y), others = _map_axes(plan)
     cases = [
         dict(zip(others, values, strict=True))
         for values in product(*(plan.grid[path] for path in others))
@@ -190,7 +172,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     return maps
 
 
-def _map_axes(plan: SweepPlan, axes: list[str]) -> tuple[list[str], list[str]]:
+def _map_axes(plan: SweepPlan) -> tuple[list[str], list[str]]:
     """The two fields with most values span the maps; the others have a map each."""
     by_size = sorted(plan.grid, key=lambda path: -len(plan.grid[path]))
     chosen = [path for path in plan.grid if path in by_size[:2]]

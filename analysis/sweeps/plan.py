@@ -9,7 +9,6 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from io import StringIO
 from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,7 +16,6 @@ from zlib import crc32
 
 import numpy as np
 from pydantic import Field, Strict, ValidationError, model_validator
-from ruamel.yaml import YAML
 
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
@@ -29,6 +27,7 @@ from diagrams.loading import (
     set_field,
 )
 from diagrams.own_code import own_files
+from diagrams.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 
@@ -104,7 +103,7 @@ class SweepPlan(Parameters):
                     raise InputError(
                         f"grid.{key}", f"{text} stands there twice; drop one"
                     )
-        total = self.runs * math.prod(len(values) for values in self.grid.values())
+        total = self.runs * self.cell_count
         if total > MOST_RUNS:
             raise InputError(
                 "grid",
@@ -136,6 +135,11 @@ class SweepPlan(Parameters):
     def paths(self) -> list[str]:
         """Dotted paths of all fields that differ between runs."""
         return [path for key in (*self.grid, *self.draw) for path in _paths(key)]
+
+    @property
+    def cell_count(self) -> int:
+        """Number of the grid's cells."""
+        return math.prod(len(values) for values in self.grid.values())
 
     def cells(self) -> list[dict[str, Any]]:
         """The grid's fields in each cell; one cell without fields where it is empty."""
@@ -208,7 +212,7 @@ class SweepPlan(Parameters):
             drawn = dict(self._draws([*entropy, attempt]))
             points = [
                 SweepPoint(
-                    index=run * _count(self.grid) + cell,
+                    index=run * self.cell_count + cell,
                     cell=cell,
                     run=run,
                     seed=seed,
@@ -282,12 +286,8 @@ def load_sweep(path: str | Path) -> SweepPlan:
 
 def dump_plan(plan: SweepPlan) -> str:
     """The plan as YAML, loadable by ``load_sweep``."""
-    yaml = YAML()
-    yaml.default_flow_style = None
-    stream = StringIO()
     document = plan.model_dump(mode="json", exclude_none=True)
-    yaml.dump({**document, "scenario": plan.source}, stream)
-    return stream.getvalue()
+    return dump_yaml({**document, "scenario": plan.source})
 
 
 def _paths(key: str) -> list[str]:
@@ -307,10 +307,6 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
             yield from _texts(key, item)
     elif isinstance(value, str):
         yield key, value
-
-
-def _count(grid: dict[str, tuple[Any, ...]]) -> int:
-    return int(np.prod([len(values) for values in grid.values()], dtype=np.int64))
 
 
 def _check_path(field: str, path: str, earlier: list[str]) -> None:

@@ -11,10 +11,11 @@ import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from analysis.reporting.intervals import Estimate
 from analysis.reporting.palette import draw_grid
 from analysis.sweeps.estimates import (
-    Estimate,
     Quantity,
+    by_cell,
     cell_label,
     ended,
     marginal,
@@ -50,16 +51,18 @@ def plot_heat_maps(
     Returns:
         The picture, a panel for each quantity.
     """
-    cells = plan.cells()
+    runs, cells = by_cell(plan, ended(results)), plan.cells()
+    chosen = [
+        [
+            runs[cells.index({**rest, x: x_value, y: y_value})]
+            for x_value in plan.grid[x]
+        ]
+        for y_value in plan.grid[y]
+    ]
     figure, panels = _panels(results, 3.5)
     for axes, quantity in panels:
-        values = np.full((len(plan.grid[y]), len(plan.grid[x])), np.nan)
-        for row, y_value in enumerate(plan.grid[y]):
-            for column, x_value in enumerate(plan.grid[x]):
-                cell = cells.index({**rest, x: x_value, y: y_value})
-                runs = ended(results[results["cell"] == cell])
-                values[row, column] = quantity.estimate(runs).value
-        _heat_map(axes, quantity, values)
+        values = [[quantity.estimate(each).value for each in row] for row in chosen]
+        _heat_map(axes, quantity, np.array(values))
         _ticks(axes, "x", x, plan.grid[x])
         _ticks(axes, "y", y, plan.grid[y])
     return figure
@@ -100,16 +103,15 @@ def _heat_map(axes: Axes, quantity: Quantity, values: np.ndarray) -> None:
 def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
     labels = [short(value, 16) for value in values]
     turned = side == "x" and max(map(len, labels)) * len(labels) > 40
-    places = axes.set_xticks if side == "x" else axes.set_yticks
-    places(
+    axis = axes.xaxis if side == "x" else axes.yaxis
+    axis.set_ticks(
         range(len(labels)),
         labels,
         fontsize=8,
         rotation=30 if turned else 0,
         ha="right" if turned or side == "y" else "center",
     )
-    name = axes.set_xlabel if side == "x" else axes.set_ylabel
-    name(path, fontsize=9)
+    axis.set_label_text(path, fontsize=9)
 
 
 def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
@@ -125,10 +127,7 @@ def plot_line(plan: SweepPlan, results: pd.DataFrame, x: str) -> Figure:
     """
     figure, panels = _panels(results, 3.0)
     for axes, quantity in panels:
-        estimates = [
-            quantity.estimate(ended(results[results["cell"] == cell]))
-            for cell in range(len(plan.grid[x]))
-        ]
+        estimates = [quantity.estimate(runs) for runs in by_cell(plan, ended(results))]
         places = np.arange(len(estimates), dtype=float)
         _errorbars(axes, places, estimates, COLOURS[0], "")
         _frame(axes, quantity)

@@ -17,25 +17,19 @@ import pandas as pd
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from analysis.reporting.provenance import versions
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.reporting.result_directory import whole_directory
 from analysis.run_error import RunError
-from analysis.sweeps.one_run import Outcome
+from analysis.sweeps.one_run import Outcome, parquet_bytes, results_table
 from analysis.sweeps.plan import SweepPlan, dump_plan
-from analysis.sweeps.table import parquet_bytes, results_table
 from diagrams import dump_scenario
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
 
 __all__ = ["StoreError", "SweepStore", "load_results", "trajectory_path"]
 
-SCHEMA_VERSION = 1
-JOURNAL, TABLE, MANIFEST, PLAN = (
-    "runs.jsonl",
-    "runs.parquet",
-    "sweep.json",
-    "sweep.yaml",
-)
+JOURNAL, TABLE = "runs.jsonl", "runs.parquet"
+MANIFEST, PLAN = "sweep.json", "sweep.yaml"
 
 
 class StoreError(RunError):

@@ -8,24 +8,15 @@ from typing import Any
 
 import pandas as pd
 
-from analysis.reporting.provenance import versions
-from analysis.sweeps.estimates import (
-    QUANTITIES,
-    Estimate,
-    Quantity,
-    cell_label,
-    ended,
-    quantities,
-    shown,
-)
+from analysis.reporting.intervals import Estimate
+from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.sweeps.estimates import QUANTITIES, Quantity, by_cell, ended, figure_table
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.sweep import reproducing_command
 
 __all__ = ["sweep_summary", "sweep_text"]
 
-#: Raised when a key of the document changes its meaning.
-SCHEMA_VERSION = 1
 #: Columns that are no metrics.
 _NO_METRICS = ("index", "cell", "run", "seed", "redraws", "wall_s")
 
@@ -53,8 +44,8 @@ def sweep_summary(
         "runs": len(results),
         "failed": len(failed),
         "cells": [
-            _cell(plan, fields, results[results["cell"] == cell])
-            for cell, fields in enumerate(plan.cells())
+            _cell(plan, fields, runs)
+            for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True)
         ],
         "failures": [
             {
@@ -106,13 +97,10 @@ def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
     Returns:
         Lines without an end of line after the last one.
     """
-    figured = quantities(results)
-    headings = ["cell", "runs", *(quantity.title for quantity in figured)]
-    rows = [headings]
-    for cell, fields in enumerate(plan.cells()):
-        runs = ended(results[results["cell"] == cell])
-        figures = [shown(q, q.estimate(runs)) for q in figured]
-        rows.append([cell_label(fields), str(len(runs)), *figures])
+    titles, cells = figure_table(plan, results)
+    rows = [["cell", "runs", *titles]]
+    for (label, *figures), runs in zip(cells, by_cell(plan, results), strict=True):
+        rows.append([label, str(len(ended(runs))), *figures])
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [
         "  ".join(text.ljust(w) for text, w in zip(row, widths, strict=True)).rstrip()

@@ -214,22 +214,26 @@ def _sighting(
     return pose, np.array([x, y, xx, xy, yy, x_P + dx, y_P + dy, nx, ny, ranged])
 
 
+#: Rules for what the target does between bursts.
+_HOLDS = "motion", "world", "robot"
+
+
 @register_jitable
 def _held_position(
-    hold: str, chosen: Any, likely: Any, pose_heard: Any, pose: Any
+    hold: int, chosen: Any, likely: Any, pose_heard: Any, pose: Any
 ) -> tuple[Any, Any]:
     """x and y of the target in W, by the rule of ``hold``.
 
     Args:
-        hold: See ``TrackerParameters``.
+        hold: Place of the rule in ``_HOLDS``.
         chosen: The chosen track, as it was when last heard.
         likely: The same as it is expected to be now.
         pose_heard: Of the robot at the moment of the last estimate.
         pose: Of the robot now.
     """
-    if hold == "motion":
+    if hold == 0:
         return likely[1], likely[2]
-    if hold == "world":
+    if hold == 1:
         return chosen[1], chosen[2]
     dx, dy = rotate(
         pose[2] - pose_heard[2], chosen[1] - pose_heard[0], chosen[2] - pose_heard[1]
@@ -247,7 +251,8 @@ def _held_covariance(likely: Any, position: Any) -> tuple[Any, Any, Any]:
 class TrackerNumbers(NamedTuple):
     """What the step of ``SourceTracker`` depends on."""
 
-    hold: str
+    hold: int
+    """Place of the rule in ``_HOLDS``."""
     maximum_age_s: float
     past_ticks: int
     """Number of past poses that are remembered."""
@@ -342,7 +347,7 @@ class TrackerModel:
         self._age_ticks = measurement_age_s / tick_s
         self.past_ticks = max(2, math.ceil(self._age_ticks))
         """Number of past poses that a track remembers."""
-        self._hold = tracker.hold
+        self._hold = _HOLDS.index(tracker.hold)
         centre_P = np.mean(robot.microphones_m, axis=0).tolist()
         ahead = ArrayShape.of(robot.microphones_m).ahead
         both = tracker.resolve_front_back and ahead is not None

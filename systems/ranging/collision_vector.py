@@ -154,13 +154,14 @@ def collision_vectors(points, parameters: CollisionVectorParameters, neighbours=
         [(0.0, 0.0) if point is None else point for point in points],
         [point is not None for point in points],
         [*neighbours],
-        parameters.aggregation,
         parameters.pair_separation_m,
+        joined=parameters.aggregation == "paper",
+        every=parameters.aggregation == "sum",
     )
 
 
 @register_jitable
-def _vectors(points, heard, neighbours, aggregation, separation):
+def _vectors(points, heard, neighbours, separation, joined, every):
     """``collision_vectors``; points that are not heard may lie anywhere."""
     nearest = -1
     for k in range(len(points)):
@@ -178,9 +179,9 @@ def _vectors(points, heard, neighbours, aggregation, separation):
         and heard[int(pair[1])]
         and _close(points[int(pair[0])], points[int(pair[1])], separation)
     ]
-    if aggregation == "sum":
+    if every:
         return _all_vectors(points, heard, pairs, found)
-    if aggregation == "paper":
+    if joined:
         # Of the neighbours that are close enough the nearer to P.
         best, least = -1, math.inf
         for index in range(len(pairs)):
@@ -279,7 +280,12 @@ COLLISION_PORTS = (
 class CollisionNumbers(NamedTuple):
     """What the step of ``CollisionVector`` depends on."""
 
-    parameters: CollisionVectorParameters
+    separation_m: float
+    """Echoes farther apart are not joined, m."""
+    joined: bool
+    """Whether the nearest echo is joined with a neighbour."""
+    every: bool
+    """Whether every echo or pair has its own vector."""
     axes: tuple[float, ...]
     """Of the sensors in B, rad."""
     places: tuple[tuple[float, float], ...]
@@ -323,8 +329,9 @@ def collision_step(tick, state, inputs, outputs, numbers):
         points,
         [flag > 0.5 for flag in echo],
         numbers.neighbours,
-        numbers.parameters.aggregation,
-        numbers.parameters.pair_separation_m,
+        numbers.separation_m,
+        numbers.joined,
+        numbers.every,
     )
     fill_slots(vectors, outputs)
 
@@ -389,7 +396,9 @@ def CollisionVector_(T):
             count = self._sensors.count
             past_poses = self._sensors.round_ticks(tick_s) - 1
             numbers = CollisionNumbers(
-                self._parameters,
+                self._parameters.pair_separation_m,
+                self._parameters.aggregation == "paper",
+                self._parameters.aggregation == "sum",
                 self._sensors.axes,
                 self._sensors.places,
                 self._sensors.neighbours,

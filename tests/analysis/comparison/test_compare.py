@@ -10,10 +10,10 @@ import pytest
 from analysis.comparison.compare import (
     EXPERIMENTS,
     comparison_plan,
+    comparison_plans,
     library_layouts,
     prepare_comparison,
 )
-from analysis.comparison.options import comparison_plans
 from analysis.comparison.report import (
     compare_summary,
     compare_text,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.recordings.delay_scale import delay_scale
+from analysis.recordings.channel_order import FrameDelays
+from analysis.recordings.delay_scale import DelayScale, delay_scale
 from systems.sound.array_shape import ArrayShape
 
 METRES_PER_SAMPLE = 340.0 / 16_000.0
@@ -26,21 +27,24 @@ def lags(places, direction, frames=20, noise=0.05, seed=0):
     return exact + each[:, j] - each[:, i]
 
 
+def scale_of(frames, shape) -> DelayScale | None:
+    levels = np.ones((len(frames), shape.count))
+    return delay_scale(FrameDelays(frames, levels, shape, METRES_PER_SAMPLE))
+
+
 @pytest.mark.parametrize("places", [SQUARE, SPACE])
 @pytest.mark.parametrize("direction", [(1, 0, 0.3), (-0.4, 0.9, -0.2), (0, 0, 1)])
 def test_right_size(places, direction):
     shape = ArrayShape.of(places)
-    assert delay_scale(lags(places, direction), shape, METRES_PER_SAMPLE) is None
+    assert scale_of(lags(places, direction), shape) is None
 
 
 @pytest.mark.parametrize(("unit", "times"), [("cm", 100.0), ("inch", 1 / 0.0254)])
 @pytest.mark.parametrize("places", [SQUARE, SPACE])
 def test_positions_in_a_smaller_unit(unit, times, places):
     """A wave along the array takes a hundredth of what it would, or 2.5 %."""
-    found = delay_scale(
-        lags(places, (1, 0.2, 0), noise=0.0),
-        ArrayShape.of(times * places),
-        METRES_PER_SAMPLE,
+    found = scale_of(
+        lags(places, (1, 0.2, 0), noise=0.0), ArrayShape.of(times * places)
     )
     assert found is not None
     assert found.kind == "nothing"
@@ -55,9 +59,7 @@ def test_positions_in_a_larger_unit(times):
     big = 8.0 * SPACE
     u = np.array([1.0, 0.3, 0.2])
     u /= np.linalg.norm(u)
-    found = delay_scale(
-        lags(big, u, noise=0.0), ArrayShape.of(times * big), METRES_PER_SAMPLE
-    )
+    found = scale_of(lags(big, u, noise=0.0), ArrayShape.of(times * big))
     assert found is not None
     assert found.kind == "beyond"
     i, j = np.triu_indices(4, 1)
@@ -72,7 +74,7 @@ def test_source_above_a_plane_says_how_far_it_would_be():
     """1.3 m across, delays of 2 % at most: beyond 1.3 / (8 x 0.02) = 8 m."""
     big = 20.0 * SQUARE
     u = np.array([0.02, 0.0, 1.0])
-    found = delay_scale(lags(big, u, noise=0.0), ArrayShape.of(big), METRES_PER_SAMPLE)
+    found = scale_of(lags(big, u, noise=0.0), ArrayShape.of(big))
     assert found is not None
     assert found.kind == "nothing"
     aperture = np.linalg.norm(big[0] - big[2])
@@ -82,19 +84,17 @@ def test_source_above_a_plane_says_how_far_it_would_be():
 
 def test_delays_that_do_not_agree_say_nothing():
     noise = np.random.default_rng(1).uniform(-9.0, 9.0, (30, 6))
-    assert delay_scale(noise, ArrayShape.of(SQUARE), METRES_PER_SAMPLE) is None
+    assert scale_of(noise, ArrayShape.of(SQUARE)) is None
     few = lags(SQUARE, (1, 0, 0))[:4]
     large = ArrayShape.of(100.0 * SQUARE)
-    assert delay_scale(few, large, METRES_PER_SAMPLE) is None
+    assert scale_of(few, large) is None
 
 
 @pytest.mark.parametrize(("times", "beyond"), [(1 / 1.3, False), (0.5, True)])
 def test_delays_are_impossible_from_half_as_long_again(times, beyond):
     """Of a wave along an edge: echoes and errors make 1.3 times, not 2 times."""
     big = 20.0 * SQUARE
-    found = delay_scale(
-        lags(big, (1, 0, 0), noise=0.0), ArrayShape.of(times * big), METRES_PER_SAMPLE
-    )
+    found = scale_of(lags(big, (1, 0, 0), noise=0.0), ArrayShape.of(times * big))
     assert (found is not None) == beyond
     if found:
         edge = big[0, 0] - big[1, 0]
@@ -106,7 +106,7 @@ def test_delays_are_impossible_from_half_as_long_again(times, beyond):
 def test_no_delay_at_all_is_of_a_quarter_sample_at_least():
     """A front from R is a^2 / 8 R from flat: here a quarter of a sample's way."""
     big = 20.0 * SQUARE
-    found = delay_scale(np.zeros((20, 6)), ArrayShape.of(big), METRES_PER_SAMPLE)
+    found = scale_of(np.zeros((20, 6)), ArrayShape.of(big))
     assert found is not None
     assert (found.kind, found.share) == ("nothing", 0.0)
     aperture = np.linalg.norm(big[0] - big[2])
@@ -122,7 +122,7 @@ def test_frames_that_agree_are_five_and_a_fifth(good, bad, says):
     wrong = np.zeros((bad, 6))
     wrong[:, 5] = 9.0  # microphones 2 and 3 alone, so that the delays do not add up
     frames = np.concatenate((right, wrong))
-    found = delay_scale(frames, ArrayShape.of(20.0 * SQUARE), METRES_PER_SAMPLE)
+    found = scale_of(frames, ArrayShape.of(20.0 * SQUARE))
     assert (found is not None) == says
 
 
@@ -135,7 +135,7 @@ def test_three_quarters_of_the_frames_have_next_to_no_delay(above, nothing):
             lags(big, (1, 0, 0), frames=20 - above, noise=0.0),
         )
     )
-    found = delay_scale(frames, ArrayShape.of(big), METRES_PER_SAMPLE)
+    found = scale_of(frames, ArrayShape.of(big))
     assert (found is not None) == nothing
 
 
@@ -144,7 +144,7 @@ def test_near_microphones_are_too_near_to_tell():
     near = np.array([[1.3, 0.0], [0.0, 1.3], [0.0, 0.0], [0.02, 0.0]])
     frames = np.zeros((20, 6))
     frames[:, [2, 4, 5]] = 0.5  # the last microphone, after each of the others
-    found = delay_scale(frames, ArrayShape.of(near), METRES_PER_SAMPLE)
+    found = scale_of(frames, ArrayShape.of(near))
     assert found is not None
     assert found.kind == "nothing"
     assert found.share == pytest.approx(0.5 * METRES_PER_SAMPLE / 1.3, rel=0.02)

@@ -40,7 +40,6 @@ def sightings(places, late_us=0.0, channel=0, seed=0, count=20, scatter_s=NOISE_
                 tau=arrivals[1:] - arrivals[0],
                 covariance=NOISE_S**2 * (np.eye(n - 1) + 1.0),
                 coherence=0.9,
-                response=0.8,
             )
         )
     return found

@@ -8,10 +8,9 @@ import signal
 import pandas as pd
 import pytest
 
-from analysis.sweeps.one_run import Task, run_task
+from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import run_sweep
-from analysis.sweeps.table import results_table
 
 distributed = pytest.importorskip("distributed")
 
