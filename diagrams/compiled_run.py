@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
-from numba.core.errors import TypingError
+from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from diagrams.robot import Parts
@@ -93,11 +93,14 @@ class CompiledLoop:
             self.done, found, touched = self._function(
                 self.done, end, self.log, self._judged, *self._arguments
             )
-        except TypingError as error:
+        except (NumbaError, NotImplementedError, ValueError) as error:
+            law = self.rules.scenario.law
+            if ":" not in law:
+                raise
             raise InputError(
                 "engine",
-                f"numba cannot compile law {self.rules.scenario.law!r} "
-                f"({_last_line(error)}); run with engine drake",
+                f"numba cannot compile law {law!r} ({_last_line(error)}); run with "
+                "engine drake",
             ) from None
         if not np.isfinite(self.log[self.done - 1]).all():
             raise InputError(
@@ -159,7 +162,7 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
         _ORDERS[scenario.integrator.scheme],
         scenario.integrator.step_s,
     )
-    times = np.arange(ticks + 1) * scenario.tick_s
+    times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
     tables = _world(scenario, times)
     widths = {name: table.shape[1] for name, table in tables.items()}
     signals = _Signals(parts.blocks, widths)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any
@@ -28,6 +29,7 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
         raises InputError.
     """
 
+    @functools.wraps(law)
     def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
         try:
             force = law(c, s, repulsion)

@@ -8,6 +8,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
@@ -126,7 +127,7 @@ def _run_compiled(
             progress(loop.time_s)
     wall_s = perf_counter() - start
     log = loop.log[: loop.done]
-    times = np.arange(loop.done) * scenario.tick_s
+    times: NDArray[np.float64] = np.arange(float(loop.done)) * scenario.tick_s
     columns = logged_columns(parts, times, np.ascontiguousarray(log.T))
     return gather_result(scenario, {name: rules}, {name: columns}, wall_s, "compiled")
 

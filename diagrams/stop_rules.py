@@ -161,7 +161,15 @@ FOUND = ("", "diverged", "reached", "lost", "stuck")
 UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
 
 
-def judge_tick(time, state, pose, velocity, p_WS, valid, numbers):
+def judge_tick(
+    time: float,
+    state: Any,
+    pose: Any,
+    velocity: Any,
+    p_WS: Any,
+    valid: bool,  # noqa: FBT001  # compiled code has no keywords
+    numbers: RuleNumbers,
+) -> int:
     """Why a run ends at a tick, contacts apart.
 
     Args:

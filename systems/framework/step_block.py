@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from functools import cache, cached_property
@@ -68,8 +69,13 @@ def _tuple_type(model: type[Parameters]) -> Any:
 
 @cache
 def as_compiled(function: Any) -> Any:
-    """A function for compiled code; what is compiled already stays as it is."""
-    return njit(function) if isinstance(function, FunctionType) else function
+    """A function for compiled code, without what checks it for Drake's sake.
+
+    What is compiled already stays as it is.
+    """
+    if isinstance(function, FunctionType):
+        return njit(inspect.unwrap(function))
+    return function
 
 
 def compiled_numbers(value: Any) -> Any:
@@ -77,7 +83,8 @@ def compiled_numbers(value: Any) -> Any:
 
     Args:
         value: Parameters become named tuples of their fields and of what they derive
-            from them, functions compiled ones, lists arrays; what is unset becomes 0.
+            from them, functions compiled ones, lists arrays (an empty one is of
+            pairs); what is unset becomes 0.
 
     Returns:
         The same, of types that numba knows.
@@ -91,7 +98,7 @@ def compiled_numbers(value: Any) -> Any:
     if isinstance(value, FunctionType):
         return as_compiled(value)
     if isinstance(value, list):
-        return np.array(value)
+        return np.array(value) if value else np.empty((0, 2))
     return 0.0 if value is None else value
 
 

@@ -76,7 +76,7 @@ def disturbed(x, y, numbers, hearing):
     """
     bearing = math.atan2(y, x) + numbers[0] * math.radians(hearing.bearing_noise_deg)
     factor = 1.0 + numbers[1] * hearing.range_noise_fraction
-    distance = math.hypot(x, y) * max(factor, 0.0)
+    distance = math.sqrt(x * x + y * y) * max(factor, 0.0)
     return distance * math.cos(bearing), distance * math.sin(bearing)
 
 

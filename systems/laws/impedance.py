@@ -204,7 +204,8 @@ def impedance_step(tick, state, inputs, outputs, numbers):
             fx, fy = _push(C_W, s, numbers.law, numbers.arguments)
             Fx, Fy = Fx + fx, Fy + fy
             speeds[seen] = s
-            now[3 * seen], now[3 * seen + 1], now[3 * seen + 2] = features[k], *C_W
+            now[3 * seen] = features[k]
+            now[3 * seen + 1], now[3 * seen + 2] = C_W[0], C_W[1]
             seen += 1
     acceleration[0] = (F_m[0] + Fx) / numbers.mass_kg
     acceleration[1] = (F_m[1] + Fy) / numbers.mass_kg

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Any, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
@@ -286,12 +286,12 @@ class CollisionNumbers(NamedTuple):
     """Whether the nearest echo is joined with a neighbour."""
     every: bool
     """Whether every echo or pair has its own vector."""
-    axes: tuple[float, ...]
+    axes: list[float]
     """Of the sensors in B, rad."""
-    places: tuple[tuple[float, float], ...]
+    places: list[tuple[float, float]]
     """Of the sensors from P, m."""
-    neighbours: Any
-    """(n, 2) pairs of sensors."""
+    neighbours: list[tuple[int, int]]
+    """Pairs of sensors."""
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
@@ -399,9 +399,9 @@ def CollisionVector_(T):
                 self._parameters.pair_separation_m,
                 self._parameters.aggregation == "paper",
                 self._parameters.aggregation == "sum",
-                self._sensors.axes,
-                self._sensors.places,
-                self._sensors.neighbours,
+                [*self._sensors.axes],
+                [*self._sensors.places],
+                [*self._sensors.neighbours],
                 self._robot.control_point_m,
                 tick_s,
             )

@@ -153,10 +153,10 @@ def IdealObstacleSensor_(T):
                 check_finite(f"IdealObstacleSensor: {name}", self._config[name])
             self.set_name("ideal_obstacle_sensor")
             numbers = ObstacleNumbers(
-                self._config["robot"].control_point_m,
+                (robot or RobotParameters()).control_point_m,
                 maximum_range_m,
                 SLOTS if all_bodies else 1,
-                tuple(source_size),
+                source_size,
             )
             self._declare_step(
                 T,

@@ -1,0 +1,102 @@
+"""The compiled loop is Drake's run: same cause, same tick, places within 1e-9 m."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from diagrams import build_sound_follower, load_scenario, simulate
+from systems.framework.input_error import InputError
+
+OWN_LAW = """
+from pydrake.math import exp
+
+
+def gaussian(c, s, repulsion):
+    return 6.0 * exp(-c * c / repulsion.active.alpha_m) + 0.5 * s
+
+
+def wordy(c, s, repulsion):
+    return 1.0 / float(str(c))
+"""
+
+
+@pytest.fixture(scope="module")
+def own_law(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("laws") / "own_law.py"
+    file.write_text(OWN_LAW, encoding="utf-8")
+    return file
+
+
+def both(name, *overrides):
+    scenario = load_scenario(name, ["hearing=ideal", *overrides])
+    follower = build_sound_follower(scenario, log=True)
+    return (
+        simulate(scenario, follower=follower, engine=engine)
+        for engine in ("drake", "compiled")
+    )
+
+
+def assert_same(name, *overrides):
+    drake, compiled = both(name, *overrides)
+    assert (drake.engine, compiled.engine) == ("drake", "compiled")
+    assert compiled.cause == drake.cause
+    assert compiled.collision == drake.collision
+    assert compiled.columns.keys() == drake.columns.keys()
+    np.testing.assert_array_equal(compiled.time, drake.time)
+    for column, values in drake.columns.items():
+        # Speeds are differences of places over a tick.
+        atol = 1e-6 if "speed" in column else 1e-9
+        np.testing.assert_allclose(
+            compiled.columns[column], values, rtol=0.0, atol=atol, err_msg=column
+        )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("default", ()),
+        ("two_static_obstacles", ("seed=2",)),
+        ("one_moving_obstacle", ("ultrasonic.dropout_probability=0.1",)),
+        ("two_moving_obstacles", ("ultrasonic.firing=sequential",)),
+        ("corridor", ("tick_s=0.0125", "microphones.frame_s=0.05")),
+        ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
+        ("wall", ("integrator.scheme=runge_kutta2", "integrator.step_s=0.01")),
+        ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
+        ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
+        ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
+    ],
+)
+def test_runs_are_those_of_drake(name, overrides):
+    assert_same(name, *overrides)
+
+
+@pytest.mark.slow
+def test_a_users_law_on_wheels_that_slip(own_law):
+    law = f"law={own_law}:gaussian"
+    slip = "plant.friction=0.05", "obstacle_sensing=ideal"
+    assert_same("one_moving_obstacle", law, *slip)
+
+
+@pytest.mark.slow
+def test_a_law_that_numba_cannot_compile_is_named(own_law):
+    law = f"law={own_law}:wordy"
+    with pytest.raises(InputError, match=r"engine: numba cannot compile law .*drake"):
+        list(both("default", law, "duration_s=0.1"))
+
+
+@pytest.mark.parametrize(
+    ("name", "override", "reason"),
+    [
+        ("default", "hearing=audio", "sound waves are not compiled"),
+        ("two_followers", "duration_s=1", "one robot and one source"),
+        ("default", "integrator.scheme=runge_kutta5", "integrate with runge_kutta2 or"),
+    ],
+)
+def test_what_has_no_compiled_loop_is_refused(name, override, reason):
+    scenario = load_scenario(name, ["hearing=ideal", override, "engine=compiled"])
+    with pytest.raises(InputError, match=f"engine: .*{reason}"):
+        simulate(scenario)
