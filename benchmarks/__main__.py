@@ -12,6 +12,7 @@ from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from benchmarks.hearing import frame_figures
 from benchmarks.memory import memory_growth_mb
 from benchmarks.speed import (
+    compiled_speed,
     overhead_of_a_run,
     overhead_of_the_diagram,
     real_time_factor,
@@ -39,6 +40,7 @@ def main() -> int:
                 "<=",
                 1.5,
             ),
+            Figure("compiled loop, times Drake", compiled_speed(), ">=", 30.0),
             Figure("memory, minute 1 to 10, MB", memory_growth_mb(), "<=", 20.0),
             *frame_figures(),
         ]

@@ -52,8 +52,6 @@ def why_not_compiled(scenario: Scenario) -> str:
         return "compiled loops are of one robot and one source; leave out the others"
     if scenario.hearing != "ideal":
         return "sound waves are not compiled; set hearing to ideal"
-    if scenario.blocks:
-        return "blocks of a user's own are not compiled; leave out blocks"
     if scenario.integrator.scheme not in _ORDERS:
         return f"compiled loops integrate with {' or '.join(_ORDERS)}; set that scheme"
     return ""
@@ -149,8 +147,8 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
         The loop, before its first tick.
 
     Raises:
-        InputError: The scenario has none (``why_not_compiled``), or numba cannot
-            compile its law.
+        InputError: The scenario has none (``why_not_compiled``), or a block of a
+            user's own has no step.
     """
     if reason := why_not_compiled(scenario):
         raise InputError("engine", reason)
@@ -166,7 +164,7 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
     tables = _world(scenario, times)
     widths = {name: table.shape[1] for name, table in tables.items()}
     signals = _Signals(parts.blocks, widths)
-    steps = {part: block.step_for(run) for part, block in parts.blocks.items()}
+    steps = {part: _step_for(block, run) for part, block in parts.blocks.items()}
     order = _order(parts.blocks, steps, set(tables))
     logged = [signals.places[port] for _, port in parts.logged]
     columns = np.concatenate([np.arange(place.start, place.stop) for place in logged])
@@ -196,6 +194,17 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
         _function=_loop(tuple(steps[part][::3] for part in order)),
         _arguments=arguments,
     )
+
+
+def _step_for(block: Any, run: RunFacts) -> Step:
+    if not hasattr(block, "step_for"):
+        raise InputError(
+            "engine",
+            f"{block.get_name()} has no method step_for, by which it would join a "
+            "compiled loop; give it one, or run with engine drake",
+        )
+    step: Step = block.step_for(run)
+    return step
 
 
 class _Contacts(NamedTuple):

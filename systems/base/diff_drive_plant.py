@@ -284,7 +284,7 @@ def plant_step(tick, state, inputs, outputs, numbers):
         time += h
 
 
-def publish_plant(state, outputs, numbers):
+def _publish_plant(state, outputs, numbers):
     """The outputs of ``plant_step``'s state."""
     pose, velocity, angles, slip = outputs
     found = _velocities(state, numbers)
@@ -429,7 +429,7 @@ def DiffDrivePlant_(T):
             )
             at_rest = [0.0] * (7 if self._plant.friction is not None else 4)
             state = [*self._initial_pose, *at_rest]
-            return Step(plant_step, numbers, state, publish_plant)
+            return Step(plant_step, numbers, state, _publish_plant)
 
         def _slip(self, context, output):
             state = self._state(context).tolist()

@@ -178,7 +178,7 @@ def WheelOdometry_(T):
             if self._odometry.rounding:
                 pulses = self._odometry.pulses_per_revolution
             numbers = OdometryNumbers(self._robot, pulses, tick_s)
-            self._declare_step(
+            self.declare_step(
                 T,
                 Step(odometry_step, numbers, [*self._initial_pose, 0.0, 0.0]),
                 (("wheel_angles", 2),),

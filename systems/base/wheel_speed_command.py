@@ -160,7 +160,7 @@ def command_step(tick, state, inputs, outputs, numbers):
     state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
 
 
-def publish_command(state, outputs, numbers):
+def _publish_command(state, outputs, numbers):
     """The outputs of ``command_step``'s state."""
     wheel_speeds, v_WP = outputs
     wheel_speeds[0], wheel_speeds[1] = state[2], state[3]
@@ -201,7 +201,7 @@ class _WheelCommand:
         self._tick_s = tick_s
         self._robot = robot or RobotParameters()
         numbers = CommandNumbers(velocity, self._robot, tick_s)
-        self.step = Step(command_step, numbers, [0.0] * 4, publish_command)
+        self.step = Step(command_step, numbers, [0.0] * 4, _publish_command)
         self.set_name(name)
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)

@@ -109,7 +109,7 @@ class StepBlock:
     the present inputs.
     """
 
-    def _declare_step(
+    def declare_step(
         self: Any,
         scalar: Any,
         done: Step,

@@ -143,7 +143,7 @@ def ideal_source_step(tick, state, inputs, outputs, numbers):
         state[0], state[1], state[2] = x, y, 1.0
 
 
-def publish_ideal_source(state, outputs, numbers):
+def _publish_ideal_source(state, outputs, numbers):
     """The outputs of ``ideal_source_step``'s state."""
     bearing, distance, p_PS_B, covariance, detected, range_valid = outputs
     x, y = state[0], state[1]
@@ -309,7 +309,7 @@ def IdealSourceSensor_(T):
                 sounds,
                 noise,
             )
-            return Step(ideal_source_step, numbers, [0.0] * 3, publish_ideal_source)
+            return Step(ideal_source_step, numbers, [0.0] * 3, _publish_ideal_source)
 
         def _bearing(self, context, output):
             x, y = self._state(context)

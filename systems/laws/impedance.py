@@ -275,7 +275,7 @@ class ImpedanceLoop(StepBlock):
             "tick_s": tick_s,
         }
         self.set_name(name)
-        self._declare_step(
+        self.declare_step(
             scalar,
             Step(
                 impedance_step,

@@ -405,7 +405,7 @@ def CollisionVector_(T):
                 self._robot.control_point_m,
                 tick_s,
             )
-            self._declare_step(
+            self.declare_step(
                 T,
                 Step(collision_step, numbers, [*self._initial_pose] * past_poses),
                 (

@@ -158,7 +158,7 @@ def IdealObstacleSensor_(T):
                 SLOTS if all_bodies else 1,
                 source_size,
             )
-            self._declare_step(
+            self.declare_step(
                 T,
                 Step(ideal_obstacle_step, numbers),
                 (

@@ -22,6 +22,39 @@ def wordy(c, s, repulsion):
     return 1.0 / float(str(c))
 """
 
+OWN_BLOCKS = """
+import math
+
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.step_block import Step, StepBlock
+
+
+def speed_step(tick, state, inputs, outputs, numbers):
+    (velocity,), (mean,) = inputs, outputs
+    state[0] += numbers[0] * (math.sqrt(velocity[0] ** 2 + velocity[1] ** 2) - state[0])
+    mean[0] = state[0]
+
+
+class Speedometer(LeafSystem, StepBlock):
+    FACTS = BlockFacts("speedometer", "robot", columns={"mean": ("mean_speed",)})
+
+    def __init__(self, tick_s):
+        super().__init__()
+        self.set_name("speedometer")
+        step = Step(speed_step, (tick_s / 0.5,), [0.0])
+        self.declare_step(float, step, [("velocity_WB", 3)], [("mean", 1)], tick_s)
+
+
+class Stepless(LeafSystem):
+    FACTS = BlockFacts("stepless", "robot")
+
+    def __init__(self):
+        super().__init__()
+        self.set_name("stepless")
+"""
+
 
 @pytest.fixture(scope="module")
 def own_law(tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -79,6 +112,28 @@ def test_a_users_law_on_wheels_that_slip(own_law):
     law = f"law={own_law}:gaussian"
     slip = "plant.friction=0.05", "obstacle_sensing=ideal"
     assert_same("one_moving_obstacle", law, *slip)
+
+
+@pytest.fixture
+def own_blocks(tmp_path: Path) -> Path:
+    file = tmp_path / "own_blocks.py"
+    file.write_text(OWN_BLOCKS, encoding="utf-8")
+    return file
+
+
+@pytest.mark.slow
+def test_a_users_block_joins_by_its_step(own_blocks):
+    block = f"blocks=[{own_blocks}:Speedometer]"
+    drake, compiled = both("default", block, "duration_s=5")
+    mean = drake.columns["mean_speed"]
+    assert mean.max() > 0.3
+    np.testing.assert_allclose(compiled.columns["mean_speed"], mean, atol=1e-9)
+
+
+def test_a_users_block_without_a_step_is_named(own_blocks):
+    block = f"blocks=[{own_blocks}:Stepless]"
+    with pytest.raises(InputError, match=r"engine: stepless has no method step_for"):
+        list(both("default", block, "duration_s=0.1"))
 
 
 @pytest.mark.slow
