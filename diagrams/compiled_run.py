@@ -80,26 +80,35 @@ class CompiledLoop:
         """Of the last tick that is logged, s."""
         return (self.done - 1) * self.tick_s
 
-    def advance(self, ticks: int) -> None:
-        """Goes on for so many ticks, to the end of the run at most.
+    def prepare(self) -> None:
+        """Compiles the loop, where the process has not done so for its kind.
 
         Raises:
-            ValueError: A value became NaN or infinite.
+            InputError: numba cannot compile the law of a user's own.
         """
-        end = min(self.done + ticks, len(self.log))
         try:
-            self.done, found, touched = self._function(
-                self.done, end, self.log, self._judged, *self._arguments
-            )
+            self._function(1, 1, self.log, self._judged, *self._arguments)
+        # What numba raises depends on what it does not know.
         except (NumbaError, NotImplementedError, ValueError) as error:
             law = self.rules.scenario.law
             if ":" not in law:
                 raise
             raise InputError(
                 "engine",
-                f"numba cannot compile law {law!r} ({_last_line(error)}); run with "
+                f"numba cannot compile law {law!r} ({_complaint(error)}); run with "
                 "engine drake",
             ) from None
+
+    def advance(self, ticks: int) -> None:
+        """Goes on for so many ticks, to the end of the run at most.
+
+        Raises:
+            InputError: A value became NaN or infinite.
+        """
+        end = min(self.done + ticks, len(self.log))
+        self.done, found, touched = self._function(
+            self.done, end, self.log, self._judged, *self._arguments
+        )
         if not np.isfinite(self.log[self.done - 1]).all():
             raise InputError(
                 "engine",
@@ -126,13 +135,12 @@ class CompiledLoop:
         )
 
 
-def _last_line(error: Exception) -> str:
+def _complaint(error: Exception) -> str:
     """What numba complains of, without the way there."""
-    lines = [line.strip() for line in str(error).splitlines()]
-    known = [
-        line for line in lines if line and not line.startswith(("During", "raised"))
-    ]
-    return shortened(next(line for line in known if "Failed in" not in line), 120)
+    lines = (line.strip() for line in str(error).splitlines())
+    around = "During", "raised", "Failed in"
+    known = (line for line in lines if line and not line.startswith(around))
+    return shortened(next(known, type(error).__name__), 120)
 
 
 def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> CompiledLoop:

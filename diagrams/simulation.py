@@ -74,7 +74,7 @@ def simulate(
     Raises:
         InputError: The law is not known.
         InputError: The sound file cannot be played, or a value became NaN.
-        InputError: The scenario cannot be compiled (``why_not_compiled``).
+        InputError: The scenario or its law cannot be compiled (``why_not_compiled``).
     """
     engine = engine or scenario.engine
     if engine == "compiled" and (reason := why_not_compiled(scenario)):
@@ -119,6 +119,7 @@ def _run_compiled(
     ((name, parts),) = follower.robots.items()
     rules = RobotRules(scenario, scenario.surroundings(), parts)
     loop = compile_loop(scenario, parts, rules)
+    loop.prepare()
     start = perf_counter()
     ticks_a_second = max(1, round(1.0 / scenario.tick_s))
     while not loop.over:

@@ -30,6 +30,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
         "scenario": result.full_scenario.name,
         "law": result.full_scenario.law,
         "seed": result.full_scenario.seed,
+        "engine": result.engine,
         **_outcome(result),
         "metrics": run_metrics(result),
         "timing": {

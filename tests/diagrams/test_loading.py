@@ -97,7 +97,7 @@ def test_one_of_everything_runs(tmp_path):
         for name in Scenario.model_fields
         if getattr(scenario, name) == Scenario.model_fields[name].default
     }
-    assert untouched == {"blocks", "sound", "microphones", "tdoa"}
+    assert untouched == {"blocks", "engine", "sound", "microphones", "tdoa"}
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 
 
