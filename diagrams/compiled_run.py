@@ -23,6 +23,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from diagrams.robot import Parts
+from diagrams.run_parameters import COMPILED_ORDERS
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import (
     BETWEEN_TICKS,
@@ -40,21 +41,7 @@ from systems.framework.step_block import (
 )
 from systems.world.geometry import rectangle_clearance
 
-__all__ = ["CompiledLoop", "compile_loop", "why_not_compiled"]
-
-#: What compiled loops integrate with, and its order.
-_ORDERS = {"runge_kutta2": 2, "runge_kutta3": 3}
-
-
-def why_not_compiled(scenario: Scenario) -> str:
-    """Why a scenario has no compiled loop, with the remedy; empty where it has one."""
-    if scenario.robots or scenario.sources:
-        return "compiled loops are of one robot and one source; leave out the others"
-    if scenario.hearing != "ideal":
-        return "sound waves are not compiled; set hearing to ideal"
-    if scenario.integrator.scheme not in _ORDERS:
-        return f"compiled loops integrate with {' or '.join(_ORDERS)}; set that scheme"
-    return ""
+__all__ = ["CompiledLoop", "compile_loop"]
 
 
 @dataclass
@@ -155,17 +142,16 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
         The loop, before its first tick.
 
     Raises:
-        InputError: The scenario has none (``why_not_compiled``), or a block of a
-            user's own has no step.
+        InputError: The scenario has none (``Scenario.require_compilable``), or a
+            block of a user's own has no step.
     """
-    if reason := why_not_compiled(scenario):
-        raise InputError("engine", reason)
+    scenario.require_compilable()
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     run = RunFacts(
         ticks,
         scenario.tick_s,
         scenario.start.pose,
-        _ORDERS[scenario.integrator.scheme],
+        COMPILED_ORDERS[scenario.integrator.scheme],
         scenario.integrator.step_s,
     )
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s

@@ -22,7 +22,16 @@ from systems.sound.room import RoomParameters
 from systems.sound.waveforms import SoundParameters
 from systems.world.obstacles import ObstacleParameters
 
-__all__ = ["Engine", "IntegratorParameters", "RunParameters", "StopParameters"]
+__all__ = [
+    "COMPILED_ORDERS",
+    "Engine",
+    "IntegratorParameters",
+    "RunParameters",
+    "StopParameters",
+]
+
+#: What compiled loops integrate with, and its order.
+COMPILED_ORDERS = {"runge_kutta2": 2, "runge_kutta3": 3}
 
 #: What carries a run out.
 Engine = Literal["drake", "compiled"]

@@ -23,7 +23,7 @@ from diagrams.bodies import (
 )
 from diagrams.explain import explain
 from diagrams.participants import FollowerParameters, SourceParameters, joined
-from diagrams.run_parameters import RunParameters
+from diagrams.run_parameters import COMPILED_ORDERS, RunParameters
 from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
@@ -148,6 +148,29 @@ class Scenario(FollowerParameters, RunParameters):
                     f"is {period:g} s, but {purpose} is of one rate; set it to tick_s, "
                     f"{self.tick_s:g} s",
                 )
+
+    def require_compilable(self) -> None:
+        """Refuses what has no compiled loop.
+
+        Raises:
+            InputError: Says why, and what to do.
+        """
+        reason = ""
+        if self.robots or self.sources:
+            reason = "compiled loops are of one robot and one source; leave out others"
+        elif self.hearing != "ideal":
+            reason = "sound waves are not compiled; set hearing to ideal"
+        elif self.integrator.scheme not in COMPILED_ORDERS:
+            schemes = " or ".join(COMPILED_ORDERS)
+            reason = f"compiled loops integrate with {schemes}; set that scheme"
+        if reason:
+            raise InputError("engine", reason)
+
+    @model_validator(mode="after")
+    def _check_engine(self) -> Scenario:
+        if self.engine == "compiled":
+            self.require_compilable()
+        return self
 
     def surroundings(
         self, robot: str = "", paths: Mapping[str, Path] | None = None

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.compiled_run import compile_loop, why_not_compiled
+from diagrams.compiled_run import compile_loop
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import Scenario
@@ -74,11 +74,11 @@ def simulate(
     Raises:
         InputError: The law is not known.
         InputError: The sound file cannot be played, or a value became NaN.
-        InputError: The scenario or its law cannot be compiled (``why_not_compiled``).
+        InputError: The scenario or its law cannot be compiled.
     """
     engine = engine or scenario.engine
-    if engine == "compiled" and (reason := why_not_compiled(scenario)):
-        raise InputError("engine", reason)
+    if engine == "compiled":
+        scenario.require_compilable()
     follower = follower or build_sound_follower(scenario, log=True)
     logs = [parts.log for parts in follower.robots.values()]
     if follower.scenario != scenario or None in logs:

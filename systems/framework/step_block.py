@@ -136,7 +136,7 @@ class StepBlock:
             self.DeclareVectorInputPort(name=name, size=size) for name, size in inputs
         ]
         self._read = [port for port in self._inputs if port.get_name() not in unread]
-        sources = {port.ticket() for port in self._read}
+        sources = {port.ticket() for port in self._read} | {self.time_ticket()}
         if done.state:
             self.DeclareDiscreteState([scalar(x) for x in done.state])
             self.DeclarePeriodicDiscreteUpdateEvent(

@@ -382,7 +382,8 @@ class TrackerModel:
         Returns:
             A new track; an outlier leaves the pose of the last believed one.
         """
-        poses = np.vstack((pose, track.past_poses))
+        poses = np.empty_like(track.past_poses, shape=(self.past_ticks + 1, 3))
+        poses[0], poses[1:] = pose, track.past_poses
         p_PS_B, covariance, ranged = estimate
         memory = track.memory.copy()
         measured = p_PS_B, covariance, float(ranged)
@@ -404,7 +405,8 @@ class TrackerModel:
             A new track, older by a tick.
         """
         memory = track.memory + self._tick
-        past_poses = np.vstack((pose, track.past_poses[:-1]))
+        past_poses = np.empty_like(track.past_poses)
+        past_poses[0], past_poses[1:] = pose, track.past_poses[:-1]
         return Track(past_poses, track.pose_heard, memory)
 
     def position(self, track: Track, pose: Any) -> Any:

@@ -152,6 +152,9 @@ def test_a_law_that_numba_cannot_compile_is_named(own_law):
     ],
 )
 def test_what_has_no_compiled_loop_is_refused(name, override, reason):
-    scenario = load_scenario(name, ["hearing=ideal", override, "engine=compiled"])
+    overrides = ["hearing=ideal", override]
+    scenario = load_scenario(name, overrides)
     with pytest.raises(InputError, match=f"engine: .*{reason}"):
-        simulate(scenario)
+        simulate(scenario, engine="compiled")
+    with pytest.raises(InputError, match=f"engine: .*{reason}"):
+        load_scenario(name, [*overrides, "engine=compiled"])
