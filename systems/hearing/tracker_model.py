@@ -266,10 +266,10 @@ class TrackerNumbers(NamedTuple):
     """By what the filter's memory grows in a tick."""
 
 
-@njit(cache=True)
+# Not compiled by itself: a cached function does not notice changes in other files.
 def track_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrackerNumbers
-) -> None:  # pragma: no cover  (compiled)
+) -> None:
     """The target of one tick; see ``systems.framework.step_block.Step``.
 
     Args:

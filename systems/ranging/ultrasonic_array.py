@@ -168,6 +168,19 @@ class UltrasonicParameters(Parameters):
         rounds = self.count if self.firing == "sequential" else 1
         return rounds * self.period_ticks(tick_s)
 
+    def errors(self, sound_speed: float) -> tuple[float, float, float, float, float]:
+        """Stretch of the ranges, noise, m, least luck, least and greatest range, m.
+
+        Args:
+            sound_speed: True speed of sound, m/s.
+
+        Returns:
+            As ``_measured_ranges`` takes them.
+        """
+        stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
+        limits = self.minimum_range_m, self.maximum_range_m
+        return stretch, self.noise_m, self.least_luck, *limits
+
     @cached_property
     def least_luck(self) -> float:
         """Standard normal numbers below this drop an echo."""
@@ -246,10 +259,7 @@ def measured_ranges(
         (n,) ranges in [minimum, maximum], m, and (n,) echoes, 0 or 1. Without
         an echo the range is finite and means nothing.
     """
-    stretch = (parameters.assumed_sound_speed_m_s or sound_speed) / sound_speed
-    limits = parameters.minimum_range_m, parameters.maximum_range_m
-    errors = stretch, parameters.noise_m, parameters.least_luck
-    return _measured_ranges(true_ranges, numbers, *errors, *limits)
+    return _measured_ranges(true_ranges, numbers, *parameters.errors(sound_speed))
 
 
 @njit(cache=True)
@@ -287,8 +297,7 @@ class UltrasonicNumbers(NamedTuple):
     source_size: tuple[float, float]
     """Length and width of the master robot, m."""
     errors: tuple[float, float, float, float, float]
-    """Stretch of the ranges, noise, m, luck below which echoes are lost, least and
-    greatest range, m."""
+    """See ``UltrasonicParameters.errors``."""
     noise: TickNoise
     turns: NDArray[np.int64]
     """(n,) ticks into the round at which each sensor fires."""
@@ -297,10 +306,10 @@ class UltrasonicNumbers(NamedTuple):
     tick_s: float
 
 
-@njit(cache=True)
+# Not compiled by itself: a cached function does not notice changes in other files.
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
-) -> None:  # pragma: no cover  (compiled)
+) -> None:
     """Ranges of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
@@ -426,19 +435,12 @@ class UltrasonicArray(LeafSystem):
 
     def _numbers(self, seed: int) -> UltrasonicNumbers:
         sensors = self._parameters
-        believed = sensors.assumed_sound_speed_m_s or self._sound_speed
         turns = np.arange(sensors.count) * sensors.period_ticks(self._tick_s)
         return UltrasonicNumbers(
             *sensors.beams,
             self._control_point,
             self._source_size,
-            (
-                believed / self._sound_speed,
-                sensors.noise_m,
-                sensors.least_luck,
-                sensors.minimum_range_m,
-                sensors.maximum_range_m,
-            ),
+            sensors.errors(self._sound_speed),
             tick_noise(seed),
             turns if sensors.firing == "sequential" else 0 * turns,
             self._round,
