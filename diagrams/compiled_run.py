@@ -6,42 +6,32 @@ same random numbers; what it logs is what the diagram logs.
 
 In a tick, as Drake has it: blocks whose outputs are state have published them; all
 others do their steps, each after those whose outputs it reads; the row is logged; then
-the blocks with state outputs do theirs, and the plant moves on by a tick.
+the blocks with state outputs do theirs, and the plants move on by a tick.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from typing import Any, NamedTuple
+from functools import partial
+from typing import Any
 
 import numpy as np
 from numba import njit
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
-from diagrams.robot import Parts
+from diagrams.bodies import Surroundings
+from diagrams.compiled_judge import contacts_of, judge_all
+from diagrams.compiled_source import PACKED, Packing, compiled_from
+from diagrams.robot import columns_of, require_published, robot_blocks, seed_of
 from diagrams.run_parameters import COMPILED_ORDERS
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import (
-    BETWEEN_TICKS,
-    UNJUDGED,
-    JudgedTick,
-    RobotRules,
-    judge_tick,
-)
+from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
 from systems.framework.input_error import InputError, shortened
-from systems.framework.step_block import (
-    RunFacts,
-    Step,
-    as_compiled,
-    compiled_numbers,
-)
-from systems.world.geometry import rectangle_clearance
+from systems.framework.step_block import RunFacts, Step
 
-__all__ = ["CompiledLoop", "compile_loop"]
+__all__ = ["CompiledLoop", "compile_loop", "shared_blocks"]
 
 
 @dataclass
@@ -49,42 +39,72 @@ class CompiledLoop:
     """A run that goes on tick by tick, in compiled code."""
 
     log: NDArray[np.float64]
-    """(ticks + 1, columns) what the diagram logs, as far as the run has come."""
+    """(ticks + 1, columns) what all robots log, as far as the run has come."""
     tick_s: float
-    rules: RobotRules
+    rules: RunRules
     """Know why it ended, once it has."""
+    columns: Mapping[str, Mapping[str, int]]
+    """Of each robot its columns of the log, by name."""
     over: bool = False
     """Whether the run has ended."""
     done: int = 0
     """Ticks that are logged."""
-    _judged: NDArray[np.float64] = field(default_factory=lambda: np.array(UNJUDGED))
-    _columns: Sequence[str] = ()
+    _judged: NDArray[np.float64] = field(init=False)
+    _ended: NDArray[np.int64] = field(init=False)
     _function: Any = None
     _arguments: tuple[Any, ...] = ()
+
+    def __post_init__(self) -> None:
+        robots = len(self.rules.robots)
+        self._judged = np.tile(np.array(UNJUDGED), (robots, 1))
+        self._ended = np.zeros((robots, 2), dtype=np.int64)
 
     @property
     def time_s(self) -> float:
         """Of the last tick that is logged, s."""
         return (self.done - 1) * self.tick_s
 
+    def logged(self, robot: str) -> dict[str, NDArray[np.float64]]:
+        """A robot's columns, and the time.
+
+        Args:
+            robot: Its name.
+
+        Returns:
+            (ticks,) each, by name.
+        """
+        log = np.ascontiguousarray(self.log[: self.done].T)
+        times: NDArray[np.float64] = np.arange(float(self.done)) * self.tick_s
+        return {"t": times, **{n: log[k] for n, k in self.columns[robot].items()}}
+
     def prepare(self) -> None:
-        """Compiles the loop, where the process has not done so for its kind.
+        """Compiles the loop or loads it, where the process has not done so.
 
         Raises:
-            InputError: numba cannot compile the law of a user's own.
+            InputError: numba cannot compile a law or a block of a user's own.
         """
         try:
-            self._function(1, 1, self.log, self._judged, *self._arguments)
+            self._call(1, 1)
         # What numba raises depends on what it does not know.
         except (NumbaError, NotImplementedError, ValueError) as error:
-            law = self.rules.scenario.law
-            if ":" not in law:
+            own = [
+                text
+                for rules in self.rules.robots.values()
+                for text in (rules.scenario.law, *rules.scenario.blocks)
+                if ":" in text
+            ]
+            if not own:
                 raise
             raise InputError(
                 "engine",
-                f"numba cannot compile law {law!r} ({_complaint(error)}); run with "
-                "engine drake",
+                f"numba cannot compile {' or '.join(map(repr, own))} "
+                f"({_complaint(error)}); run with engine drake",
             ) from None
+
+    def _call(self, begin: int, end: int) -> tuple[int, bool]:
+        state = self.log, self._judged, self._ended
+        done: tuple[int, bool] = self._function(begin, end, *state, *self._arguments)
+        return done
 
     def advance(self, ticks: int) -> None:
         """Goes on for so many ticks, to the end of the run at most.
@@ -93,32 +113,32 @@ class CompiledLoop:
             InputError: A value became NaN or infinite.
         """
         end = min(self.done + ticks, len(self.log))
-        self.done, found, touched = self._function(
-            self.done, end, self.log, self._judged, *self._arguments
-        )
+        self.done, over = self._call(self.done, end)
         if not np.isfinite(self.log[self.done - 1]).all():
             raise InputError(
                 "engine",
                 f"a value is not finite at {self.time_s:g} s; run with engine drake, "
                 "which names the block",
             )
-        self.over = found > 0 or touched or self.done == len(self.log)
+        self.over = over or self.done == len(self.log)
         if self.over:
-            self.rules.take_over(self._last_tick(found, touched=touched))
+            names = enumerate(self.rules.robots)
+            self.rules.take_over({name: self._last_tick(k, name) for k, name in names})
 
-    def _last_tick(self, found: int, *, touched: bool) -> JudgedTick:
-        last = self.done - 1
-        names = [*self._columns]
-        pose = [names.index(name) for name in ("p_WB_x", "p_WB_y", "theta_WB")]
+    def _last_tick(self, number: int, robot: str) -> JudgedTick:
+        last, columns = self.done - 1, self.columns[robot]
+        pose = [columns[name] for name in ("p_WB_x", "p_WB_y", "theta_WB")]
+        before = max(last - 1, 0)
+        found, touched = self._ended[number].tolist()
         return JudgedTick(
             last * self.tick_s,
-            max(last - 1, 0) * self.tick_s,
+            before * self.tick_s,
             self.log[last, pose].tolist(),
-            self.log[last - 1, pose].tolist() if last else None,
-            bool(self.log[last, names.index("target_valid")] > 0.5),
-            self._judged.tolist(),
+            self.log[before, pose].tolist(),
+            bool(self.log[last, columns["target_valid"]] > 0.5),
+            self._judged[number].tolist(),
             found,
-            touched,
+            bool(touched),
         )
 
 
@@ -130,12 +150,15 @@ def _complaint(error: Exception) -> str:
     return shortened(next(known, type(error).__name__), 120)
 
 
-def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> CompiledLoop:
+def compile_loop(
+    scenario: Scenario, blocks: Mapping[str, Mapping[str, Any]], rules: RunRules
+) -> CompiledLoop:
     """The loop of a scenario that has one.
 
     Args:
-        scenario: Of one robot.
-        parts: Of its diagram, built with a log.
+        scenario: What to run.
+        blocks: Of each robot, by part (``robot_blocks``); they may be those of another
+            start or seed.
         rules: When the run ends.
 
     Returns:
@@ -147,47 +170,153 @@ def compile_loop(scenario: Scenario, parts: Parts, rules: RobotRules) -> Compile
     """
     scenario.require_compilable()
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
-    run = RunFacts(
-        ticks,
-        scenario.tick_s,
-        scenario.start.pose,
-        COMPILED_ORDERS[scenario.integrator.scheme],
-        scenario.integrator.step_s,
-    )
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
-    tables = _world(scenario, times)
-    widths = {name: table.shape[1] for name, table in tables.items()}
-    signals = _Signals(parts.blocks, widths)
-    steps = {part: _step_for(block, run) for part, block in parts.blocks.items()}
-    order = _order(parts.blocks, steps, set(tables))
-    logged = [signals.places[port] for _, port in parts.logged]
-    columns = np.concatenate([np.arange(place.start, place.stop) for place in logged])
-    watched = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
-    arguments = (
-        signals.values,
-        columns,
-        tuple(map(signals.view, tables)),
-        tuple(tables.values()),
+    robots = {
+        name: _LoopRobot(scenario, name, own, ticks) for name, own in blocks.items()
+    }
+    packing = Packing()
+    source = _Source(packing)
+    for name, robot in robots.items():
+        source.surround(rules.robots[name].surroundings, robot, robots, times)
+    for robot in robots.values():
+        source.add(robot)
+    text = source.text(
+        scenario.tick_s,
         tuple(
-            (
-                np.array(steps[part].state, dtype=float),
-                tuple(map(signals.view, _inputs(parts.blocks[part]))),
-                tuple(map(signals.view, _outputs(parts.blocks[part]))),
-                compiled_numbers(steps[part].numbers),
-            )
-            for part in order
+            (*map(robot.view, _WATCHED), np.array(robot.facts.initial_pose))
+            for robot in robots.values()
         ),
-        (*map(signals.view, watched), np.array(scenario.start.pose)),
-        _contacts(scenario, rules, times),
+        tuple(contacts_of(rules.robots[name], [*robots], times) for name in robots),
+        tuple(
+            robot.view(port)
+            for robot in robots.values()
+            for _, port in columns_of(robot.blocks)
+        ),
     )
+    width, columns = 0, {}
+    for name, own in blocks.items():
+        wanted = [text for texts in columns_of(own).values() for text in texts]
+        columns[name] = {text: width + k for k, text in enumerate(wanted)}
+        width += len(wanted)
     return CompiledLoop(
-        np.empty((ticks + 1, len(columns))),
+        np.empty((ticks + 1, width)),
         scenario.tick_s,
         rules,
-        _columns=[name for names in parts.logged.values() for name in names],
-        _function=_loop(tuple(steps[part][::3] for part in order)),
-        _arguments=arguments,
+        columns,
+        _function=compiled_from(text, packing.names),
+        _arguments=packing.values,
     )
+
+
+#: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
+_NO_BLOCKS = {
+    "name",
+    "description",
+    "engine",
+    "seed",
+    "duration_s",
+    "arena_m",
+    "start",
+    "obstacles",
+    "stop",
+    "robots",
+    "sources",
+    "source",
+}
+#: Blocks by what they were made from, the last used ones last.
+_SHARED: dict[str, dict[str, Any]] = {}
+_MOST_SHARED = 64
+
+
+def shared_blocks(scenario: Scenario) -> dict[str, dict[str, Any]]:
+    """Blocks for ``compile_loop``, those of an earlier scenario where they serve.
+
+    They do where scenarios differ in layout, start and seed alone: Drake never frees
+    blocks written in Python.
+
+    Args:
+        scenario: What to run.
+
+    Returns:
+        Of each robot, by part.
+
+    Raises:
+        InputError: As ``robot_blocks``.
+    """
+    scenario.require_compilable()
+    blocks = {}
+    for name in scenario.all_robots:
+        own, bodies = (
+            scenario.of_robot(name),
+            len(scenario.surroundings(name).bodies) - 1,
+        )
+        if own.blocks:  # may ask for the whole scenario
+            blocks[name] = robot_blocks(own, name, bodies=bodies)
+            continue
+        made_from = own.model_dump_json(exclude=_NO_BLOCKS)
+        key = f"{bodies} {own.source_size} {made_from}"
+        found = _SHARED.pop(key, None) or robot_blocks(own, name, bodies=bodies)
+        blocks[name] = _SHARED[key] = found
+        if len(_SHARED) > _MOST_SHARED:
+            del _SHARED[next(iter(_SHARED))]
+    return blocks
+
+
+#: What a robot takes from the world.
+_WORLD = "pose_WS", "poses_WO", "sizes"
+#: What a robot is judged by, and its pose at the tick before.
+_WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
+
+
+class _LoopRobot:
+    """One robot's blocks, their steps, and what their ports carry."""
+
+    def __init__(
+        self, scenario: Scenario, name: str, blocks: Mapping[str, Any], ticks: int
+    ) -> None:
+        own = scenario.all_robots[name]
+        self.facts = RunFacts(
+            ticks,
+            scenario.tick_s,
+            own.start.pose,
+            COMPILED_ORDERS[scenario.integrator.scheme],
+            scenario.integrator.step_s,
+            partial(seed_of, scenario, owner=name),
+        )
+        self.blocks = blocks
+        require_published(blocks.values(), _WORLD)
+        self.steps = {part: _step_for(b, self.facts) for part, b in blocks.items()}
+        self._views: dict[str, NDArray[np.float64]] = {}
+        for block in blocks.values():
+            for port in _ports(block, "output"):
+                self._views[port.get_name()] = np.zeros(port.size())
+        self.outside = {
+            port.get_name(): port.size()
+            for block in blocks.values()
+            for port in _ports(block, "input")
+            if port.get_name() not in self._views
+        }
+        self._views |= {name: np.zeros(size) for name, size in self.outside.items()}
+
+    def view(self, port: str) -> NDArray[np.float64]:
+        """What a port carries."""
+        return self._views[port]
+
+    def order(self) -> tuple[list[str], list[str]]:
+        """Parts as they do their steps: before the log, or with state outputs after."""
+        late = [part for part, step in self.steps.items() if step.publish is not None]
+        known = {*self.outside}.union(*(_names(self.blocks[p], "output") for p in late))
+        waiting, early = [part for part in self.blocks if part not in late], []
+        while waiting:
+            part = next(
+                part
+                for part in waiting
+                if known.issuperset(_names(self.blocks[part], "input"))
+            )
+            waiting.remove(part)
+            early.append(part)
+            known.update(_names(self.blocks[part], "output"))
+        return early, late
 
 
 def _step_for(block: Any, run: RunFacts) -> Step:
@@ -201,152 +330,140 @@ def _step_for(block: Any, run: RunFacts) -> Step:
     return step
 
 
-class _Contacts(NamedTuple):
-    """What a tick is judged by."""
-
-    rules: Any
-    tick_s: float
-    size: tuple[float, float]
-    """Length and width of the robot, m."""
-    sizes: NDArray[np.float64]
-    """(n, 2) of the bodies, m."""
-    reach: NDArray[np.float64]
-    """(n,) m: farther away, a body does not touch the robot."""
-    poses: NDArray[np.float64]
-    """(n, 5 ticks + 1, 3) of the bodies, at ticks and in between."""
+def _ports(block: Any, kind: str) -> list[Any]:
+    """Input or output ports."""
+    count = getattr(block, f"num_{kind}_ports")()
+    return list(map(getattr(block, f"get_{kind}_port"), range(count)))
 
 
-def _contacts(
-    scenario: Scenario, rules: RobotRules, times: NDArray[np.float64]
-) -> _Contacts:
-    parts = np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS
-    between = times[:-1, None] + parts * (times[1:] - times[:-1])[:, None]
-    instants = np.concatenate([times[:1], between.ravel()])
-    poses = np.empty((len(rules.reach), len(instants), 3))
-    for row, (_, body, _) in zip(poses, rules.reach, strict=True):
-        row[:] = body.path.poses(instants if body.path.moves else instants[:1])
-    return _Contacts(
-        compiled_numbers(rules.numbers),
-        scenario.tick_s,
-        scenario.size,
-        np.array([body.size for _, body, _ in rules.reach]),
-        np.array([reach for _, _, reach in rules.reach]),
-        poses,
-    )
+def _names(block: Any, kind: str) -> list[str]:
+    return [port.get_name() for port in _ports(block, kind)]
 
 
-def _world(
-    scenario: Scenario, times: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
-    """What the robot takes from the world, a row a tick; of what rests, one."""
-    around = scenario.surroundings()
-    bodies = [*around.obstacles.values()]
-    poses = [body.path.poses(times) for body in bodies]
-    sizes = [extent for body in bodies for extent in body.size]
-    empty = np.empty((len(times), 0))
-    return {
-        "pose_WS": np.ascontiguousarray(around.followed.path.poses(times)),
-        "poses_WO": np.hstack(poses) if poses else empty,
-        "sizes": np.tile(np.array(sizes, dtype=float), (len(times), 1)),
-    }
+class _Source:
+    """The lines of a loop."""
+
+    def __init__(self, packing: Packing) -> None:
+        self._packing = packing
+        self._blocks = 0
+        self._made: list[str] = []
+        self._filled: list[str] = []
+        self._early: list[str] = []
+        self._late: list[str] = []
+        self._plants: list[str] = []
+        self._published: dict[bool, list[str]] = {False: [], True: []}
+
+    def add(self, robot: _LoopRobot) -> None:
+        """A robot's blocks."""
+        early, late = robot.order()
+        for part in (*early, *late):
+            block, step = robot.blocks[part], robot.steps[part]
+            parts = (
+                np.array(step.state, dtype=float),
+                tuple(map(robot.view, _names(block, "input"))),
+                tuple(map(robot.view, _names(block, "output"))),
+                step.numbers,
+            )
+            names = ("state", "inputs", "outputs", "numbers")
+            own = [
+                self._let(f"{n}_{self._blocks}", x)
+                for n, x in zip(names, parts, strict=True)
+            ]
+            self._blocks += 1
+            call = self._call(step.step, "tick", *own)
+            if step.publish is None:
+                self._early += [self._call(_clear, own[2]), call]
+                continue
+            plant = part == "plant"
+            (self._plants if plant else self._late).append(call)
+            state, _, outputs, numbers = own
+            publish = self._call(step.publish, state, outputs, numbers)
+            self._published[plant].append(publish)
+
+    def surround(
+        self,
+        around: Surroundings,
+        robot: _LoopRobot,
+        robots: Mapping[str, _LoopRobot],
+        times: NDArray[np.float64],
+    ) -> None:
+        """What a robot takes from the world in every tick."""
+        wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
+        for port, bodies in wanted.items():
+            if port not in robot.outside:
+                continue
+            into = self._packing.expression(robot.view(port))
+            for k, body in enumerate(bodies):
+                if body in robots:
+                    pose = self._packing.expression(robots[body].view("pose_WB"))
+                    self._filled.append(self._call(_copy, into, f"{3 * k}", pose))
+                    continue
+                path = around.bodies[body].path
+                poses = path.poses(times if path.moves else times[:1])
+                rows = self._packing.expression(np.ascontiguousarray(poses))
+                self._filled.append(self._call(_fill, into, f"{3 * k}", rows, "tick"))
+        if "sizes" in robot.outside:
+            sizes = [body.size for body in around.obstacles.values()]
+            robot.view("sizes")[:] = np.ravel(sizes)
+
+    def text(self, tick_s: float, watched: Any, contacts: Any, logged: Any) -> str:
+        """The source, with what robots are judged by and what is logged."""
+        self._let("tick_s", tick_s)
+        self._let("watched", watched)
+        self._let("contacts", contacts)
+        self._let("logged", logged)
+        judged = "tick, tick_s, watched, contacts, judged, ended"
+        published = self._published[False], self._published[True]
+        body = [
+            *self._made,
+            "if begin == 0:",
+            *_indented([*published[0], *published[1]]),
+            "for tick in range(begin, end):",
+            *_indented(
+                [
+                    *self._filled,
+                    *self._early,
+                    self._call(_write, "log", "tick", "logged"),
+                    f"if {self._call(judge_all, judged)}:",
+                    "    return tick + 1, True",
+                    *self._late,
+                    *published[0],
+                    *self._plants,
+                    *published[1],
+                ]
+            ),
+            "return end, False",
+        ]
+        head = f"def loop(begin, end, log, judged, ended, {PACKED}):"
+        return "\n".join([head, *_indented(body), ""])
+
+    def _let(self, name: str, value: Any) -> str:
+        """A local name of a value."""
+        self._made.append(f"{name} = {self._packing.expression(value)}")
+        return name
+
+    def _call(self, function: Any, *arguments: str) -> str:
+        return f"{self._packing.name(function)}({', '.join(arguments)})"
 
 
-class _Signals:
-    """What the ports carry, one after the other in one array."""
-
-    def __init__(self, blocks: Mapping[str, Any], outside: Mapping[str, int]) -> None:
-        sizes = dict(outside)
-        for block in blocks.values():
-            for index in range(block.num_output_ports()):
-                port = block.get_output_port(index)
-                sizes[port.get_name()] = port.size()
-        ends = np.cumsum([*sizes.values()]).tolist()
-        self.places = {
-            name: slice(end - size, end)
-            for (name, size), end in zip(sizes.items(), ends, strict=True)
-        }
-        self.values = np.zeros(ends[-1])
-
-    def view(self, name: str) -> NDArray[np.float64]:
-        """What a port carries."""
-        return self.values[self.places[name]]
-
-
-def _inputs(block: Any) -> list[str]:
-    ports = map(block.get_input_port, range(block.num_input_ports()))
-    return [port.get_name() for port in ports]
-
-
-def _outputs(block: Any) -> list[str]:
-    ports = map(block.get_output_port, range(block.num_output_ports()))
-    return [port.get_name() for port in ports]
-
-
-def _order(
-    blocks: Mapping[str, Any], steps: Mapping[str, Step], known: set[str]
-) -> list[str]:
-    """Parts as they do their steps: state outputs last, and the plant after them."""
-    late = [part for part, step in steps.items() if step.publish is not None]
-    late.sort(key=lambda part: part == "plant")
-    known = known.union(*(_outputs(blocks[part]) for part in late))
-    waiting, order = [part for part in blocks if part not in late], []
-    while waiting:
-        part = next(p for p in waiting if known.issuperset(_inputs(blocks[p])))
-        waiting.remove(part)
-        order.append(part)
-        known.update(_outputs(blocks[part]))
-    return [*order, *late]
-
-
-@cache
-def _loop(steps: tuple[tuple[Any, Any], ...]) -> Any:
-    """The function over ticks, compiled when it is first called.
-
-    Args:
-        steps: Step and publish of each block, in the order of ``_order``.
-    """
-    early = [k for k, (_, publish) in enumerate(steps) if publish is None]
-    late = [k for k, (_, publish) in enumerate(steps) if publish is not None]
-    publish = [f"publish_{k}(blocks[{k}][0], *blocks[{k}][2:])" for k in late]
-    step = [f"step_{k}(tick, *blocks[{k}])" for k in range(len(steps))]
-    cleared = [f"clear(blocks[{k}][2]); {step[k]}" for k in early]
-    lines = [
-        "def loop(",
-        "    begin, end, log, judged,",
-        "    signals, columns, outside, tables, blocks, watched, contacts",
-        "):",
-        "    if begin == 0:",
-        *(f"        {line}" for line in publish),
-        "    for tick in range(begin, end):",
-        *(f"        fill(outside[{k}], tables[{k}], tick)" for k in range(3)),
-        *(f"        {line}" for line in cleared),
-        "        write(log, tick, signals, columns)",
-        "        found, touched = judge(tick, judged, watched, contacts)",
-        "        if found > 0 or touched:",
-        "            return tick + 1, found, touched",
-        *(f"        {step[k]}" for k in late[:-1]),
-        *(f"        {line}" for line in publish[:-1]),
-        f"        {step[late[-1]]}",
-        f"        {publish[-1]}",
-        "    return end, 0, False",
-    ]
-    names: dict[str, Any] = {
-        "fill": _fill,
-        "clear": _clear,
-        "write": _write,
-        "judge": _judge,
-    }
-    for k, (function, publishing) in enumerate(steps):
-        names[f"step_{k}"] = as_compiled(function)
-        names[f"publish_{k}"] = publishing and as_compiled(publishing)
-    exec("\n".join(lines), names)
-    return njit(names["loop"])
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
 
 
 @njit(cache=True)
-def _fill(out: Any, table: Any, tick: int) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(out)):
-        out[k] = table[tick, k]
+def _fill(
+    out: Any, first: int, rows: Any, tick: int
+) -> None:  # pragma: no cover  (compiled)
+    """From the row of a tick; of what rests there is but one."""
+    row = min(tick, len(rows) - 1)
+    for k in range(rows.shape[1]):
+        out[first + k] = rows[row, k]
+
+
+@njit(cache=True)
+def _copy(out: Any, first: int, values: Any) -> None:  # pragma: no cover  (compiled)
+    for k in range(len(values)):
+        out[first + k] = values[k]
 
 
 @njit(cache=True)
@@ -357,59 +474,9 @@ def _clear(outputs: Any) -> None:  # pragma: no cover  (compiled)
 
 
 @njit(cache=True)
-def _write(
-    log: Any, tick: int, signals: Any, columns: Any
-) -> None:  # pragma: no cover  (compiled)
-    for k in range(len(columns)):
-        log[tick, k] = signals[columns[k]]
-
-
-_judge_tick = njit(judge_tick)
-
-
-@njit
-def _judge(
-    tick: int, judged: Any, watched: Any, contacts: _Contacts
-) -> tuple[int, bool]:  # pragma: no cover  (compiled)
-    """Cause of the end by ``judge_tick``, and whether a body is touched."""
-    pose, velocity, pose_WS, valid, before = watched
-    for body in range(len(contacts.reach)):
-        if _touched(tick, pose, before, body, contacts):
-            return 0, True
-    found = _judge_tick(
-        tick * contacts.tick_s,
-        judged,
-        pose,
-        velocity,
-        pose_WS,
-        valid[0] > 0.5,
-        contacts.rules,
-    )
-    for k in range(3):
-        before[k] = pose[k]
-    return found, False
-
-
-@njit
-def _touched(
-    tick: int, pose: Any, before: Any, body: int, contacts: _Contacts
-) -> bool:  # pragma: no cover  (compiled)
-    """Whether robot and body touch since the last tick, as ``RobotRules`` looks."""
-    poses, (length, width) = contacts.poses[body], contacts.size
-    at = BETWEEN_TICKS * tick
-    dx, dy = poses[at, 0] - pose[0], poses[at, 1] - pose[1]
-    if math.hypot(dx, dy) > contacts.reach[body]:
-        return False
-    mine, other = np.empty(5), np.empty(5)
-    mine[3], mine[4] = length, width
-    other[3], other[4] = contacts.sizes[body, 0], contacts.sizes[body, 1]
-    for number in range(1, BETWEEN_TICKS + 1):
-        row, part = at - BETWEEN_TICKS + number, number / BETWEEN_TICKS
-        if tick == 0:
-            row, part = 0, 0.0
-        for k in range(3):
-            mine[k] = before[k] + part * (pose[k] - before[k])
-            other[k] = poses[row, k]
-        if rectangle_clearance(mine, other) < 0.0:
-            return True
-    return False
+def _write(log: Any, tick: int, logged: Any) -> None:  # pragma: no cover  (compiled)
+    column = 0
+    for k in range(len(logged)):
+        for j in range(len(logged[k])):
+            log[tick, column] = logged[k][j]
+            column += 1

@@ -17,9 +17,18 @@ from pydrake.systems.framework import LeafSystem
 from systems.framework.block_facts import BlockFacts
 from systems.framework.input_error import InputError
 
-__all__ = ["import_own", "made", "own_files", "why", "with_own_blocks"]
+__all__ = [
+    "OURS",
+    "files_of",
+    "import_own",
+    "made",
+    "own_files",
+    "why",
+    "with_own_blocks",
+]
 
-_OURS = ("analysis", "diagrams", "systems")
+#: Packages of the project.
+OURS = ("analysis", "diagrams", "systems")
 
 
 def import_own(name: str, field: str) -> Any:
@@ -89,9 +98,20 @@ def own_files(name: str, field: str) -> tuple[Path, ...]:
     if ":" not in name:
         return ()
     import_own(name, field)
-    module_name = name.rpartition(":")[0]
+    return files_of(_import(name.rpartition(":")[0]))
+
+
+def files_of(module: ModuleType) -> tuple[Path, ...]:
+    """Source files of a module of the user's, and of those of theirs that it uses.
+
+    Args:
+        module: Imported.
+
+    Returns:
+        Absolute paths in ascending order; none of a module that has no file.
+    """
     found: dict[str, Path] = {}
-    waiting = [_import(module_name)]
+    waiting = [module]
     while waiting:
         module = waiting.pop()
         file = getattr(module, "__file__", None)
@@ -186,7 +206,7 @@ def _own_block(name: str, parts: Mapping[str, Any]) -> Any:
 
 def _is_users(module: ModuleType, file: str) -> bool:
     """Whether versions of packages do not tell what the module holds."""
-    if module.__name__.partition(".")[0] in _OURS:
+    if module.__name__.partition(".")[0] in OURS:
         return False
     # The standard library, and what pip has installed.
     return (

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 from zlib import crc32
@@ -38,11 +39,15 @@ from systems.sound.waveforms import SoundParameters
 __all__ = [
     "Parts",
     "block_seed",
+    "columns_of",
     "connect_by_name",
     "make_robot",
     "make_source",
     "multiplexed",
     "parts_of",
+    "require_published",
+    "robot_blocks",
+    "seed_of",
 ]
 
 #: What a robot takes from the world around it; of emissions, all.
@@ -83,12 +88,24 @@ def parts_of(diagram: Diagram) -> Parts:
         elif not isinstance(system, Multiplexer):
             blocks[block_facts(system).part] = system
     if log is not None:
-        logged = {
-            (part, port): names
-            for part, block in blocks.items()
-            for port, names in _columns(block).items()
-        }
+        logged = columns_of(blocks)
     return Parts(diagram, blocks, log, logged)
+
+
+def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ...]]:
+    """What a log of a robot holds, in order.
+
+    Args:
+        blocks: Of the robot, by part.
+
+    Returns:
+        The columns of each (part, port).
+    """
+    return {
+        (part, port): names
+        for part, block in blocks.items()
+        for port, names in _columns(block).items()
+    }
 
 
 def block_seed(seed: int, name: str) -> int:
@@ -105,10 +122,70 @@ def block_seed(seed: int, name: str) -> int:
     return int(sequence.generate_state(1, np.uint64)[0])
 
 
-def _seed(scenario: Scenario, block: str, owner: str) -> int:
-    """Of a block of a robot or source; of the only one it is that of the block."""
+def seed_of(scenario: Scenario, block: str, owner: str) -> int:
+    """The seed of a block; of the only robot or source it is that of the block.
+
+    Args:
+        scenario: The run.
+        block: Name of the block.
+        owner: Name of the robot or source that has it.
+
+    Returns:
+        As ``block_seed``.
+    """
     name = block if owner in (ROBOT, SOURCE) else f"{block}_{owner}"
     return block_seed(scenario.seed, name)
+
+
+def robot_blocks(
+    scenario: Scenario,
+    name: str = ROBOT,
+    *,
+    bodies: int = 0,
+    others: Sequence[str] = (),
+) -> dict[str, Any]:
+    """The blocks of a robot by part, a user's own among them.
+
+    Args:
+        scenario: Of this robot alone, see ``Scenario.of_robot``.
+        name: Of the robot; its random numbers depend on it.
+        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        others: Names of the sources that are not followed.
+
+    Returns:
+        As a diagram needs them, not yet in one.
+
+    Raises:
+        InputError: As ``make_robot``.
+    """
+    controller = make_controller(scenario)
+    ours = [
+        DiffDrivePlant(
+            robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
+        ),
+        WheelOdometry(
+            robot=scenario.robot,
+            odometry=scenario.odometry,
+            initial_pose=scenario.start.pose,
+            tick_s=scenario.tick_s,
+        ),
+        *_hearing(scenario, name, others),
+        _tracker(scenario),
+        *_obstacle_sensing(scenario, name, bodies),
+        controller,
+        make_command(controller, scenario.robot, scenario.tick_s),
+    ]
+    return with_own_blocks(
+        {block_facts(block).part: block for block in ours},
+        scenario.blocks,
+        {
+            "scenario": scenario,
+            "robot": scenario.robot,
+            "bodies": bodies,
+            "tick_s": scenario.tick_s,
+            "seed": seed_of(scenario, "own_block", name),
+        },
+    )
 
 
 def make_robot(
@@ -146,34 +223,7 @@ def make_robot(
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
     """
-    controller = make_controller(scenario)
-    ours = [
-        DiffDrivePlant(
-            robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
-        ),
-        WheelOdometry(
-            robot=scenario.robot,
-            odometry=scenario.odometry,
-            initial_pose=scenario.start.pose,
-            tick_s=scenario.tick_s,
-        ),
-        *_hearing(scenario, name, others),
-        _tracker(scenario),
-        *_obstacle_sensing(scenario, name, bodies),
-        controller,
-        make_command(controller, scenario.robot, scenario.tick_s),
-    ]
-    by_part = with_own_blocks(
-        {block_facts(block).part: block for block in ours},
-        scenario.blocks,
-        {
-            "scenario": scenario,
-            "robot": scenario.robot,
-            "bodies": bodies,
-            "tick_s": scenario.tick_s,
-            "seed": _seed(scenario, "own_block", name),
-        },
-    )
+    by_part = robot_blocks(scenario, name, bodies=bodies, others=others)
     blocks, plant = [*by_part.values()], by_part["plant"]
     builder = DiagramBuilder()
     for block in blocks:
@@ -237,7 +287,7 @@ def _emitter(
             maximum_range_m=microphone_reach(scenario.room, scenario.acoustics),
             frame_s=frame_s,
             tick_s=scenario.tick_s,
-            seed=_seed(scenario, "sound_emitter", name),
+            seed=seed_of(scenario, "sound_emitter", name),
         )
     except InputError as error:
         if not error.field.startswith("sound."):
@@ -268,7 +318,7 @@ def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
                 hearing=scenario.ideal_hearing,
                 sound=scenario.sound,
                 frame_s=scenario.microphones.frame_s,
-                seed=_seed(scenario, "ideal_source_sensor", name),
+                seed=seed_of(scenario, "ideal_source_sensor", name),
             )
         ]
     return [
@@ -278,7 +328,7 @@ def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
             acoustics=scenario.acoustics,
             room=scenario.room,
             others=others,
-            seed=_seed(scenario, "mic_array", name),
+            seed=seed_of(scenario, "mic_array", name),
         ),
         TDOAEstimator(
             parameters=scenario.tdoa,
@@ -328,7 +378,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
         UltrasonicArray(
             parameters=scenario.ultrasonic,
             acoustics=scenario.acoustics,
-            seed=_seed(scenario, "ultrasonic_array", name),
+            seed=seed_of(scenario, "ultrasonic_array", name),
             tick_s=scenario.tick_s,
             **seen,
         ),
@@ -360,30 +410,50 @@ def connect_by_name(
         InputError: More than one block publishes a quantity, or none, and it does
             not come from elsewhere.
     """
-    outputs: dict[str, list[Any]] = {}
-    for block in blocks:
-        for index in range(block.num_output_ports()):
-            port = block.get_output_port(index)
-            outputs.setdefault(port.get_name(), []).append(port)
+    outputs = require_published(blocks, outside)
     entries: dict[str, Any] = {}
     for block in blocks:
         for index in range(block.num_input_ports()):
             port = block.get_input_port(index)
             name = port.get_name()
-            sources = outputs.get(name, [])
-            if len(sources) == 1:
-                builder.Connect(sources[0], port)
-            elif not sources and any(f"{name}_".startswith(f"{o}_") for o in outside):
-                if name not in entries:
-                    entries[name] = builder.ExportInput(port, name)
-                else:
-                    builder.ConnectInput(entries[name], port)
+            if name in outputs:
+                builder.Connect(outputs[name], port)
+            elif name not in entries:
+                entries[name] = builder.ExportInput(port, name)
             else:
+                builder.ConnectInput(entries[name], port)
+
+
+def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str, Any]:
+    """Refuses blocks whose inputs are not published, or more than once.
+
+    Args:
+        blocks: Of a robot or a source.
+        outside: As of ``connect_by_name``.
+
+    Returns:
+        Their output ports by name.
+
+    Raises:
+        InputError: Names the block and what it needs.
+    """
+    blocks, outputs, counts = list(blocks), {}, Counter[str]()
+    for block in blocks:
+        for index in range(block.num_output_ports()):
+            port = block.get_output_port(index)
+            outputs[port.get_name()] = port
+            counts[port.get_name()] += 1
+    for block in blocks:
+        for index in range(block.num_input_ports()):
+            name = block.get_input_port(index).get_name()
+            given = any(f"{name}_".startswith(f"{each}_") for each in outside)
+            if counts[name] != 1 and (counts[name] or not given):
                 raise InputError(
                     block.get_name(),
-                    f"{len(sources)} blocks publish {name!r}, which it needs; give "
+                    f"{counts[name]} blocks publish {name!r}, which it needs; give "
                     "one block an output port of that name",
                 )
+    return outputs
 
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:

@@ -24,6 +24,7 @@ from systems.world.obstacles import ObstacleParameters
 
 __all__ = [
     "COMPILED_ORDERS",
+    "MANY_RUNS",
     "Engine",
     "IntegratorParameters",
     "RunParameters",
@@ -35,6 +36,9 @@ COMPILED_ORDERS = {"runge_kutta2": 2, "runge_kutta3": 3}
 
 #: What carries a run out.
 Engine = Literal["drake", "compiled"]
+
+#: So many runs are worth the time that compiling takes.
+MANY_RUNS = 100
 
 _Name = Annotated[str, StringConstraints(pattern=r"\A[a-z][a-z0-9_]*\z")]
 _Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
@@ -80,9 +84,10 @@ class RunParameters(Parameters):
     """Name in results."""
     description: str = Field(default="", pattern=r"\A[^\n]*\z")
     """One line for ``phonotaxis scenarios``."""
-    engine: Engine = "drake"
+    engine: Engine | Literal["auto"] = "auto"
     """What carries the run out: Drake's simulator, or one compiled loop over the blocks
-    of a robot with ideal hearing, the same to 1e-9 m in a fraction of the time."""
+    of robots with ideal hearing, the same to 1e-9 m in a fraction of the time; auto:
+    compiled where 100 runs or more are asked at once and can be."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""
     tick_s: Period = TICK_S

@@ -156,9 +156,7 @@ class Scenario(FollowerParameters, RunParameters):
             InputError: Says why, and what to do.
         """
         reason = ""
-        if self.robots or self.sources:
-            reason = "compiled loops are of one robot and one source; leave out others"
-        elif self.hearing != "ideal":
+        if any(robot.hearing != "ideal" for robot in self.all_robots.values()):
             reason = "sound waves are not compiled; set hearing to ideal"
         elif self.integrator.scheme not in COMPILED_ORDERS:
             schemes = " or ".join(COMPILED_ORDERS)

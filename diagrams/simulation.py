@@ -8,21 +8,21 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.compiled_run import compile_loop
+from diagrams.compiled_run import CompiledLoop, compile_loop, shared_blocks
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import RobotRules, StopRules
+from diagrams.stop_rules import RunRules, StopRules
 from systems.framework.input_error import InputError
 
 __all__ = [
     "RunResult",
     "load_compiled_code",
     "make_simulator",
+    "prepared_loop",
     "simulate",
     "simulator_config",
 ]
@@ -62,11 +62,11 @@ def simulate(
         scenario: What to run.
         follower: A logged build of the same scenario to use again: Drake
             never frees blocks written in Python, so many runs in one process
-            should share a build.
+            should share a build. Compiled runs do by themselves.
         progress: Called with the simulated time, s, once a simulated second.
         engine: ``drake``, or ``compiled``: the same blocks in one compiled loop, which
-            a process compiles for some 20 s when it first runs a kind of scenario;
-            none: that of the scenario.
+            is compiled for some 15 s when a kind of scenario is first run, and kept on
+            the disk; none: that of the scenario, Drake's if that is ``auto``.
 
     Returns:
         ``RunResult``.
@@ -76,17 +76,14 @@ def simulate(
         InputError: The sound file cannot be played, or a value became NaN.
         InputError: The scenario or its law cannot be compiled.
     """
-    engine = engine or scenario.engine
-    if engine == "compiled":
-        scenario.require_compilable()
+    if (engine or scenario.engine) == "compiled":
+        return _run_compiled(scenario, progress)
     follower = follower or build_sound_follower(scenario, log=True)
     logs = [parts.log for parts in follower.robots.values()]
     if follower.scenario != scenario or None in logs:
         raise InputError(
             "simulate", "follower must be built from the same scenario with log=True"
         )
-    if engine == "compiled":
-        return _run_compiled(follower, progress)
     load_compiled_code(follower)
     simulator = make_simulator(follower)
     rules = StopRules(follower)
@@ -111,15 +108,22 @@ def simulate(
     return gather_result(scenario, rules.robots, columns, wall_s)
 
 
+def prepared_loop(scenario: Scenario) -> CompiledLoop:
+    """The compiled loop of a scenario, compiled or loaded, before its first tick.
+
+    Raises:
+        InputError: As ``simulate``.
+    """
+    loop = compile_loop(scenario, shared_blocks(scenario), RunRules(scenario))
+    loop.prepare()
+    return loop
+
+
 def _run_compiled(
-    follower: SoundFollower, progress: Callable[[float], None] | None
+    scenario: Scenario, progress: Callable[[float], None] | None
 ) -> RunResult:
     """``simulate`` by a compiled loop."""
-    scenario = follower.scenario
-    ((name, parts),) = follower.robots.items()
-    rules = RobotRules(scenario, scenario.surroundings(), parts)
-    loop = compile_loop(scenario, parts, rules)
-    loop.prepare()
+    loop = prepared_loop(scenario)
     start = perf_counter()
     ticks_a_second = max(1, round(1.0 / scenario.tick_s))
     while not loop.over:
@@ -127,10 +131,9 @@ def _run_compiled(
         if progress is not None:
             progress(loop.time_s)
     wall_s = perf_counter() - start
-    log = loop.log[: loop.done]
-    times: NDArray[np.float64] = np.arange(float(loop.done)) * scenario.tick_s
-    columns = logged_columns(parts, times, np.ascontiguousarray(log.T))
-    return gather_result(scenario, {name: rules}, {name: columns}, wall_s, "compiled")
+    robots = loop.rules.robots
+    columns = {name: loop.logged(name) for name in robots}
+    return gather_result(scenario, robots, columns, wall_s, "compiled")
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:

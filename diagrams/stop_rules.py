@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -24,12 +24,15 @@ from systems.world.geometry import (
 
 __all__ = [
     "BETWEEN_TICKS",
+    "DIVERGED",
     "ROUNDING_S",
     "SUCCESSFUL",
     "UNJUDGED",
     "Collision",
     "JudgedTick",
     "RobotRules",
+    "RunRules",
+    "Seen",
     "StopRules",
     "decisive_robot",
     "judge_tick",
@@ -87,27 +90,33 @@ def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
     return min(robots, key=rank)
 
 
-class StopRules:
-    """A monitor for Drake's simulator; remembers why it stopped the run.
+class Seen(NamedTuple):
+    """What a robot's run is judged by, at a tick."""
 
-    A run ends when each robot has a cause of its own, or one has touched something
+    pose: list[float]
+    """x, y, theta in W, m and rad."""
+    velocity: list[float]
+    """vx, vy, omega of it in W, m/s and rad/s."""
+    valid: bool
+    """Whether there is a target."""
+
+
+class RunRules:
+    """When a run of one or several robots ends.
+
+    It ends when each robot has a cause of its own, or one has touched something
     or is lost from sight; what has ended otherwise goes on beside the others.
     """
 
-    def __init__(self, follower: SoundFollower) -> None:
-        self._diagram = follower.diagram
-        scenario = follower.scenario
+    def __init__(self, scenario: Scenario) -> None:
         starts = {n: robot.start.pose for n, robot in scenario.all_robots.items()}
         self._paths = {name: LivePath(pose) for name, pose in starts.items()}
-        several = len(starts) > 1
-        self._moving = self._paths if several else {}
         self.robots = {
             name: RobotRules(
-                scenario.of_robot(name), scenario.surroundings(name, self._paths), parts
+                scenario.of_robot(name), scenario.surroundings(name, self._paths)
             )
-            for name, parts in follower.robots.items()
+            for name in starts
         }
-        self._tick, self._tick_s = -1, scenario.tick_s
 
     @property
     def cause(self) -> str:
@@ -122,6 +131,51 @@ class StopRules:
         causes = [rules.cause for rules in self.robots.values()]
         return all(causes) or any(cause in ENDING for cause in causes)
 
+    def judge(self, time: float, seen: Mapping[str, Seen]) -> None:
+        """Decides at a tick.
+
+        Args:
+            time: s.
+            seen: What each robot does.
+        """
+        self._move(time, {name: each.pose for name, each in seen.items()})
+        for name, rules in self.robots.items():
+            rules.judge(time, seen[name])
+        self._interrupt()
+
+    def take_over(self, ticks: Mapping[str, JudgedTick]) -> None:
+        """Ends as a compiled loop has ended, which judges by the same functions.
+
+        Args:
+            ticks: The last one of each robot.
+        """
+        last = next(iter(ticks.values()))
+        before = {name: tick.pose_before for name, tick in ticks.items()}
+        self._move(last.time_before, before)
+        self._move(last.time, {name: tick.pose for name, tick in ticks.items()})
+        for name, rules in self.robots.items():
+            rules.take_over(ticks[name])
+        self._interrupt()
+
+    def _move(self, time: float, poses: Mapping[str, Sequence[float]]) -> None:
+        for name, path in self._paths.items():
+            path.move(time, poses[name])
+
+    def _interrupt(self) -> None:
+        if self.over:
+            for rules in self.robots.values():
+                rules.cause = rules.cause or INTERRUPTED
+
+
+class StopRules(RunRules):
+    """A monitor for Drake's simulator; remembers why it stopped the run."""
+
+    def __init__(self, follower: SoundFollower) -> None:
+        super().__init__(follower.scenario)
+        self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
+        self._views = {name: _View(parts) for name, parts in follower.robots.items()}
+        self._tick = -1
+
     def __call__(self, context: Any) -> EventStatus:
         """Called after every step of the simulator, which may be finer than ticks."""
         time = context.get_time()
@@ -129,16 +183,33 @@ class StopRules:
         if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
             return _GO_ON
         self._tick = tick
-        poses = {n: rules.look(context) for n, rules in self.robots.items()}
-        for name, path in self._moving.items():
-            path.move(time, poses[name])
-        for rules in self.robots.values():
-            rules.judge(time)
+        self.judge(time, {name: view.at(context) for name, view in self._views.items()})
         if self.over:
-            for rules in self.robots.values():
-                rules.cause = rules.cause or INTERRUPTED
             return EventStatus.ReachedTermination(self._diagram, self.cause)
         return _GO_ON
+
+
+class _View:
+    """Reads a robot in the diagram's context."""
+
+    def __init__(self, parts: Parts) -> None:
+        self._blocks = parts.blocks["plant"], parts.blocks["tracker"]
+        self._pose = parts.port("plant", "pose_WB")
+        self._velocity = parts.port("plant", "velocity_WB")
+        self._valid = parts.port("tracker", "target_valid")
+        self._root: Any = None
+        self._contexts: list[Any] = []
+
+    def at(self, context: Any) -> Seen:
+        if context is not self._root:
+            self._root = context
+            self._contexts = [b.GetMyContextFromRoot(context) for b in self._blocks]
+        plant, tracker = self._contexts
+        return Seen(
+            self._pose.Eval(plant).tolist(),
+            self._velocity.Eval(plant).tolist(),
+            self._valid.Eval(tracker)[0] > 0.5,
+        )
 
 
 class RuleNumbers(NamedTuple):
@@ -154,6 +225,7 @@ class RuleNumbers(NamedTuple):
 
 #: Causes that ``judge_tick`` finds, by their numbers.
 FOUND = ("", "diverged", "reached", "lost", "stuck")
+DIVERGED = FOUND.index("diverged")
 
 #: State of ``judge_tick`` before the first tick: time and place of P from which it has
 #: stayed, time of the last valid target, since when P rests in the goal, whether it was
@@ -218,19 +290,20 @@ def judge_tick(
 
 
 class JudgedTick(NamedTuple):
-    """The last tick of a compiled loop."""
+    """A robot's last tick in a compiled loop."""
 
     time: float
     time_before: float
     """Of the tick before, s; 0 at the first one."""
     pose: list[float]
-    pose_before: list[float] | None
+    pose_before: list[float]
+    """The same as ``pose`` at the first tick."""
     valid: bool
     """Whether there is a target."""
     state: list[float]
     """Of ``judge_tick``."""
     found: int
-    """What that returned."""
+    """What that has returned, at this tick or before."""
     touched: bool
     """Whether a body was touched since the tick before."""
 
@@ -243,14 +316,10 @@ class RobotRules:
     """Of this robot alone."""
     surroundings: Surroundings
     """What it can hit, and what it follows."""
-    parts: Parts
     cause: str = ""
     collision: Collision | None = None
-    _root: Any = None
-    _contexts: tuple[Any, Any] = (None, None)
-    _now: list[float] = field(default_factory=list)
-    _velocity: list[float] = field(default_factory=list)
-    _pose: list[float] | None = None
+    _pose: Sequence[float] | None = None
+    """At the last tick."""
     _valid: bool = False
     _state: list[float] = field(default_factory=lambda: [*UNJUDGED])
     _time: float = 0.0
@@ -258,11 +327,6 @@ class RobotRules:
     def __post_init__(self) -> None:
         scenario = self.scenario
         self._source_rests = not self.surroundings.followed.path.moves
-        self._plant = self.parts.blocks["plant"]
-        self._tracker = self.parts.blocks["tracker"]
-        self._pose_port = self.parts.port("plant", "pose_WB")
-        self._velocity_port = self.parts.port("plant", "velocity_WB")
-        self._valid_port = self.parts.port("tracker", "target_valid")
         self.numbers = RuleNumbers(
             scenario.stop,
             scenario.robot.control_point_m,
@@ -277,41 +341,32 @@ class RobotRules:
             for name, body in self.surroundings.bodies.items()
         ]
 
-    def look(self, context: Any) -> list[float]:
-        """Reads the robot at a tick; its pose, m and rad."""
-        if context is not self._root:
-            self._root = context
-            self._contexts = (
-                self._plant.GetMyContextFromRoot(context),
-                self._tracker.GetMyContextFromRoot(context),
-            )
-        plant, tracker = self._contexts
-        self._now = self._pose_port.Eval(plant).tolist()
-        self._velocity = self._velocity_port.Eval(plant).tolist()
-        self._valid = self._valid_port.Eval(tracker)[0] > 0.5
-        return self._now
-
-    def judge(self, time: float) -> None:
-        """Decides at a tick, in s, after ``look``; what has ended stays as it ended.
+    def judge(self, time: float, seen: Seen) -> None:
+        """Decides at a tick; what has ended stays as it ended.
 
         Of several robots, one that has reached its goal can still be hit.
+
+        Args:
+            time: s.
+            seen: What the robot does.
         """
         places = {name: body.path.pose(time) for name, body, _ in self.reach}
-        ended, self.collision = self.cause, self._find_collision(time, places)
+        ended, self._valid = self.cause, seen.valid
+        self.collision = self._find_collision(time, seen.pose, places)
         if self.collision is not None:
             self.cause = "collision"
         elif not ended:
             found = judge_tick(
                 time,
                 self._state,
-                self._now,
-                self._velocity,
+                seen.pose,
+                seen.velocity,
                 places[self.surroundings.target],
                 self._valid,
                 self.numbers,
             )
             self.cause = FOUND[found]
-        self._pose, self._time = self._now, time
+        self._pose, self._time = seen.pose, time
 
     def take_over(self, tick: JudgedTick) -> None:
         """Ends as a compiled loop has ended, which judges by the same functions.
@@ -320,15 +375,11 @@ class RobotRules:
             tick: The last one.
         """
         self._state, self._valid = tick.state, tick.valid
-        self._now, self._pose, self._time = (
-            tick.pose,
-            tick.pose_before,
-            tick.time_before,
-        )
+        self._pose, self._time = tick.pose_before, tick.time_before
         self.cause = FOUND[tick.found]
         if tick.touched:
             places = {name: body.path.pose(tick.time) for name, body, _ in self.reach}
-            self.collision = self._find_collision(tick.time, places)
+            self.collision = self._find_collision(tick.time, tick.pose, places)
             self.cause = "collision"
 
     def final_cause(self) -> str:
@@ -348,9 +399,11 @@ class RobotRules:
         *_, ticks, following_ticks = self._state
         return ticks > 0.0 and following_ticks >= share * ticks
 
-    def _find_collision(self, time: float, places: _Places) -> Collision | None:
+    def _find_collision(
+        self, time: float, pose: Sequence[float], places: _Places
+    ) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
-        first, pose = None, self._now
+        first = None
         for name, body, reach in self.reach:
             x, y, _ = places[name]
             if math.hypot(x - pose[0], y - pose[1]) > reach:
@@ -362,7 +415,7 @@ class RobotRules:
         return first
 
     def _first_contact(
-        self, time: float, pose: list[float], body: Body
+        self, time: float, pose: Sequence[float], body: Body
     ) -> float | None:
         for part in np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS:
             instant = self._time + part * (time - self._time)
@@ -371,7 +424,9 @@ class RobotRules:
                 return float(instant)
         return None
 
-    def _fault(self, instant: float, time: float, pose: list[float], body: Body) -> str:
+    def _fault(
+        self, instant: float, time: float, pose: Sequence[float], body: Body
+    ) -> str:
         """Who alone would have come nearer since the last tick, the other standing."""
         robot_then = self._footprint(self._time, time, pose)
         robot_now = self._footprint(instant, time, pose)
@@ -381,7 +436,7 @@ class RobotRules:
         return "robot" if robot_alone <= body_alone else "obstacle"
 
     def _footprint(
-        self, instant: float, time: float, pose: list[float]
+        self, instant: float, time: float, pose: Sequence[float]
     ) -> NDArray[np.float64]:
         """The robot's rectangle between the last tick and this one."""
         now = np.array(pose)

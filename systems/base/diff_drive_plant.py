@@ -428,7 +428,7 @@ def DiffDrivePlant_(T):
                 tick_s=run.tick_s,
             )
             at_rest = [0.0] * (7 if self._plant.friction is not None else 4)
-            state = [*self._initial_pose, *at_rest]
+            state = [*run.initial_pose, *at_rest]
             return Step(plant_step, numbers, state, _publish_plant)
 
         def _slip(self, context, output):

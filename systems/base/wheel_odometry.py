@@ -186,6 +186,10 @@ def WheelOdometry_(T):
                 tick_s,
             )
 
+        def step_for(self, run):
+            """What the block does in each tick of a compiled loop, ``Step``."""
+            return self.step._replace(state=[*run.initial_pose, 0.0, 0.0])
+
         def _construct_copy(self, other, converter=None):
             Impl._construct(
                 self,

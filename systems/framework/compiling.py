@@ -17,10 +17,17 @@ import tempfile
 from collections.abc import Iterable
 from pathlib import Path
 
-__all__ = ["REORDER", "provide_cache"]
+__all__ = ["REORDER", "cache_folder", "provide_cache"]
 
 #: Licence for compiled sums to reorder, so that they vectorise; NaN stays NaN.
 REORDER = {"reassoc", "contract", "nsz", "arcp"}
+
+
+#: Where numba keeps compiled code, best first.
+_FOLDERS = (
+    Path(__file__).with_name("__pycache__"),
+    Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")),  # noqa: PTH111
+)
 
 
 def provide_cache(folders: Iterable[Path]) -> Path | None:
@@ -45,6 +52,13 @@ def provide_cache(folders: Iterable[Path]) -> Path | None:
     return made
 
 
+def cache_folder() -> Path:
+    """A folder for compiled code that can be written."""
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return Path(given)
+    return next(filter(_can_be_written, _FOLDERS))
+
+
 def _can_be_written(folder: Path) -> bool:
     """Whether files can be made there, or the folder itself."""
     while not folder.exists():
@@ -53,9 +67,4 @@ def _can_be_written(folder: Path) -> bool:
 
 
 # Every import of a block comes by here, before numba compiles anything.
-provide_cache(
-    [
-        Path(__file__).with_name("__pycache__"),
-        Path(os.environ.get("XDG_CACHE_HOME") or os.path.expanduser("~/.cache")),  # noqa: PTH111
-    ]
-)
+provide_cache(_FOLDERS)

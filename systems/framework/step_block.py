@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import inspect
-from collections import namedtuple
 from collections.abc import Callable, Sequence
-from functools import cache, cached_property
-from types import FunctionType
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
-from systems.framework.parameters import Parameters
 from systems.framework.scalar_math import float_of
 
-__all__ = ["RunFacts", "Step", "StepBlock", "as_compiled", "compiled_numbers"]
+__all__ = ["RunFacts", "Step", "StepBlock"]
 
 
 class Step(NamedTuple):
@@ -32,7 +26,7 @@ class Step(NamedTuple):
     step: Callable[..., None]
     numbers: Any
     """What the step depends on: a named tuple of numbers, arrays, functions and
-    parameters; see ``compiled_numbers``."""
+    parameters, or of tuples of these."""
     state: Sequence[float] = ()
     """At the first tick."""
     publish: Callable[..., None] | None = None
@@ -43,7 +37,8 @@ class Step(NamedTuple):
 class RunFacts(NamedTuple):
     """What a compiled loop runs, for blocks whose step depends on it.
 
-    A block joins compiled loops by ``step_for(run)``, which gives its ``Step``.
+    A block joins compiled loops by ``step_for(run)``, which gives its ``Step``. Start
+    and seed are those of the run, whatever the block was made with: runs share blocks.
     """
 
     ticks: int
@@ -54,52 +49,8 @@ class RunFacts(NamedTuple):
     """Of the Runge-Kutta steps, 2 or 3."""
     step_s: float
     """Largest step of the integrator, s."""
-
-
-@cache
-def _tuple_type(model: type[Parameters]) -> Any:
-    derived = [
-        name
-        for each in reversed(model.__mro__)
-        for name, value in vars(each).items()
-        if isinstance(value, cached_property)
-    ]
-    return namedtuple(f"{model.__name__}Numbers", [*model.model_fields, *derived])
-
-
-@cache
-def as_compiled(function: Any) -> Any:
-    """A function for compiled code, without what checks it for Drake's sake.
-
-    What is compiled already stays as it is.
-    """
-    if isinstance(function, FunctionType):
-        return njit(inspect.unwrap(function))
-    return function
-
-
-def compiled_numbers(value: Any) -> Any:
-    """What a step depends on, as compiled code takes it.
-
-    Args:
-        value: Parameters become named tuples of their fields and of what they derive
-            from them, functions compiled ones, lists arrays (an empty one is of
-            pairs); what is unset becomes 0.
-
-    Returns:
-        The same, of types that numba knows.
-    """
-    if isinstance(value, Parameters):
-        kind = _tuple_type(type(value))
-        return kind(*(compiled_numbers(getattr(value, name)) for name in kind._fields))
-    if isinstance(value, tuple):
-        parts = [compiled_numbers(part) for part in value]
-        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
-    if isinstance(value, FunctionType):
-        return as_compiled(value)
-    if isinstance(value, list):
-        return np.array(value) if value else np.empty((0, 2))
-    return 0.0 if value is None else value
+    seed_of: Callable[[str], int]
+    """Seed of a block, by its name."""
 
 
 class StepBlock:

@@ -293,7 +293,7 @@ def IdealSourceSensor_(T):
 
         def step_for(self, run):
             """What the block does in each tick of a compiled loop, ``Step``."""
-            frame_s, seed = self._config["frame_s"], self._config["seed"]
+            frame_s, seed = self._config["frame_s"], run.seed_of(self.get_name())
             frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
             sounds = np.ones(len(frames), dtype=bool)
             if self._hearing.burst_gaps:

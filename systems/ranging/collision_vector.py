@@ -419,6 +419,11 @@ def CollisionVector_(T):
                 unread=() if past_poses else ("range_ages", "pose_WB_estimated"),
             )
 
+        def step_for(self, run):
+            """What the block does in each tick of a compiled loop, ``Step``."""
+            past_poses = len(self.step.state) // 3
+            return self.step._replace(state=[*run.initial_pose] * past_poses)
+
         def _construct_copy(self, other, converter=None):
             Impl._construct(
                 self,

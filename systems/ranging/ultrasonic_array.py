@@ -449,7 +449,8 @@ class UltrasonicArray(LeafSystem):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        return self.step
+        noise = tick_noise(run.seed_of(self.get_name()))
+        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
 
     def _read(self, context: Any) -> tuple[Any, Any]:
         """Outputs as they stand now, and the state of the next tick."""

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams import build_sound_follower, load_scenario, simulate
+from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
 OWN_LAW = """
@@ -65,11 +65,7 @@ def own_law(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def both(name, *overrides):
     scenario = load_scenario(name, ["hearing=ideal", *overrides])
-    follower = build_sound_follower(scenario, log=True)
-    return (
-        simulate(scenario, follower=follower, engine=engine)
-        for engine in ("drake", "compiled")
-    )
+    return (simulate(scenario, engine=engine) for engine in ("drake", "compiled"))
 
 
 def assert_same(name, *overrides):
@@ -101,6 +97,8 @@ def assert_same(name, *overrides):
         ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
+        ("convoy", ("ideal_hearing.range_noise_fraction=0.01",)),
+        ("convoy", ("robots.second.attraction={follow_distance_m: 0.1}", "law=none")),
     ],
 )
 def test_runs_are_those_of_drake(name, overrides):
@@ -139,7 +137,9 @@ def test_a_users_block_without_a_step_is_named(own_blocks):
 @pytest.mark.slow
 def test_a_law_that_numba_cannot_compile_is_named(own_law):
     law = f"law={own_law}:wordy"
-    with pytest.raises(InputError, match=r"engine: numba cannot compile law .*drake"):
+    with pytest.raises(
+        InputError, match=r"engine: numba cannot compile '.*own_law.*drake"
+    ):
         list(both("default", law, "duration_s=0.1"))
 
 
@@ -147,7 +147,6 @@ def test_a_law_that_numba_cannot_compile_is_named(own_law):
     ("name", "override", "reason"),
     [
         ("default", "hearing=audio", "sound waves are not compiled"),
-        ("two_followers", "duration_s=1", "one robot and one source"),
         ("default", "integrator.scheme=runge_kutta5", "integrate with runge_kutta2 or"),
     ],
 )
