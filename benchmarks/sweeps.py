@@ -87,13 +87,13 @@ def speed_up(plan: SweepPlan) -> tuple[float, float]:
     return one / two, two_cpu / one_cpu
 
 
-def memory_growth_mb(runs: int, *, every: int = 7) -> float:
+def memory_growth_mb(runs: int, *, every: int = 7, engine: str = "drake") -> float:
     """Growth of the peak memory from the first to the second half of the runs, MB.
 
-    Each half must see processes renewed: at least 50 runs in each of two.
+    Each half must see processes renewed: at least 50 runs in each of two with Drake.
     """
     short = {"hearing": "ideal", "obstacle_sensing": "ideal", "duration_s": 0.1}
-    plan = SweepPlan(scenario="default", set=short, runs=runs)
+    plan = SweepPlan(scenario="default", set={**short, "engine": engine}, runs=runs)
     memory = trace_sweep(plan, workers=2, every=every).resident_mb
     half = len(memory) // 2
     return float(np.max(memory[half:]) - np.max(memory[:half]))

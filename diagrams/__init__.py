@@ -3,7 +3,13 @@
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.loading import dump_scenario, library_scenarios, load_scenario
 from diagrams.scenario import Scenario
-from diagrams.simulation import RunResult, load_compiled_code, make_simulator, simulate
+from diagrams.simulation import (
+    RunResult,
+    load_compiled_code,
+    make_simulator,
+    prepared_loop,
+    simulate,
+)
 from systems.framework.input_error import InputError
 
 __all__ = [
@@ -17,5 +23,6 @@ __all__ = [
     "load_compiled_code",
     "load_scenario",
     "make_simulator",
+    "prepared_loop",
     "simulate",
 ]

@@ -149,20 +149,29 @@ class Scenario(FollowerParameters, RunParameters):
                     f"{self.tick_s:g} s",
                 )
 
+    @property
+    def compilable(self) -> bool:
+        """Whether there is a compiled loop for it, a user's own code apart."""
+        return not self._no_loop()
+
     def require_compilable(self) -> None:
         """Refuses what has no compiled loop.
 
         Raises:
             InputError: Says why, and what to do.
         """
+        if reason := self._no_loop():
+            raise InputError("engine", reason)
+
+    def _no_loop(self) -> str:
+        """Why there is no compiled loop for it, and what to do; empty if there is."""
         reason = ""
         if any(robot.hearing != "ideal" for robot in self.all_robots.values()):
             reason = "sound waves are not compiled; set hearing to ideal"
         elif self.integrator.scheme not in COMPILED_ORDERS:
             schemes = " or ".join(COMPILED_ORDERS)
             reason = f"compiled loops integrate with {schemes}; set that scheme"
-        if reason:
-            raise InputError("engine", reason)
+        return reason
 
     @model_validator(mode="after")
     def _check_engine(self) -> Scenario:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import logging
 import os
 import sys
 import traceback
@@ -86,7 +87,7 @@ def _prepare_process() -> None:
 
     Standard streams that are closed lead nowhere: a result file must not get their
     numbers. Characters that a terminal cannot show are escaped. Pictures go to
-    files, whatever a notebook has chosen.
+    files, whatever a notebook has chosen. What takes long says so.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
@@ -97,6 +98,11 @@ def _prepare_process() -> None:
         if hasattr(getattr(sys, name), "reconfigure"):
             getattr(sys, name).reconfigure(errors="backslashreplace")
     os.environ["MPLBACKEND"] = "agg"
+    handler = logging.StreamHandler()
+    handler.setFormatter(logging.Formatter("phonotaxis: %(message)s"))
+    logger = logging.getLogger("phonotaxis")
+    logger.handlers = [handler]
+    logger.setLevel(logging.INFO)
 
 
 def _parser() -> argparse.ArgumentParser:

@@ -148,7 +148,7 @@ def _run_remotely(task: Task) -> Outcome:
         try:
             worker = _idle.get_nowait()
         except Empty:
-            worker = WorkerProcess(task.scenario)
+            worker = WorkerProcess(task)
         try:
             outcome = worker.run(task)
         except EOFError:

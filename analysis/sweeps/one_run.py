@@ -17,6 +17,7 @@ from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
+from diagrams.run_parameters import Engine
 from diagrams.stop_rules import Collision
 from systems.framework.input_error import shortened
 
@@ -42,6 +43,8 @@ class Task:
 
     point: SweepPoint
     scenario: Scenario
+    engine: Engine
+    """What runs it."""
     trajectory: bool
     """Whether the trajectory is wanted."""
 
@@ -54,7 +57,7 @@ class Outcome:
     """Plain values: the point's own (``fields`` a mapping), ``cause``,
     ``collision_object``, ``collision_fault``, ``collision_time_s``, ``robots`` (the
     same of each of several, ``<name>.cause`` ...), ``metrics``
-    (a mapping), ``simulated_s``, ``wall_s`` and ``error``."""
+    (a mapping), ``simulated_s``, ``wall_s``, ``engine`` and ``error``."""
     trajectory: bytes | None = None
     """A Parquet file."""
 
@@ -63,12 +66,12 @@ def run_task(task: Task) -> Outcome:
     """Runs a point. Whatever the run raises becomes its row."""
     start = perf_counter()
     try:
-        result = simulate(task.scenario)
-        row = _row(task.point, result.cause, start, result)
+        result = simulate(task.scenario, engine=task.engine)
+        row = _row(task, result.cause, start, result)
         trajectory = parquet_bytes(result.trajectory) if task.trajectory else None
     except (Exception, SystemExit) as error:  # noqa: BLE001  # the rest must go on
         text = " ".join(f"{type(error).__name__}: {error}".split())
-        return Outcome(_row(task.point, FAILED, start, error=text))
+        return Outcome(_row(task, FAILED, start, error=text))
     return Outcome(row, trajectory)
 
 
@@ -100,11 +103,11 @@ def lost_outcome(task: Task, reason: str) -> Outcome:
     Returns:
         A failed run, with the reason as its error.
     """
-    return Outcome(_row(task.point, FAILED, perf_counter(), error=reason))
+    return Outcome(_row(task, FAILED, perf_counter(), error=reason))
 
 
 def _row(
-    point: SweepPoint,
+    task: Task,
     cause: str,
     start: float,
     result: RunResult | None = None,
@@ -116,7 +119,7 @@ def _row(
         if value is not None and not math.isfinite(value):
             raise ValueError(f"{name} is {value}")
     return {
-        **vars(point),
+        **vars(task.point),
         **_ending(cause, collision),
         "collision_time_s": collision and collision.time,
         "robots": {
@@ -126,6 +129,7 @@ def _row(
         },
         "metrics": metrics,
         "simulated_s": result.simulated_s if result else None,
+        "engine": task.engine,
         "error": error,
         "wall_s": perf_counter() - start,
     }
@@ -164,7 +168,8 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
         columns[metric] = _numbers(row["metrics"].get(metric) for row in ordered)
     for name in ("simulated_s", "wall_s"):
         columns[name] = _numbers(row[name] for row in ordered)
-    columns["error"] = pd.array([row["error"] for row in ordered], dtype="str")
+    for name in ("engine", "error"):
+        columns[name] = pd.array([row[name] for row in ordered], dtype="str")
     return pd.DataFrame(columns)
 
 

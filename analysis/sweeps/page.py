@@ -204,14 +204,15 @@ def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> lis
         parts.append(heading(3, caption))
         parts.append(
             definitions(
-                (
-                    f"Run {row['index']}",
-                    f"{_remark(row)}`{reproducing_command(out, points[row['index']])}`",
-                )
+                (f"Run {row['index']}", f"{_remark(row)}`{_command(row, points, out)}`")
                 for row in runs.head(most).to_dict("records")
             )
         )
     return parts if causes else []
+
+
+def _command(row: dict[str, Any], points: list[SweepPoint], out: Path) -> str:
+    return reproducing_command(out, points[row["index"]], row["engine"])
 
 
 def _remark(row: dict[str, Any]) -> str:

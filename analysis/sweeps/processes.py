@@ -8,18 +8,20 @@ import signal
 import socket
 import subprocess
 import sys
+from collections import deque
 from collections.abc import Callable, Generator, Iterator
 from multiprocessing.connection import Connection, wait
 
 from analysis.run_error import RunError
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
 from analysis.sweeps.worker import READY
-from diagrams import Scenario
 
 __all__ = ["WorkerError", "WorkerProcess", "run_locally"]
 
 #: How often a run is tried whose worker ends before it answers.
 ATTEMPTS = 2
+#: Tasks that a worker has at once, so that it never waits for the next one.
+AHEAD = 2
 #: The caller is heard at least so often, s.
 PULSE_S = 0.25
 _MAIN = "import sys; from analysis.sweeps.worker import main; main(int(sys.argv[1]))"
@@ -32,11 +34,11 @@ class WorkerError(RunError):
 class WorkerProcess:
     """A worker in a process of its own; see ``analysis/sweeps/worker.py``."""
 
-    def __init__(self, scenario: Scenario) -> None:
-        """Starts the process, which warms up with a scenario."""
+    def __init__(self, task: Task) -> None:
+        """Starts the process, which warms up with a task; it is not yet given that."""
         ours, theirs = socket.socketpair()
         self.connection = Connection(ours.detach())
-        self.task: Task | None = None
+        self.tasks: deque[Task] = deque()
         self.ready = False
         # With several threads a worker would be slower, and its sums different.
         threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
@@ -50,16 +52,16 @@ class WorkerProcess:
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,
             )
-        self._send(scenario)
+        self._send(task)
 
-    def _send(self, message: Task | Scenario) -> None:
+    def _send(self, message: Task) -> None:
         # A process that has just ended is noticed by receive.
         with contextlib.suppress(OSError):
             self.connection.send(message)
 
     def give(self, task: Task) -> None:
-        """Hands over a task; ``receive`` gets its outcome."""
-        self.task = task
+        """Hands over a task; ``receive`` gets its outcome, in the order of tasks."""
+        self.tasks.append(task)
         self._send(task)
 
     def receive(self) -> Outcome | None:
@@ -80,7 +82,7 @@ class WorkerProcess:
         if message == READY:
             self.ready = True
             return None
-        self.task = None
+        self.tasks.popleft()
         outcome: Outcome = message
         return outcome
 
@@ -133,18 +135,19 @@ class _Pool:
     def __init__(self, tasks: Iterator[Task]) -> None:
         self.busy: dict[Connection, WorkerProcess] = {}
         self._tasks = tasks
+        self._first: deque[Task] = deque()
         self._again: dict[int, int] = {}
+
+    def _next(self) -> Task | None:
+        return self._first.popleft() if self._first else next(self._tasks, None)
 
     def start(self) -> None:
         """A worker for the next task, if there is one."""
-        task = next(self._tasks, None)
+        task = self._next()
         if task is not None:
-            self._employ(task)
-
-    def _employ(self, task: Task) -> None:
-        worker = WorkerProcess(task.scenario)
-        worker.task = task
-        self.busy[worker.connection] = worker
+            self._first.appendleft(task)
+            worker = WorkerProcess(task)
+            self.busy[worker.connection] = worker
 
     def step(self) -> Iterator[Outcome]:
         for connection in wait(list(self.busy), PULSE_S):
@@ -154,26 +157,28 @@ class _Pool:
             except EOFError:
                 yield from self._replace(worker)
                 continue
-            task = worker.task if outcome is None else next(self._tasks, None)
-            if task is None:
-                self._dismiss(worker)
-            else:
+            while len(worker.tasks) < AHEAD and (task := self._next()) is not None:
                 worker.give(task)
+            if not worker.tasks:
+                self._dismiss(worker)
             if outcome is not None:
                 yield outcome
 
     def _replace(self, worker: WorkerProcess) -> Iterator[Outcome]:
-        """The run of a worker that has ended goes to a new one."""
-        task = worker.task
+        """The runs of a worker that has ended go to a new one.
+
+        It was at the first; the others waited.
+        """
+        task, *others = worker.tasks
         self._dismiss(worker)
-        assert task is not None
+        self._first.extendleft(reversed(others))
         tried = self._again.pop(task.point.index, 1)
         if tried < ATTEMPTS:
             self._again[task.point.index] = tried + 1
-            self._employ(task)
+            self._first.appendleft(task)
         else:
             yield lost_outcome(task, f"its worker process ended {ATTEMPTS} times")
-            self.start()
+        self.start()
 
     def _dismiss(self, worker: WorkerProcess) -> None:
         del self.busy[worker.connection]

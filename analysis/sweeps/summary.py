@@ -52,7 +52,9 @@ def sweep_summary(
                 "index": int(row["index"]),
                 "seed": int(row["seed"]),
                 "error": row["error"],
-                "command": reproducing_command(out, points[int(row["index"])]),
+                "command": reproducing_command(
+                    out, points[int(row["index"])], row["engine"]
+                ),
             }
             for row in failed.to_dict("records")
         ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import os
 import shlex
 from collections.abc import Callable, Generator, Iterator
@@ -18,10 +19,13 @@ from analysis.sweeps.one_run import Outcome, Task
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.processes import run_locally
 from analysis.sweeps.store import StoreError, SweepStore, load_results
-from diagrams import build_sound_follower
+from diagrams import Scenario, build_sound_follower, prepared_loop
+from diagrams.run_parameters import MANY_RUNS, Engine
 from systems.framework.input_error import InputError
 
 __all__ = ["PreparedSweep", "prepare_sweep", "reproducing_command", "run_sweep"]
+
+_LOGGER = logging.getLogger("phonotaxis")
 
 #: Runs tasks, and calls its second argument a few times a second.
 Runner = Callable[[Iterator[Task], Callable[[], None]], Generator[Outcome]]
@@ -37,6 +41,8 @@ class PreparedSweep:
     store: SweepStore
     """The open directory of the results; ``run`` closes it."""
     runner: Runner
+    compiled: bool
+    """Whether what has a compiled loop runs in it."""
 
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
         """Does all runs that the directory does not hold yet.
@@ -75,7 +81,14 @@ class PreparedSweep:
         for point in self.points:
             if point.index not in done:
                 scenario = self.plan.scenario_of(point)
-                yield Task(point, scenario, trajectory=self.plan.trajectories)
+                engine = self.engine(scenario)
+                yield Task(point, scenario, engine, self.plan.trajectories)
+
+    def engine(self, scenario: Scenario) -> Engine:
+        """What runs a scenario of the sweep."""
+        if scenario.engine != "auto":
+            return scenario.engine
+        return "compiled" if self.compiled and scenario.compilable else "drake"
 
 
 #: Processes, each of some 300 MB.
@@ -116,7 +129,7 @@ def prepare_sweep(
     if directory is not None and not (resume and begun):
         check_directory(directory)
     points = plan.points()
-    _build_each_kind(plan, points)
+    compiled = _build_each_kind(plan, points)
     runner: Runner
     if scheduler is None:
         runner = partial(run_locally, workers=workers or _cores())
@@ -124,7 +137,8 @@ def prepare_sweep(
         from analysis.sweeps.dask_cluster import connect, run_on_cluster
 
         runner = partial(run_on_cluster, client=connect(scheduler))
-    return PreparedSweep(plan, points, SweepStore(directory, plan), runner)
+    store = SweepStore(directory, plan)
+    return PreparedSweep(plan, points, store, runner, compiled)
 
 
 def run_sweep(
@@ -158,12 +172,13 @@ def run_sweep(
     return prepared.run(progress)
 
 
-def reproducing_command(out: Path, point: SweepPoint) -> str:
+def reproducing_command(out: Path, point: SweepPoint, engine: str) -> str:
     """The shell command that does one run of a sweep again.
 
     Args:
         out: Directory of the sweep; has the scenario's file.
         point: The run.
+        engine: What ran it.
 
     Returns:
         One line, quoted for a shell.
@@ -171,11 +186,19 @@ def reproducing_command(out: Path, point: SweepPoint) -> str:
     words = ["phonotaxis", "simulate", str(out / "scenario.yaml")]
     for path, value in point.fields.items():
         words += ["--set", f"{path}={json.dumps(value, ensure_ascii=False)}"]
+    if engine == "compiled":
+        words += ["--set", "engine=compiled"]
     return shlex.join([*words, "--seed", str(point.seed)])
 
 
-def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> None:
-    """What only a build finds, as an unknown law: once for each text or group."""
+def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
+    """What only a build finds, as an unknown law: once for each text or group.
+
+    Returns:
+        Whether compiled loops shall run where a scenario leaves it open: for many runs,
+        unless numba cannot compile a user's own code.
+    """
+    compiled = len(points) >= MANY_RUNS
     seen: set[str] = set()
     for point in points:
         kinds = {
@@ -184,8 +207,22 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> None:
             if type(value) in (str, dict)
         }
         if point.index == 0 or not kinds <= seen:
-            build_sound_follower(plan.scenario_of(point))
+            scenario = plan.scenario_of(point)
+            auto = scenario.engine == "auto"
+            if scenario.engine == "compiled" or (
+                auto and compiled and scenario.compilable
+            ):
+                try:
+                    prepared_loop(scenario)
+                except InputError as error:
+                    if error.field != "engine" or not auto:
+                        raise
+                    _LOGGER.warning("%s", error.message)
+                    compiled = False
+            else:
+                build_sound_follower(scenario)
         seen |= kinds
+    return compiled
 
 
 def _cores() -> int:

@@ -2,7 +2,8 @@
 
 It loads all that a run needs once. Then it forks a child that does the runs,
 and a new child every ``RUNS_PER_CHILD`` runs: Drake never frees blocks written
-in Python, so that a process grows by about a megabyte a run.
+in Python, so that a process grows by about a megabyte a run. Compiled runs share
+blocks.
 """
 
 from __future__ import annotations
@@ -15,29 +16,29 @@ from collections.abc import Callable
 from multiprocessing.connection import Connection
 
 from analysis.sweeps.one_run import Task, run_task
-from diagrams import Scenario, build_sound_follower, load_compiled_code
+from diagrams import build_sound_follower, load_compiled_code, prepared_loop
 
 __all__ = ["READY", "main"]
 
 READY = "ready"
-RUNS_PER_CHILD = 50
+RUNS_PER_CHILD = {"drake": 50, "compiled": 1000}
 
 
 def main(file_descriptor: int) -> None:
     """Serves tasks until the other end of the socket is closed.
 
     Args:
-        file_descriptor: A socket. A ``Scenario`` comes first, to warm up with;
+        file_descriptor: A socket. A ``Task`` comes first, to warm up with;
             the answer is READY. Then an ``Outcome`` answers each ``Task``.
     """
     # Keyboards speak to the process that we work for.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with Connection(file_descriptor) as connection:
         try:
-            scenario = connection.recv()
+            task = connection.recv()
             # A run may end its process: that must happen when it is its turn.
-            if _survives(lambda: _warm(scenario)):
-                _warm(scenario)
+            if _survives(lambda: _warm(task)):
+                _warm(task)
             connection.send(READY)
         except (EOFError, OSError):
             return
@@ -59,14 +60,19 @@ def _survives(work: Callable[[], None]) -> bool:
     return os.waitpid(child, 0)[1] == 0
 
 
-def _warm(scenario: Scenario) -> None:
+def _warm(task: Task) -> None:
     """Loads compiled functions. An error here comes again with the run itself."""
     with contextlib.suppress(Exception, SystemExit):
-        load_compiled_code(build_sound_follower(scenario, log=True))
+        if task.engine == "compiled":
+            prepared_loop(task.scenario)
+        else:
+            load_compiled_code(build_sound_follower(task.scenario, log=True))
 
 
 def _serve(connection: Connection) -> None:
     """Some runs. At the end of all, EOFError."""
-    for _ in range(RUNS_PER_CHILD):
+    worn = 0.0
+    while worn < 1.0:
         task: Task = connection.recv()
         connection.send(run_task(task))
+        worn += 1.0 / RUNS_PER_CHILD[task.engine]

@@ -161,7 +161,7 @@ def test_command_makes_the_same_scenario(tmp_path_factory, value, text):
     base = scenario_from_mapping(sweep.base)
     (out / "scenario.yaml").write_text(dump_scenario(base), "utf-8")
     point = sweep.points()[1]
-    words = shlex.split(reproducing_command(out, point))
+    words = shlex.split(reproducing_command(out, point, "drake"))
     assert words[:2] == ["phonotaxis", "simulate"]
     overrides = [words[k + 1] for k, word in enumerate(words) if word == "--set"]
     overrides.append(f"seed={words[words.index('--seed') + 1]}")

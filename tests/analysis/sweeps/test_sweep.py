@@ -251,8 +251,9 @@ def test_a_run_that_kills_its_process_is_recorded(tmp_path, laws):
 def test_worker_that_cannot_start_says_so(monkeypatch):
     monkeypatch.setattr(sys, "executable", "/bin/false")
     sweep = plan()
-    scenario = sweep.scenario_of(sweep.points()[0])
-    worker = WorkerProcess(scenario)
+    point = sweep.points()[0]
+    scenario = sweep.scenario_of(point)
+    worker = WorkerProcess(Task(point, scenario, "drake", trajectory=False))
     with pytest.raises(WorkerError, match="could not start"):
         worker.receive()
     worker.close()
