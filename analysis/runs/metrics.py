@@ -70,7 +70,7 @@ def following_error(result: RunResult) -> NDArray[np.float64]:
 
 def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
     """The source counts as a body, but not as an obstacle."""
-    least, contact = proximity.least, float(np.min(proximity.time_to_contact))
+    least, contact = proximity.least, proximity.least_time_to_contact
     return {
         "minimum_clearance_m": float(np.min(least)),
         "minimum_obstacle_clearance_m": min(least[:-1].tolist(), default=None),
@@ -252,22 +252,23 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
 def _reaction_distance(proximity: Proximity) -> float | None:
     """From P to the nearest obstacle when the law first pushes back from it."""
     result, columns = proximity.result, proximity.result.columns
-    distances = proximity.distances_from_P()
-    if len(distances) < 2 or "repulsion_x" not in columns:
+    if len(result.surroundings.bodies) < 2 or "repulsion_x" not in columns:
         return None
+    push = np.hypot(*result.vector("repulsion"))
+    features = [columns[f"feature_{k}"] > 0.5 for k in (1, 2, 3)]
+    pushed = np.flatnonzero((push >= REACTION_N) & np.any(features, axis=0))
+    distances = proximity.distances_from_P(pushed)
     nearest = np.min(distances[:-1], axis=0)
     echoes = [
         np.where(
-            columns[f"feature_{k}"] > 0.5,
-            np.hypot(*result.vector(f"collision_{k}_B")),
+            feature[pushed],
+            np.hypot(*result.vector(f"collision_{k}_B")[:, pushed]),
             np.inf,
         )
-        for k in (1, 2, 3)
+        for k, feature in enumerate(features, start=1)
     ]
     seen = np.min(np.abs(np.stack(echoes) - nearest), axis=0) <= ECHO_M
-    push = np.hypot(*result.vector("repulsion"))
-    reacting = seen & (nearest < distances[-1]) & (push >= REACTION_N)
-    first = np.flatnonzero(reacting)
+    first = np.flatnonzero(seen & (nearest < distances[-1]))
     return float(nearest[first[0]]) if len(first) else None
 
 

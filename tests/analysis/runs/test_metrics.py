@@ -97,7 +97,7 @@ def test_time_to_contact_counts_both_motions():
     }
     run = straight(obstacles=[cart], source={"waypoints_m": [[0.0, 3.0]]})
     gap = 8.0 - 0.3 * (4.0 - 0.15) - 0.1 - (2.0 + FRONT)  # half of v/a to start
-    assert Proximity(run).time_to_contact[-1] == pytest.approx(gap / 0.8)
+    assert Proximity(run).least_time_to_contact == pytest.approx(gap / 0.8)
 
 
 @pytest.mark.parametrize(("speed", "passed"), [(4.0, 20.5), (7.0, 20.1), (7.0, 20.9)])
@@ -118,7 +118,7 @@ def test_clearance_between_ticks(speed, passed):
         "acceleration_m_s2": 1e6,
     }
     run = motion(still, still, still + math.pi / 4, obstacles=[speck])
-    assert np.min(Proximity(run).clearances[0]) > 0.015
+    assert np.min(Proximity(run).clearance) > 0.015
     least = run_metrics(run)["minimum_obstacle_clearance_m"]
     assert least == pytest.approx(0.01, abs=2e-4)
 
@@ -136,7 +136,7 @@ def test_distance_of_P_is_from_the_turned_box():
     v = np.array([0.5, -0.4, 0.05, -0.5, 0.05])
     x, y = 2.0 + cos * u - sin * v, 1.0 + sin * u + cos * v
     run = motion(x - FRONT, y, 0.0 * x, obstacles=[box])
-    distances = Proximity(run).distances_from_P()
+    distances = Proximity(run).distances_from_P(np.arange(5))
     assert distances.shape == (2, 5)
     np.testing.assert_allclose(distances[0], [0.5, 0.3, 0.5, 0.5, 0.0], atol=1e-6)
 
