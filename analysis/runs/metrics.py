@@ -179,7 +179,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
     duration = result.simulated_s
     return {
         "jerk_rms_m_s3": _rms(linear),
-        "jerk_max_m_s3": max(linear.tolist(), default=None),
+        "jerk_max_m_s3": float(np.max(linear)) if len(linear) else None,
         "angular_jerk_rms_rad_s3": _rms(angular),
         "sparc": _quantile(sparc, 0.5),
         "ldlj": _quantile(ldlj, 0.5),
@@ -327,4 +327,11 @@ def _rms(values: NDArray[np.float64]) -> float | None:
 
 
 def _quantile(values: NDArray[np.float64], q: float) -> float | None:
-    return float(np.quantile(values, q)) if len(values) else None
+    """Interpolated as ``numpy.quantile`` does, which takes many times as long."""
+    if not len(values):
+        return None
+    place = q * (len(values) - 1)
+    low = int(place)
+    high = min(low + 1, len(values) - 1)
+    ordered = np.partition(values, (low, high))
+    return float(ordered[low] + (place - low) * (ordered[high] - ordered[low]))

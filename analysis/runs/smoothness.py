@@ -39,16 +39,17 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
         (m,) or (m, k), m/s^3: samples whose window is whole, 10 fewer than n at 25 ms;
         empty where there is none.
     """
-    from scipy.signal import savgol_filter
-
     velocity = np.asarray(velocity, dtype=float)
     half = max(2, round(JERK_HALF_WINDOW_S / period))
     if len(velocity) <= 2 * half:
         return np.empty((0, *velocity.shape[1:]))
-    second: NDArray[np.float64] = savgol_filter(
-        velocity, 2 * half + 1, polyorder=3, deriv=2, delta=period, axis=0
-    )
-    return second[half:-half]
+    # The cubic's odd terms are orthogonal to the square less its mean.
+    square = np.arange(-half, half + 1.0) ** 2
+    square -= np.mean(square)
+    weights = 2.0 * square / (np.sum(square**2) * period**2)
+    columns = velocity.reshape(len(velocity), -1).T
+    second = [np.correlate(column, weights, "valid") for column in columns]
+    return np.stack(second, axis=1).reshape(-1, *velocity.shape[1:])
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
@@ -68,17 +69,17 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
     magnitude = np.abs(np.fft.rfft(speed, count))
-    magnitude /= np.max(magnitude, axis=-1, keepdims=True)
-    frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
-    magnitude = magnitude[..., frequency <= CUTOFF_HZ]
+    peak = np.max(magnitude, axis=-1, keepdims=True)
+    magnitude = magnitude[..., : math.floor(CUTOFF_HZ * count / rate_hz) + 1] / peak
     loud = magnitude >= THRESHOLD
     first = np.argmax(loud, axis=-1)
     last = loud.shape[-1] - 1 - np.argmax(loud[..., ::-1], axis=-1)
     step = 1.0 / np.maximum(last - first, 1)
-    index = np.arange(loud.shape[-1] - 1)
+    index = np.arange(np.max(last, initial=0))
     inside = (index >= first[..., None]) & (index < last[..., None])
-    lengths = np.hypot(step[..., None], np.diff(magnitude, axis=-1))
-    return -np.sum(np.where(inside, lengths, 0.0), axis=-1)
+    rise = np.diff(magnitude[..., : len(index) + 1], axis=-1)
+    lengths = np.sqrt(step[..., None] ** 2 + rise**2)
+    return -np.sum(lengths, axis=-1, where=inside)
 
 
 def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
