@@ -305,7 +305,7 @@ class DrivenPath:
         """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
         times = np.asarray(times, dtype=float)
         if not self.moves or not len(times):
-            return np.tile(np.array(self._rest), (len(times), 1))
+            return np.full((len(times), 3), self._rest)
         ticks = np.maximum((times - self._start) / TICK_S, 0.0)
         self._since(ticks.max())
         return _poses_between(self._table, ticks)

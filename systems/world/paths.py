@@ -167,7 +167,7 @@ class WaypointPath:
         """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
         times = np.asarray(times, dtype=float)
         if not self._moves:
-            return np.tile(np.array(self._pieces[0][1:4]), (len(times), 1))
+            return np.full((len(times), 3), self._pieces[0][1:4])
         return _poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
