@@ -101,7 +101,7 @@ class RunResult:
 
     def vector(self, name: str) -> NDArray[np.float64]:
         """(2, n) x and y of a column's quantity at the ticks, as of ``p_WP``."""
-        return np.stack([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
+        return np.array([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
 
     @property
     def simulated_s(self) -> float:
@@ -208,7 +208,7 @@ def _completed(
     dx, dy = columns["p_WS_x"] - x_P, columns["p_WS_y"] - y_P
     ahead, left = c * dx + s * dy, c * dy - s * dx
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
-    columns["source_range_true"] = np.hypot(dx, dy)
+    columns["source_range_true"] = np.sqrt(dx * dx + dy * dy)
     columns["source_bearing_true"] = np.arctan2(left, ahead)
     x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
     heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5

@@ -95,10 +95,7 @@ class Proximity:
         Returns:
             (m, k) m.
         """
-        p_WP = self.result.vector("p_WP")[:, ticks]
-        return np.hypot(
-            *beyond_rectangle(p_WP, self.bodies[:, ticks].transpose(2, 0, 1))
-        )
+        return _distances(self.result.vector("p_WP"), self.bodies, ticks)
 
     @cached_property
     def _clearances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -130,6 +127,19 @@ def _least_clearances(
             if clearance < nearest[i]:
                 nearest[i], first = clearance, k
     return nearest, least
+
+
+@njit(cache=True)
+def _distances(
+    points: NDArray[np.float64], bodies: NDArray[np.float64], ticks: NDArray[np.intp]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(m, k) of (2, n) points from (m, n, 5) rectangles at some of n ticks, m."""
+    distances = np.empty((bodies.shape[0], ticks.size))
+    for k in range(bodies.shape[0]):
+        for j, i in enumerate(ticks):
+            du, dv = beyond_rectangle(points[:, i], bodies[k, i])
+            distances[k, j] = math.sqrt(du * du + dv * dv)
+    return distances
 
 
 @njit(cache=True)
