@@ -51,7 +51,7 @@ class RunResult:
     several: dict[str, RunResult] = field(default_factory=dict)
     """What each robot did, where there are several."""
     others: Surroundings | None = None
-    """What this one of several robots had about it."""
+    """What this robot had about it, other robots on their ways included."""
     whole: Scenario | None = None
     """What was run, where that is more than ``scenario``."""
 
@@ -152,7 +152,7 @@ def gather_result(
             wall_s,
             name,
             engine,
-            others=None if own is scenario else around,
+            others=around,
             whole=None if own is scenario else scenario,
         )
     if not several:

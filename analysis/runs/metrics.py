@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from typing import Any
 
@@ -150,7 +151,8 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
     settled = result.time >= sound.start_s + sound.period_s + sound.on_s
     errors = np.abs(following_error(result))
     following = errors <= result.scenario.stop.following_band_m
-    since_heard = np.maximum.accumulate(columns["target_valid"] > 0.5)
+    valid = columns["target_valid"] > 0.5
+    since_heard = np.maximum.accumulate(valid)
     error = errors[settled]
     bearing = np.degrees(columns["source_bearing_true"][settled])
     return {
@@ -158,7 +160,7 @@ def _following_metrics(result: RunResult) -> dict[str, float | None]:
         "following_error_rms_m": _rms(error),
         "following_error_p95_m": _quantile(error, 0.95),
         "following_bearing_rms_deg": _rms(bearing),
-        "valid_target_fraction": float(np.mean(columns["target_valid"] > 0.5)),
+        "valid_target_fraction": _mean(valid),
     }
 
 
@@ -194,7 +196,7 @@ def _smoothness_metrics(result: RunResult) -> dict[str, float | None]:
 def _effort_metrics(result: RunResult) -> dict[str, float | None]:
     """What the law and the wheels were asked for."""
     columns, robot = result.columns, result.scenario.robot
-    wheels = np.stack([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
+    wheels = np.array([columns[f"wheel_speed_{side}"] for side in ("left", "right")])
     variation = np.mean(np.abs(np.diff(wheels))) if len(result.time) > 1 else 0.0
     pulling = _lengths(result.vector("v_WP"))
     full = 0.999
@@ -205,7 +207,7 @@ def _effort_metrics(result: RunResult) -> dict[str, float | None]:
         "wheel_variation_m_s2": float(variation)
         * robot.wheel_radius_m
         / result.scenario.tick_s,
-        "saturated_fraction": float(np.mean(saturated)),
+        "saturated_fraction": _mean(saturated),
         "impossible_obstacle_speed_ticks": _impossible_speeds(result),
     }
 
@@ -228,7 +230,7 @@ def _impossible_speeds(result: RunResult) -> int | None:
     columns, top = result.columns, result.scenario.robot.top_speed_m_s
     if "obstacle_speed_1" not in columns:
         return None
-    speeds = np.stack([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
+    speeds = np.array([columns[f"obstacle_speed_{k}"] for k in (1, 2, 3)])
     return int(np.count_nonzero(np.any(speeds > 2.0 * top, axis=0)))
 
 
@@ -328,11 +330,11 @@ def _lengths(vectors: Iterable[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 def _mean(flags: NDArray[np.bool_]) -> float | None:
-    return float(np.mean(flags)) if len(flags) else None
+    return int(np.count_nonzero(flags)) / len(flags) if len(flags) else None
 
 
 def _rms(values: NDArray[np.float64]) -> float | None:
-    return float(np.sqrt(np.mean(values**2))) if len(values) else None
+    return math.sqrt(values @ values / len(values)) if len(values) else None
 
 
 def _quantile(values: NDArray[np.float64], q: float) -> float | None:

@@ -113,13 +113,14 @@ def _least_clearances(
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
+    reaches = _reaches(robot, bodies)
     first = 0
     for i in range(ticks):
         # What was nearest at the last tick is first, so that others are passed over.
         begin = first
         for j in range(count):
             k = (begin + j) % count
-            apart = _gap(robot[i], bodies[k, i])
+            apart = _gap(robot[i], bodies[k, i], reaches[k])
             if apart > 0.0 and apart >= nearest[i] and apart >= least[k]:
                 continue
             clearance = rectangle_clearance(robot[i], bodies[k, i])
@@ -157,13 +158,13 @@ def _least_contact_time(
         velocity: (2, n) of the robot, m/s.
         bodies: (m, n, 5) rectangles.
     """
-    least = np.inf
+    least, reaches = np.inf, _reaches(robot, bodies)
     for k in range(bodies.shape[0]):
         for i in range(time.size):
             vx = velocity[0, i] - _rate(time, bodies[k, :, 0], i)
             vy = velocity[1, i] - _rate(time, bodies[k, :, 1], i)
             # Circles round the rectangles touch first, if ever.
-            apart = _gap(robot[i], bodies[k, i])
+            apart = _gap(robot[i], bodies[k, i], reaches[k])
             if apart > 0.0 and apart >= least * math.sqrt(vx * vx + vy * vy):
                 continue
             least = min(least, contact_time(robot[i], bodies[k, i], vx, vy))
@@ -171,13 +172,24 @@ def _least_contact_time(
 
 
 @njit(cache=True)
+def _reaches(
+    robot: NDArray[np.float64], bodies: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(m,) radii of the circles round robot and body together, m."""
+    reaches = np.empty(len(bodies))
+    for k in range(len(bodies)):
+        a, b = robot[0], bodies[k, 0]
+        reaches[k] = 0.5 * (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4]))
+    return reaches
+
+
+@njit(cache=True)
 def _gap(
-    a: NDArray[np.float64], b: NDArray[np.float64]
+    a: NDArray[np.float64], b: NDArray[np.float64], reach: float
 ) -> float:  # pragma: no cover  (compiled)
     """Between the circles round two rectangles, m; negative where they overlap."""
     dx, dy = a[0] - b[0], a[1] - b[1]
-    reach = math.sqrt(a[3] * a[3] + a[4] * a[4]) + math.sqrt(b[3] * b[3] + b[4] * b[4])
-    return math.sqrt(dx * dx + dy * dy) - 0.5 * reach
+    return math.sqrt(dx * dx + dy * dy) - reach
 
 
 @njit(cache=True)

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.fft import rfft
 
 __all__ = [
     "jerk",
@@ -68,7 +69,7 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
     """
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
-    magnitude = np.abs(np.fft.rfft(speed, count))
+    magnitude = np.abs(rfft(speed, count))
     peak = np.max(magnitude, axis=-1, keepdims=True)
     magnitude = magnitude[..., : math.floor(CUTOFF_HZ * count / rate_hz) + 1] / peak
     loud = magnitude >= THRESHOLD
