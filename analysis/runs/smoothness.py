@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import rfft
 
@@ -44,13 +46,20 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
     half = max(2, round(JERK_HALF_WINDOW_S / period))
     if len(velocity) <= 2 * half:
         return np.empty((0, *velocity.shape[1:]))
-    # The cubic's odd terms are orthogonal to the square less its mean.
-    square = np.arange(-half, half + 1.0) ** 2
-    square -= np.mean(square)
-    weights = 2.0 * square / (np.sum(square**2) * period**2)
+    weights = _second_derivative(half) / period**2
     columns = velocity.reshape(len(velocity), -1).T
     second = [np.correlate(column, weights, "valid") for column in columns]
     return np.stack(second, axis=1).reshape(-1, *velocity.shape[1:])
+
+
+@cache
+def _second_derivative(half: int) -> NDArray[np.float64]:
+    """Weights of 2 half + 1 samples, one apart, in that of the fitted cubic."""
+    square = np.arange(-half, half + 1.0) ** 2
+    # The cubic's odd terms are orthogonal to the square less its mean.
+    square -= np.mean(square)
+    weights: NDArray[np.float64] = 2.0 * square / np.sum(square**2)
+    return weights
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
@@ -69,18 +78,27 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
     """
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
-    magnitude = np.abs(rfft(speed, count))
-    peak = np.max(magnitude, axis=-1, keepdims=True)
-    magnitude = magnitude[..., : math.floor(CUTOFF_HZ * count / rate_hz) + 1] / peak
-    loud = magnitude >= THRESHOLD
-    first = np.argmax(loud, axis=-1)
-    last = loud.shape[-1] - 1 - np.argmax(loud[..., ::-1], axis=-1)
-    step = 1.0 / np.maximum(last - first, 1)
-    index = np.arange(np.max(last, initial=0))
-    inside = (index >= first[..., None]) & (index < last[..., None])
-    rise = np.diff(magnitude[..., : len(index) + 1], axis=-1)
-    lengths = np.sqrt(step[..., None] ** 2 + rise**2)
-    return -np.sum(lengths, axis=-1, where=inside)
+    spectra = rfft(speed.reshape(-1, speed.shape[-1]), count)
+    highest = math.floor(CUTOFF_HZ * count / rate_hz)
+    return _arc_lengths(spectra, highest).reshape(speed.shape[:-1])
+
+
+@njit(cache=True)
+def _arc_lengths(
+    spectra: NDArray[np.complex128], highest: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n,) ``spectral_arc_length`` of (n, lines) spectra, up to the highest line."""
+    lengths = np.zeros(len(spectra))
+    for k in range(len(spectra)):
+        power = spectra[k].real ** 2 + spectra[k].imag ** 2
+        magnitude = np.sqrt(power[: highest + 1] / np.max(power))
+        loud = np.flatnonzero(magnitude >= THRESHOLD)
+        first, last = (loud[0], loud[-1]) if loud.size else (0, highest)
+        step = 1.0 / max(last - first, 1)
+        for i in range(first, last):
+            rise = magnitude[i + 1] - magnitude[i]
+            lengths[k] -= math.sqrt(step * step + rise * rise)
+    return lengths
 
 
 def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
