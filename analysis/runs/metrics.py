@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from analysis.runs.collision_warning import collision_warning
@@ -21,7 +22,7 @@ from analysis.runs.smoothness import (
 )
 from diagrams.simulation import RunResult
 from diagrams.stop_rules import ROUNDING_S
-from systems.world.geometry import control_point_velocity
+from systems.world.geometry import beyond_rectangle, control_point_velocity
 
 __all__ = ["following_error", "frames_with_sound", "run_metrics"]
 
@@ -257,17 +258,50 @@ def _reaction_distance(proximity: Proximity) -> float | None:
     result, columns = proximity.result, proximity.result.columns
     if len(result.surroundings.bodies) < 2 or "repulsion_x" not in columns:
         return None
-    push = _lengths(result.vector("repulsion"))
-    pushed = np.flatnonzero(push >= REACTION_N)
-    distances = proximity.distances_from_P(pushed)
-    nearest = np.min(distances[:-1], axis=0)
-    seen = np.zeros(len(pushed), dtype=bool)
-    for k in (1, 2, 3):
-        echo = _lengths(result.vector(f"collision_{k}_B")[:, pushed])
-        own = np.abs(echo - nearest) <= ECHO_M
-        seen |= own & (columns[f"feature_{k}"][pushed] > 0.5)
-    first = np.flatnonzero(seen & (nearest < distances[-1]))
-    return float(nearest[first[0]]) if len(first) else None
+    echoes = [
+        [columns[f"feature_{k}"], *result.vector(f"collision_{k}_B")] for k in (1, 2, 3)
+    ]
+    distance = _first_reaction(
+        proximity.bodies,
+        result.vector("p_WP"),
+        result.vector("repulsion"),
+        np.array(echoes),
+    )
+    return distance if math.isfinite(distance) else None
+
+
+@njit(cache=True)
+def _first_reaction(
+    bodies: NDArray[np.float64],
+    p_WP: NDArray[np.float64],
+    push: NDArray[np.float64],
+    echoes: NDArray[np.float64],
+) -> float:  # pragma: no cover  (compiled)
+    """Distance from P to the nearest obstacle at the first reaction to it, m.
+
+    Args:
+        bodies: (m, n, 5) rectangles, what is followed last.
+        p_WP: (2, n) m.
+        push: (2, n) of the law, N.
+        echoes: (k, 3, n) whether there is one, and where it is in B, m.
+
+    Returns:
+        Infinite where there was none.
+    """
+    for i in range(push.shape[1]):
+        if math.hypot(push[0, i], push[1, i]) < REACTION_N:
+            continue
+        nearest, distance = np.inf, np.inf
+        for k in range(len(bodies)):
+            nearest = min(nearest, distance)
+            du, dv = beyond_rectangle(p_WP[:, i], bodies[k, i])
+            distance = math.hypot(du, dv)
+        if nearest >= distance:
+            continue
+        for there, x, y in echoes[:, :, i]:
+            if there > 0.5 and abs(math.hypot(x, y) - nearest) <= ECHO_M:
+                return nearest
+    return np.inf
 
 
 def _hearing_metrics(result: RunResult) -> dict[str, Any]:

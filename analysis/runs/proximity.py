@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from diagrams.bodies import rectangles_at
 from diagrams.simulation import RunResult
-from systems.world.geometry import beyond_rectangle, contact_time, rectangle_clearance
+from systems.world.geometry import contact_time, rectangle_clearance
 
 __all__ = ["Proximity"]
 
@@ -86,17 +86,6 @@ class Proximity:
         velocity = self.result.vector("v_WB")
         return _least_contact_time(self.result.time, self.robot, velocity, self.bodies)
 
-    def distances_from_P(self, ticks: NDArray[np.intp]) -> NDArray[np.float64]:
-        """Distances from P to the bodies' rectangles.
-
-        Args:
-            ticks: (k,) at which.
-
-        Returns:
-            (m, k) m.
-        """
-        return _distances(self.result.vector("p_WP"), self.bodies, ticks)
-
     @cached_property
     def _clearances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         return _least_clearances(self.robot, self.bodies)
@@ -128,19 +117,6 @@ def _least_clearances(
             if clearance < nearest[i]:
                 nearest[i], first = clearance, k
     return nearest, least
-
-
-@njit(cache=True)
-def _distances(
-    points: NDArray[np.float64], bodies: NDArray[np.float64], ticks: NDArray[np.intp]
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(m, k) of (2, n) points from (m, n, 5) rectangles at some of n ticks, m."""
-    distances = np.empty((bodies.shape[0], ticks.size))
-    for k in range(bodies.shape[0]):
-        for j, i in enumerate(ticks):
-            du, dv = beyond_rectangle(points[:, i], bodies[k, i])
-            distances[k, j] = math.sqrt(du * du + dv * dv)
-    return distances
 
 
 @njit(cache=True)

@@ -123,22 +123,29 @@ def test_clearance_between_ticks(speed, passed):
     assert least == pytest.approx(0.01, abs=2e-4)
 
 
-def test_distance_of_P_is_from_the_turned_box():
-    """0.4 by 0.2 m at (2, 1), turned by 30 deg: beside it, off a corner, within."""
+@pytest.mark.parametrize(
+    ("u", "v", "distance"),
+    [(-0.5, 0.5, 0.5), (0.1, -0.4, 0.3), (0.7, 0.05, 0.5), (0.5, -0.5, 0.5), (0, 0, 0)],
+)
+def test_reaction_distance_is_from_the_turned_box(u, v, distance):
+    """P beside a box of 0.4 by 0.2 m at (2, 1) turned by 30 deg, off it, within."""
     turn = math.radians(30.0)
     cos, sin = math.cos(turn), math.sin(turn)
-    box = {
-        "size_m": [0.4, 0.2],
-        "waypoints_m": [[2.0, 1.0], [2.0 + 9.0 * cos, 1.0 + 9.0 * sin]],
-        "speed_m_s": 1e-6,
-    }
-    u = np.array([-0.5, 0.1, 0.7, 0.5, -0.1])
-    v = np.array([0.5, -0.4, 0.05, -0.5, 0.05])
-    x, y = 2.0 + cos * u - sin * v, 1.0 + sin * u + cos * v
-    run = motion(x - FRONT, y, 0.0 * x, obstacles=[box])
-    distances = Proximity(run).distances_from_P(np.arange(5))
-    assert distances.shape == (2, 5)
-    np.testing.assert_allclose(distances[0], [0.5, 0.3, 0.5, 0.5, 0.0], atol=1e-6)
+    box = {"size_m": [0.4, 0.2], "waypoints_m": [[2.0, 1.0]], "heading_deg": 30.0}
+    run = motion(
+        np.full(2, 2.0 + cos * u - sin * v - FRONT),
+        np.full(2, 1.0 + sin * u + cos * v),
+        np.zeros(2),
+        obstacles=[box],
+        source={"waypoints_m": [[9.0, 9.0]]},
+        columns={
+            "repulsion_x": np.full(2, -1.0),
+            "feature_1": np.ones(2),
+            "collision_1_B_x": np.full(2, distance + 0.19),
+        },
+    )
+    reaction = run_metrics(run)["reaction_distance_m"]
+    assert reaction == pytest.approx(distance, abs=1e-9)
 
 
 def to_and_fro(rest_s: float, **scenario: Any) -> dict[str, float | None]:
