@@ -135,14 +135,19 @@ def _least_contact_time(
         bodies: (m, n, 5) rectangles.
     """
     least, reaches = np.inf, _reaches(robot, bodies)
-    for k in range(bodies.shape[0]):
+    for k in range(len(bodies)):
+        x, y = bodies[k, :, 0], bodies[k, :, 1]
         for i in range(time.size):
-            vx = velocity[0, i] - _rate(time, bodies[k, :, 0], i)
-            vy = velocity[1, i] - _rate(time, bodies[k, :, 1], i)
-            # Circles round the rectangles touch first, if ever.
+            vx = velocity[0, i] - _rate(time, x, i)
+            vy = velocity[1, i] - _rate(time, y, i)
             apart = _gap(robot[i], bodies[k, i], reaches[k])
-            if apart > 0.0 and apart >= least * math.sqrt(vx * vx + vy * vy):
-                continue
+            if apart > 0.0:
+                # The circles touch first, if ever, and their gap closes no faster
+                # than their centres come nearer now.
+                dx, dy = x[i] - robot[i, 0], y[i] - robot[i, 1]
+                nearing = (dx * vx + dy * vy) / (apart + reaches[k])
+                if nearing <= 0.0 or apart >= least * nearing:
+                    continue
             least = min(least, contact_time(robot[i], bodies[k, i], vx, vy))
     return least
 
