@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from analysis.runs.metrics import frames_with_sound, run_metrics
@@ -18,6 +20,7 @@ from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import Collision
 from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.world.geometry import contact_time, rectangle_clearance
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.
@@ -85,6 +88,35 @@ def test_time_to_contact_on_the_way_to_the_source():
     assert metrics["minimum_time_to_contact_s"] == pytest.approx(ahead / 0.5)
     away = run_metrics(straight(-0.5, source=RESTING))
     assert away["minimum_time_to_contact_s"] is None
+
+
+@given(seed=st.integers(0, 1000))
+def test_bodies_that_are_passed_over_are_not_the_nearest(seed):
+    """Clearances and contact times of all bodies at all ticks, one by one."""
+    rng = np.random.default_rng(seed)
+    ways = np.cumsum(rng.normal(0.0, 0.1, (3, 60)), axis=1)
+    boxes = [
+        {
+            "name": f"box {k}",
+            "size_m": rng.uniform(0.05, 1.0, 2).tolist(),
+            "waypoints_m": [[3.0 * k - 3.0, 2.5], rng.uniform(-1.0, 1.0, 2).tolist()],
+            "speed_m_s": 2.0,
+        }
+        for k in range(3)
+    ]
+    run = motion(*ways, obstacles=boxes, source={"waypoints_m": [[0.0, -3.0]]})
+    near = Proximity(run)
+    velocities = np.gradient(near.bodies[:, :, :2], run.time, axis=1)
+    clearances, times = np.empty((2, *near.bodies.shape[:2]))
+    for k, i in np.ndindex(clearances.shape):
+        clearances[k, i] = rectangle_clearance(near.robot[i], near.bodies[k, i])
+        relative = run.vector("v_WB")[:, i] - velocities[k, i]
+        times[k, i] = contact_time(near.robot[i], near.bodies[k, i], *relative)
+    np.testing.assert_allclose(near.clearance, np.min(clearances, axis=0), atol=1e-12)
+    assert np.all(near.least <= np.min(clearances, axis=1) + 1e-12)
+    assert near.least_time_to_contact == pytest.approx(np.min(times), rel=1e-9)
+    p05 = run_metrics(run)["clearance_p05_m"]
+    assert p05 == pytest.approx(np.quantile(near.clearance, 0.05), rel=1e-12)
 
 
 def test_time_to_contact_counts_both_motions():
