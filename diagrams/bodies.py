@@ -21,6 +21,7 @@ __all__ = [
     "RecordedPath",
     "Surroundings",
     "microphones_W",
+    "rectangles_at",
     "robot_rectangle",
 ]
 
@@ -109,8 +110,7 @@ class Body(NamedTuple):
 
     def rectangles(self, times: ArrayLike) -> NDArray[np.float64]:
         """(n, 5) rectangles at many times at once."""
-        poses = self.path.poses(times)
-        return np.hstack([poses, np.tile(np.array(self.size), (len(poses), 1))])
+        return rectangles_at(self.path.poses(times), self.size)
 
 
 @dataclass(frozen=True)
@@ -131,6 +131,23 @@ class Surroundings:
     def obstacles(self) -> dict[str, Body]:
         """All but what is followed."""
         return {k: body for k, body in self.bodies.items() if k != self.target}
+
+
+def rectangles_at(
+    poses: NDArray[np.float64], size: tuple[float, float]
+) -> NDArray[np.float64]:
+    """Rectangles of one size.
+
+    Args:
+        poses: (n, 3) x, y, theta of their centres, m and rad.
+        size: Length and width, m.
+
+    Returns:
+        (n, 5) x, y, theta, length, width.
+    """
+    rectangles = np.empty((len(poses), 5))
+    rectangles[:, :3], rectangles[:, 3:] = poses, size
+    return rectangles
 
 
 def microphones_W(pose_WB: ArrayLike, robot: RobotParameters) -> NDArray[np.float64]:

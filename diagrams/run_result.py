@@ -51,7 +51,7 @@ class RunResult:
     several: dict[str, RunResult] = field(default_factory=dict)
     """What each robot did, where there are several."""
     others: Surroundings | None = None
-    """What this one of several robots had about it."""
+    """What this robot had about it, other robots on their ways included."""
     whole: Scenario | None = None
     """What was run, where that is more than ``scenario``."""
 
@@ -101,7 +101,7 @@ class RunResult:
 
     def vector(self, name: str) -> NDArray[np.float64]:
         """(2, n) x and y of a column's quantity at the ticks, as of ``p_WP``."""
-        return np.stack([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
+        return np.array([self.columns[f"{name}_x"], self.columns[f"{name}_y"]])
 
     @property
     def simulated_s(self) -> float:
@@ -152,7 +152,7 @@ def gather_result(
             wall_s,
             name,
             engine,
-            others=None if own is scenario else around,
+            others=around,
             whole=None if own is scenario else scenario,
         )
     if not several:
@@ -200,16 +200,16 @@ def _completed(
 ) -> dict[str, NDArray[np.float64]]:
     """With what follows from the log: P, and the true and heard place of the source."""
     offset, theta = scenario.robot.control_point_m, columns["theta_WB"]
-    x_P = columns["p_WB_x"] + offset * np.cos(theta)
-    y_P = columns["p_WB_y"] + offset * np.sin(theta)
-    path = around.followed.path
-    pose_WS = path.poses(columns["t"])
-    columns["p_WS_x"], columns["p_WS_y"], columns["theta_WS"] = pose_WS.T
+    c, s = np.cos(theta), np.sin(theta)
+    x_P = columns["p_WB_x"] + offset * c
+    y_P = columns["p_WB_y"] + offset * s
+    pose_WS = np.ascontiguousarray(around.followed.path.poses(columns["t"]).T)
+    columns["p_WS_x"], columns["p_WS_y"], columns["theta_WS"] = pose_WS
     dx, dy = columns["p_WS_x"] - x_P, columns["p_WS_y"] - y_P
-    bearing = np.arctan2(dy, dx) - theta
+    ahead, left = c * dx + s * dy, c * dy - s * dx
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
-    columns["source_range_true"] = np.hypot(dx, dy)
-    columns["source_bearing_true"] = np.arctan2(np.sin(bearing), np.cos(bearing))
+    columns["source_range_true"] = np.sqrt(dx * dx + dy * dy)
+    columns["source_bearing_true"] = np.arctan2(left, ahead)
     x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
     heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5
     columns["source_bearing"] = np.where(heard, np.arctan2(y, x), np.nan)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.simulation import RunResult
-from systems.ranging.ultrasonic_array import cone_ranges
+from systems.world.geometry import fan_ranges
 
 __all__ = ["collision_warning"]
 
@@ -45,11 +46,26 @@ def _echoes(result: RunResult, name: str) -> NDArray[np.bool_]:
     scenario, columns = result.scenario, result.columns
     sensors, control_point_m = scenario.ultrasonic, scenario.robot.control_point_m
     bodies = result.surroundings.bodies[name].rectangles(result.time)
-    ranges = [
-        cone_ranges(pose, body[np.newaxis], sensors, control_point_m)
-        for pose, body in zip(result.poses("WB"), bodies, strict=True)
-    ]
+    ranges = _cone_ranges(result.poses("WB"), bodies, *sensors.beams, control_point_m)
     numbers = range(1, sensors.count + 1)
     read = np.stack([columns[f"range_{k}"] for k in numbers], axis=1)
     echo = np.stack([columns[f"echo_{k}"] for k in numbers], axis=1) > 0.5
     return np.any(echo & (np.abs(read - ranges) <= SAME_M), axis=1)
+
+
+@njit(cache=True)
+def _cone_ranges(
+    poses: NDArray[np.float64],
+    bodies: NDArray[np.float64],
+    axes: NDArray[np.float64],
+    places: NDArray[np.float64],
+    half_angle: float,
+    control_point_m: float,
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n, cones) true ranges of (n, 5) rectangles, m; see ``fan_ranges``."""
+    ranges = np.empty((len(poses), axes.size))
+    for i in range(len(poses)):
+        ranges[i] = fan_ranges(
+            poses[i], bodies[i : i + 1], axes, places, half_angle, control_point_m
+        )
+    return ranges

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,8 +10,9 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from diagrams.bodies import rectangles_at
 from diagrams.simulation import RunResult
-from systems.world.geometry import beyond_rectangle, contact_time, rectangle_clearance
+from systems.world.geometry import contact_time, rectangle_clearance
 
 __all__ = ["Proximity"]
 
@@ -33,23 +35,20 @@ class Proximity:
     @cached_property
     def robot(self) -> NDArray[np.float64]:
         """(n, 5) the robot's rectangle at the ticks."""
-        return _rectangles(self.result, self.result.poses("WB"))
+        return rectangles_at(self.result.poses("WB"), self.result.scenario.size)
 
     @cached_property
     def bodies(self) -> NDArray[np.float64]:
         """(m, n, 5) the bodies' rectangles at the ticks, what is followed last."""
-        bodies = self.result.surroundings.bodies.values()
-        return np.stack([body.rectangles(self.result.time) for body in bodies])
-
-    @cached_property
-    def clearances(self) -> NDArray[np.float64]:
-        """(m, n) distance to each body at the ticks, m; negative depth inside."""
-        return _clearances(self.robot, self.bodies)
+        around, time = self.result.surroundings, self.result.time
+        followed = rectangles_at(self.result.poses("WS"), around.followed.size)
+        obstacles = around.obstacles.values()
+        return np.stack([*(body.rectangles(time) for body in obstacles), followed])
 
     @property
     def clearance(self) -> NDArray[np.float64]:
-        """(n,) distance to the nearest body at the ticks, m."""
-        return np.min(self.clearances, axis=0)
+        """(n,) distance to the nearest body at the ticks, m; negative depth inside."""
+        return self._clearances[0]
 
     @cached_property
     def least(self) -> NDArray[np.float64]:
@@ -60,8 +59,8 @@ class Proximity:
         interpolated, the bodies are where their paths say, and other robots on
         straight lines between ticks.
         """
-        least = np.min(self.clearances, axis=1)
-        near = self.clearance < NEAR_M
+        clearance, least = self._clearances
+        near = clearance < NEAR_M
         ticks = np.flatnonzero(near[:-1] | near[1:])
         if len(ticks) == 0:
             return least
@@ -70,60 +69,121 @@ class Proximity:
         times = (time[ticks, None] + part * np.diff(time)[ticks, None]).ravel()
         step = np.diff(poses, axis=0)[ticks]
         between = poses[ticks, None] + part[:, None] * step[:, None]
-        robot = _rectangles(self.result, between.reshape(-1, 3))
+        robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.size)
         paths = self.result.surroundings.bodies.values()
         bodies = np.stack([body.rectangles(times) for body in paths])
-        return np.minimum(least, np.min(_clearances(robot, bodies), axis=1))
+        return np.minimum(least, _least_clearances(robot, bodies)[1])
 
     @cached_property
-    def time_to_contact(self) -> NDArray[np.float64]:
-        """(n,) time to the first contact if all went on as at each tick, s.
+    def least_time_to_contact(self) -> float:
+        """Time to the first contact if all went on as at a tick, the least, s.
 
         Every rectangle keeps its heading and the velocity of its centre;
         infinite where nothing would touch.
         """
-        time = self.result.time
-        if len(time) < 2:
-            return np.full(len(time), np.inf)
-        robot = self.result.vector("v_WB").T
-        bodies = np.gradient(self.bodies[:, :, :2], time, axis=1)
-        return _contact_times(self.robot, self.bodies, robot - bodies)
+        if len(self.result.time) < 2:
+            return math.inf
+        velocity = self.result.vector("v_WB")
+        return _least_contact_time(self.result.time, self.robot, velocity, self.bodies)
 
-    def distances_from_P(self) -> NDArray[np.float64]:
-        """(m, n) distance from P to each body's rectangle at the ticks, m."""
-        p_WP, bodies = self.result.vector("p_WP"), np.moveaxis(self.bodies, 2, 0)
-        return np.hypot(*beyond_rectangle(p_WP, bodies))
-
-
-def _rectangles(result: RunResult, poses: NDArray[np.float64]) -> NDArray[np.float64]:
-    robot = result.scenario.robot
-    size = np.array([robot.length_m, robot.width_m])
-    return np.hstack([poses, np.tile(size, (len(poses), 1))])
+    @cached_property
+    def _clearances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        return _least_clearances(self.robot, self.bodies)
 
 
 @njit(cache=True)
-def _clearances(
+def _least_clearances(
+    robot: NDArray[np.float64], bodies: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
+    """Clearances of (n, 5) and (m, n, 5) rectangles: (n,) and (m,) least ones, m.
+
+    A body is passed over where the circles round both are so far apart that it
+    is neither the nearest one nor as near as before.
+    """
+    count, ticks = bodies.shape[:2]
+    nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)
+    reaches = _reaches(robot, bodies)
+    first = 0
+    for i in range(ticks):
+        # What was nearest at the last tick is first, so that others are passed over.
+        begin = first
+        for j in range(count):
+            k = (begin + j) % count
+            apart = _gap(robot[i], bodies[k, i], reaches[k])
+            if apart > 0.0 and apart >= nearest[i] and apart >= least[k]:
+                continue
+            clearance = rectangle_clearance(robot[i], bodies[k, i])
+            least[k] = min(least[k], clearance)
+            if clearance < nearest[i]:
+                nearest[i], first = clearance, k
+    return nearest, least
+
+
+@njit(cache=True)
+def _least_contact_time(
+    time: NDArray[np.float64],
+    robot: NDArray[np.float64],
+    velocity: NDArray[np.float64],
+    bodies: NDArray[np.float64],
+) -> float:  # pragma: no cover  (compiled)
+    """Least contact time over ticks and bodies, s.
+
+    Args:
+        time: (n,) of the ticks, s.
+        robot: (n, 5) rectangles.
+        velocity: (2, n) of the robot, m/s.
+        bodies: (m, n, 5) rectangles.
+    """
+    least, reaches = np.inf, _reaches(robot, bodies)
+    for k in range(len(bodies)):
+        x, y = bodies[k, :, 0], bodies[k, :, 1]
+        for i in range(time.size):
+            vx = velocity[0, i] - _rate(time, x, i)
+            vy = velocity[1, i] - _rate(time, y, i)
+            apart = _gap(robot[i], bodies[k, i], reaches[k])
+            if apart > 0.0:
+                # The circles touch first, if ever, and their gap closes no faster
+                # than their centres come nearer now.
+                dx, dy = x[i] - robot[i, 0], y[i] - robot[i, 1]
+                nearing = (dx * vx + dy * vy) / (apart + reaches[k])
+                if nearing <= 0.0 or apart >= least * nearing:
+                    continue
+            least = min(least, contact_time(robot[i], bodies[k, i], vx, vy))
+    return least
+
+
+@njit(cache=True)
+def _reaches(
     robot: NDArray[np.float64], bodies: NDArray[np.float64]
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(m, n) clearance of (n, 5) and (m, n, 5) rectangles, m."""
-    clearances = np.empty(bodies.shape[:2])
-    for k in range(bodies.shape[0]):
-        for i in range(bodies.shape[1]):
-            clearances[k, i] = rectangle_clearance(robot[i], bodies[k, i])
-    return clearances
+    """(m,) radii of the circles round robot and body together, m."""
+    reaches = np.empty(len(bodies))
+    for k in range(len(bodies)):
+        a, b = robot[0], bodies[k, 0]
+        reaches[k] = 0.5 * (math.hypot(a[3], a[4]) + math.hypot(b[3], b[4]))
+    return reaches
 
 
 @njit(cache=True)
-def _contact_times(
-    robot: NDArray[np.float64],
-    bodies: NDArray[np.float64],
-    velocities: NDArray[np.float64],
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n,) least contact time over the bodies; velocities (m, n, 2), m/s."""
-    times = np.full(robot.shape[0], np.inf)
-    for k in range(bodies.shape[0]):
-        for i in range(bodies.shape[1]):
-            vx, vy = velocities[k, i]
-            time = contact_time(robot[i], bodies[k, i], vx, vy)
-            times[i] = min(times[i], time)
-    return times
+def _gap(
+    a: NDArray[np.float64], b: NDArray[np.float64], reach: float
+) -> float:  # pragma: no cover  (compiled)
+    """Between the circles round two rectangles, m; negative where they overlap."""
+    dx, dy = a[0] - b[0], a[1] - b[1]
+    return math.sqrt(dx * dx + dy * dy) - reach
+
+
+@njit(cache=True)
+def _rate(
+    time: NDArray[np.float64], values: NDArray[np.float64], i: int
+) -> float:  # pragma: no cover  (compiled)
+    """Derivative at a tick, of a parabola through its neighbours."""
+    if i == 0:
+        return (values[1] - values[0]) / (time[1] - time[0])
+    before = time[i] - time[i - 1]
+    slope_before = (values[i] - values[i - 1]) / before
+    if i == time.size - 1:
+        return slope_before
+    after = time[i + 1] - time[i]
+    slope_after = (values[i + 1] - values[i]) / after
+    return (after * slope_before + before * slope_after) / (before + after)

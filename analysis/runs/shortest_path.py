@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import heapq
 import math
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from systems.world.geometry import beyond_each
+from systems.world.geometry import beyond, beyond_rectangle
 
 __all__ = ["shortest_path_length"]
 
@@ -42,113 +42,129 @@ def shortest_path_length(
     Returns:
         m; 0 from within the circle, infinite where there is no way.
     """
-    start, goal = np.asarray(start, dtype=float), np.asarray(goal, dtype=float)
-    boxes = np.asarray(boxes, dtype=float).reshape(-1, 5)
-    radii = np.minimum(radius, np.array([_distance(start, box) for box in boxes]))
-    obstacles = list(zip(boxes, radii - GRAZE_M, strict=True))
-    corners = [_outline(box, r) for box, r in zip(boxes, radii, strict=True)]
-    points = np.concatenate([start[None], *corners])
-    away = goal - points
-    distance = np.hypot(away[:, 0], away[:, 1])
-    to_goal = np.maximum(distance - goal_radius, 0.0)
-    # A goal's disc may hold points; from there the last leg has no length.
-    share = to_goal / np.maximum(distance, 1e-12)
-    last_leg = _free(points, points + share[:, None] * away, obstacles)
-    return _search(points, to_goal, last_leg, obstacles)
+    ends = np.asarray([start, goal], dtype=float)
+    rectangles = np.asarray(boxes, dtype=float).reshape(-1, 5)
+    return _search(ends[0], ends[1], float(goal_radius), rectangles, float(radius))
 
 
+@njit(cache=True)
 def _search(
-    points: NDArray[np.float64],
-    to_goal: NDArray[np.float64],
-    last_leg: NDArray[np.bool_],
-    obstacles: list[tuple[NDArray[np.float64], float]],
-) -> float:
-    """A* from the first point; the straight distance to the goal is its bound."""
+    start: NDArray[np.float64],
+    goal: NDArray[np.float64],
+    goal_radius: float,
+    boxes: NDArray[np.float64],
+    radius: float,
+) -> float:  # pragma: no cover  (compiled)
+    """A* from the start; the straight distance to the goal is its bound."""
+    radii = np.array([min(radius, _beyond(start, box)) for box in boxes])
+    points = np.empty((1 + 4 * TANGENTS * len(boxes), 2))
+    points[0] = start
+    for k, box in enumerate(boxes):
+        begin = 1 + 4 * TANGENTS * k
+        _outline(box, radii[k], points[begin : begin + 4 * TANGENTS])
+    to_goal = np.empty(len(points))
+    for k, point in enumerate(points):
+        away = _distance(point, goal)
+        to_goal[k] = max(away - goal_radius, 0.0)
     lengths = np.full(len(points), np.inf)
     lengths[0] = 0.0
-    best = math.inf
-    done = np.zeros(len(points), dtype=bool)
-    queue = [(float(to_goal[0]), 0)]
-    while queue:
-        bound, here = heapq.heappop(queue)
+    done = np.zeros(len(points), dtype=np.bool_)
+    best = np.inf
+    while True:
+        here, bound = 0, best
+        for k in range(len(points)):
+            if not done[k] and lengths[k] + to_goal[k] < bound:
+                here, bound = k, lengths[k] + to_goal[k]
         if bound >= best:
-            break
-        if done[here]:
-            continue
+            return best
         done[here] = True
-        if last_leg[here]:
-            best = min(best, float(lengths[here] + to_goal[here]))
-        legs = np.hypot(*(points - points[here]).T)
-        reach = lengths[here] + legs
-        better = np.flatnonzero(~done & (reach < lengths) & (reach + to_goal < best))
-        open_way = _free(points[here], points[better], obstacles)
-        for there in better[open_way]:
-            lengths[there] = reach[there]
-            heapq.heappush(queue, (float(reach[there] + to_goal[there]), int(there)))
-    return best
+        # A goal's disc may hold points; from there the last leg has no length.
+        share = to_goal[here] / max(_distance(points[here], goal), 1e-12)
+        last = points[here] + share * (goal - points[here])
+        if _free(points[here], last, boxes, radii):
+            best = min(best, bound)
+        for k in range(len(points)):
+            reach = lengths[here] + _distance(points[here], points[k])
+            useful = reach < lengths[k] and reach + to_goal[k] < best
+            if useful and not done[k] and _free(points[here], points[k], boxes, radii):
+                lengths[k] = reach
 
 
-def _distance(point: NDArray[np.float64], box: NDArray[np.float64]) -> float:
-    outside = beyond_each(_local(point[None], box)[0], box[3:] / 2.0)
-    return float(np.hypot(*outside))
+@njit(cache=True)
+def _distance(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
+    return math.hypot(b[0] - a[0], b[1] - a[1])
 
 
-def _local(
-    points: NDArray[np.float64], box: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n, 2) points in the box's own axes."""
-    c, s = math.cos(box[2]), math.sin(box[2])
-    return (points - box[:2]) @ np.array([[c, -s], [s, c]])
+@njit(cache=True)
+def _beyond(
+    point: NDArray[np.float64], box: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a point from a box, m."""
+    du, dv = beyond_rectangle(point, box)
+    return math.hypot(du, dv)
 
 
-def _outline(box: NDArray[np.float64], radius: float) -> NDArray[np.float64]:
-    """(k, 2) corners of a polygon just outside the box grown by the radius."""
+@njit(cache=True)
+def _outline(
+    box: NDArray[np.float64], radius: float, corners: NDArray[np.float64]
+) -> None:  # pragma: no cover  (compiled)
+    """Sets the corners of a polygon just outside the box grown by the radius."""
     step = 0.5 * math.pi / TANGENTS
-    corners = []
-    for quarter, (a, b) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
-        angle = (np.arange(TANGENTS) + 0.5) * step + quarter * 0.5 * math.pi
-        arc = radius / math.cos(0.5 * step)
-        x = a * box[3] / 2.0 + arc * np.cos(angle)
-        y = b * box[4] / 2.0 + arc * np.sin(angle)
-        corners.append(np.stack([x, y], axis=1))
+    arc = radius / math.cos(0.5 * step)
     c, s = math.cos(box[2]), math.sin(box[2])
-    return np.concatenate(corners) @ np.array([[c, s], [-s, c]]) + box[:2]
+    for k in range(4 * TANGENTS):
+        angle = (k + 0.5) * step
+        x = math.copysign(box[3] / 2.0, math.cos(angle)) + arc * math.cos(angle)
+        y = math.copysign(box[4] / 2.0, math.sin(angle)) + arc * math.sin(angle)
+        corners[k, 0] = box[0] + c * x - s * y
+        corners[k, 1] = box[1] + s * x + c * y
 
 
+@njit(cache=True)
 def _free(
-    starts: NDArray[np.float64],
-    ends: NDArray[np.float64],
-    obstacles: list[tuple[NDArray[np.float64], float]],
-) -> NDArray[np.bool_]:
-    """(n,) whether the legs keep their distances from all boxes."""
-    starts = np.broadcast_to(starts, ends.shape)
-    free = np.ones(len(ends), dtype=bool)
-    for box, radius in obstacles:
-        a, b = _local(starts, box), _local(ends, box)
-        free &= _distances(a, b, box[3:] / 2.0) >= radius
-    return free
+    start: NDArray[np.float64],
+    end: NDArray[np.float64],
+    boxes: NDArray[np.float64],
+    radii: NDArray[np.float64],
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a leg keeps its distances from all boxes."""
+    for k in range(len(boxes)):
+        if _leg_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
+            return False
+    return True
 
 
-def _distances(
-    a: NDArray[np.float64], b: NDArray[np.float64], half: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """(n,) distance of segments from a box centred on the origin; 0 if they meet."""
-    along = b - a
-    distance = np.minimum(*(np.hypot(*beyond_each(end, half).T) for end in (a, b)))
-    squared = np.maximum(np.sum(along**2, axis=1), 1e-18)
-    for corner in half * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]):
-        t = np.clip(np.sum((corner - a) * along, axis=1) / squared, 0.0, 1.0)
-        away = corner - a - t[:, None] * along
-        distance = np.minimum(distance, np.hypot(*away.T))
-    return np.where(_meet(a, along, half), 0.0, distance)
-
-
-def _meet(
-    a: NDArray[np.float64], along: NDArray[np.float64], half: NDArray[np.float64]
-) -> NDArray[np.bool_]:
-    """(n,) whether segments meet the box: its slabs are crossed at one time."""
-    safe = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    one, other = (-half - a) / safe, (half - a) / safe
-    enter = np.max(np.minimum(one, other), axis=1)
-    leave = np.min(np.maximum(one, other), axis=1)
-    return (enter <= leave) & (leave >= 0.0) & (enter <= 1.0)
+@njit(cache=True)
+def _leg_clearance(
+    start: NDArray[np.float64], end: NDArray[np.float64], box: NDArray[np.float64]
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a leg from a box, m; 0 if they meet."""
+    c, s = math.cos(box[2]), math.sin(box[2])
+    dx, dy = start[0] - box[0], start[1] - box[1]
+    x, y = c * dx + s * dy, c * dy - s * dx
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    along_x, along_y = c * dx + s * dy, c * dy - s * dx
+    half_x, half_y = box[3] / 2.0, box[4] / 2.0
+    # They meet if the leg crosses both of the box's slabs at one time.
+    enter, leave = 0.0, 1.0
+    for at, along, half in ((x, along_x, half_x), (y, along_y, half_y)):
+        safe = along if abs(along) >= 1e-12 else 1e-12
+        one, other = (-half - at) / safe, (half - at) / safe
+        enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
+    if enter <= leave:
+        return 0.0
+    nearest = min(
+        math.hypot(beyond(x, half_x), beyond(y, half_y)),
+        math.hypot(beyond(x + along_x, half_x), beyond(y + along_y, half_y)),
+    )
+    squared = max(along_x * along_x + along_y * along_y, 1e-18)
+    for corner_x in (half_x, -half_x):
+        for corner_y in (half_y, -half_y):
+            away_x, away_y = corner_x - x, corner_y - y
+            t = (away_x * along_x + away_y * along_y) / squared
+            t = min(max(t, 0.0), 1.0)
+            distance = math.hypot(away_x - t * along_x, away_y - t * along_y)
+            nearest = min(nearest, distance)
+    return nearest

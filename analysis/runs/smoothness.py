@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
+from scipy.fft import rfft
 
 __all__ = [
     "jerk",
@@ -39,16 +42,24 @@ def jerk(velocity: ArrayLike, period: float) -> NDArray[np.float64]:
         (m,) or (m, k), m/s^3: samples whose window is whole, 10 fewer than n at 25 ms;
         empty where there is none.
     """
-    from scipy.signal import savgol_filter
-
     velocity = np.asarray(velocity, dtype=float)
     half = max(2, round(JERK_HALF_WINDOW_S / period))
     if len(velocity) <= 2 * half:
         return np.empty((0, *velocity.shape[1:]))
-    second: NDArray[np.float64] = savgol_filter(
-        velocity, 2 * half + 1, polyorder=3, deriv=2, delta=period, axis=0
-    )
-    return second[half:-half]
+    weights = _second_derivative(half) / period**2
+    columns = velocity.reshape(len(velocity), -1).T
+    second = [np.correlate(column, weights, "valid") for column in columns]
+    return np.stack(second, axis=1).reshape(-1, *velocity.shape[1:])
+
+
+@cache
+def _second_derivative(half: int) -> NDArray[np.float64]:
+    """Weights of 2 half + 1 samples, one apart, in that of the fitted cubic."""
+    square = np.arange(-half, half + 1.0) ** 2
+    # The cubic's odd terms are orthogonal to the square less its mean.
+    square -= np.mean(square)
+    weights: NDArray[np.float64] = 2.0 * square / np.sum(square**2)
+    return weights
 
 
 def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:
@@ -67,18 +78,27 @@ def spectral_arc_length(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]
     """
     speed = np.asarray(speed, dtype=float)
     count = 2 ** (math.ceil(math.log2(speed.shape[-1])) + PADDING)
-    magnitude = np.abs(np.fft.rfft(speed, count))
-    magnitude /= np.max(magnitude, axis=-1, keepdims=True)
-    frequency = np.fft.rfftfreq(count, 1.0 / rate_hz)
-    magnitude = magnitude[..., frequency <= CUTOFF_HZ]
-    loud = magnitude >= THRESHOLD
-    first = np.argmax(loud, axis=-1)
-    last = loud.shape[-1] - 1 - np.argmax(loud[..., ::-1], axis=-1)
-    step = 1.0 / np.maximum(last - first, 1)
-    index = np.arange(loud.shape[-1] - 1)
-    inside = (index >= first[..., None]) & (index < last[..., None])
-    lengths = np.hypot(step[..., None], np.diff(magnitude, axis=-1))
-    return -np.sum(np.where(inside, lengths, 0.0), axis=-1)
+    spectra = rfft(speed.reshape(-1, speed.shape[-1]), count)
+    highest = math.floor(CUTOFF_HZ * count / rate_hz)
+    return _arc_lengths(spectra, highest).reshape(speed.shape[:-1])
+
+
+@njit(cache=True)
+def _arc_lengths(
+    spectra: NDArray[np.complex128], highest: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n,) ``spectral_arc_length`` of (n, lines) spectra, up to the highest line."""
+    lengths = np.zeros(len(spectra))
+    for k in range(len(spectra)):
+        power = spectra[k].real ** 2 + spectra[k].imag ** 2
+        magnitude = np.sqrt(power[: highest + 1] / np.max(power))
+        loud = np.flatnonzero(magnitude >= THRESHOLD)
+        first, last = (loud[0], loud[-1]) if loud.size else (0, highest)
+        step = 1.0 / max(last - first, 1)
+        for i in range(first, last):
+            rise = magnitude[i + 1] - magnitude[i]
+            lengths[k] -= math.sqrt(step * step + rise * rise)
+    return lengths
 
 
 def log_dimensionless_jerk(speed: ArrayLike, rate_hz: float) -> NDArray[np.float64]:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 from pydantic import model_validator
 
@@ -258,6 +259,7 @@ class DrivenPath:
         # Pose, velocity and wheel speeds at the ticks so far; rows of floats are
         # read one by one faster than those of an array.
         self._knots = [[*self._rest, 0.0, 0.0, 0.0, 0.0, 0.0]]
+        self._table = np.array(self._knots)
 
     def _drive_on(self, tick: int) -> None:
         """Has the knots up to the one after a tick, or to the end."""
@@ -278,6 +280,7 @@ class DrivenPath:
         velocities = np.stack([v * np.cos(theta), v * np.sin(theta), omega], axis=1)
         rows = np.hstack([states[:, :3], velocities, wheels])
         self._knots = knots + rows.tolist()
+        self._table = np.vstack([self._table, rows])
 
     def _since(self, ticks: float) -> tuple[float, list[float], list[float]]:
         """Part of the tick that has passed, and the knots at its ends."""
@@ -302,14 +305,10 @@ class DrivenPath:
         """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
         times = np.asarray(times, dtype=float)
         if not self.moves or not len(times):
-            return np.tile(np.array(self._rest), (len(times), 1))
+            return np.full((len(times), 3), self._rest)
         ticks = np.maximum((times - self._start) / TICK_S, 0.0)
         self._since(ticks.max())
-        knots = np.array(self._knots)[:, :6]
-        k = np.minimum(ticks.astype(int), len(knots) - 2)
-        a, b = knots[k], knots[k + 1]
-        p, q, r = _value_weights(np.minimum(ticks - k, 1.0)[:, None])
-        return a[:, :3] + p * (b - a)[:, :3] + q * a[:, 3:] + r * b[:, 3:]
+        return _poses_between(self._table, ticks)
 
     def velocity(self, time: float) -> tuple[float, float, float]:
         """(vx, vy, omega) in W at a time in s; m/s and rad/s."""
@@ -325,7 +324,23 @@ class DrivenPath:
         )
 
 
+@register_jitable
 def _value_weights(s: Any) -> tuple[Any, Any, Any]:
     """Of the cubic Hermite polynomial at s in [0, 1]: of b - a and of the slopes."""
     rest = TICK_S * s * (1.0 - s)
     return s * s * (3.0 - 2.0 * s), rest * (1.0 - s), -rest * s
+
+
+@njit(cache=True)
+def _poses_between(
+    knots: NDArray[np.float64], ticks: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n, 3) poses at times in ticks since the first knot; after the last one, its."""
+    poses = np.empty((ticks.size, 3))
+    for i in range(ticks.size):
+        k = min(int(ticks[i]), len(knots) - 2)
+        p, q, r = _value_weights(min(ticks[i] - k, 1.0))
+        a, b = knots[k], knots[k + 1]
+        for j in range(3):
+            poses[i, j] = a[j] + p * (b[j] - a[j]) + q * a[3 + j] + r * b[3 + j]
+    return poses

@@ -304,15 +304,47 @@ def fan_ranges(
 
 
 @njit(cache=True)
-def _shadow(
-    corners: NDArray[np.float64], nx: float, ny: float
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Where the corners' extent along (nx, ny) begins and ends."""
-    low, high = np.inf, -np.inf
-    for k in range(4):
-        u = corners[k, 0] * nx + corners[k, 1] * ny
-        low, high = min(low, u), max(high, u)
-    return low, high
+def _sides(
+    a: NDArray[np.float64], b: NDArray[np.float64]
+) -> tuple[tuple[float, float, float, float], ...]:  # pragma: no cover  (compiled)
+    """Normals of the sides of two rectangles, of a first.
+
+    Each with its components, how far along it the centre of b is ahead of that of
+    a, and how far the centres are apart where the shadows of both just touch.
+    """
+    ca, sa, cb, sb = math.cos(a[2]), math.sin(a[2]), math.cos(b[2]), math.sin(b[2])
+    c, s = abs(ca * cb + sa * sb), abs(ca * sb - sa * cb)
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    la, wa, lb, wb = a[3] / 2.0, a[4] / 2.0, b[3] / 2.0, b[4] / 2.0
+    return (
+        (ca, sa, ca * dx + sa * dy, la + c * lb + s * wb),
+        (-sa, ca, ca * dy - sa * dx, wa + s * lb + c * wb),
+        (cb, sb, cb * dx + sb * dy, lb + c * la + s * wa),
+        (-sb, cb, cb * dy - sb * dx, wb + s * la + c * wa),
+    )
+
+
+@njit(cache=True)
+def _nearest_corner(
+    u: float, v: float, c: float, s: float, corner: Any, half: Any
+) -> float:  # pragma: no cover  (compiled)
+    """Square of the least distance of a rectangle's corners from a box.
+
+    Args:
+        u: Centre of the rectangle in the box's axes, m.
+        v: See u.
+        c: Cosine of the angle of the rectangle in the box's axes.
+        s: Sine of it.
+        corner: Half of the rectangle's extents, m.
+        half: Half of the box's, m.
+    """
+    best = np.inf
+    for ahead in (corner[0], -corner[0]):
+        for left in (corner[1], -corner[1]):
+            du = max(abs(u + c * ahead - s * left) - half[0], 0.0)
+            dv = max(abs(v + s * ahead + c * left) - half[1], 0.0)
+            best = min(best, du * du + dv * dv)
+    return best
 
 
 @njit(cache=True)
@@ -322,7 +354,7 @@ def rectangle_clearance(
     """Distance between two rectangles; negative depth where they overlap.
 
     The depth is that of the separating-axis test: the shortest way to push
-    the rectangles apart.
+    the rectangles apart. Of two that are apart, a corner of one is nearest.
 
     Args:
         a: (5,) rectangle.
@@ -331,36 +363,20 @@ def rectangle_clearance(
     Returns:
         Clearance in m.
     """
-    ca, cb = _corners(a), _corners(b)
     separation = -np.inf
-    for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
-        nx, ny = math.cos(theta), math.sin(theta)
-        a_low, a_high = _shadow(ca, nx, ny)
-        b_low, b_high = _shadow(cb, nx, ny)
-        separation = max(separation, b_low - a_high, a_low - b_high)
+    sides = _sides(a, b)
+    for _, _, ahead, touching in sides:
+        separation = max(separation, abs(ahead) - touching)
     if separation <= 0.0:
         return separation
-    distance = np.inf
-    for i in range(4):
-        i2 = (i + 1) % 4
-        for j in range(4):
-            j2 = (j + 1) % 4
-            distance = min(
-                distance,
-                _nearest_on_segment(
-                    ca[i, 0] - cb[j, 0],
-                    ca[i, 1] - cb[j, 1],
-                    ca[i2, 0] - cb[j, 0],
-                    ca[i2, 1] - cb[j, 1],
-                ),
-                _nearest_on_segment(
-                    cb[j, 0] - ca[i, 0],
-                    cb[j, 1] - ca[i, 1],
-                    cb[j2, 0] - ca[i, 0],
-                    cb[j2, 1] - ca[i, 1],
-                ),
-            )
-    return distance
+    (ca, sa, ua, _), (_, _, va, _), (cb, sb, ub, _), (_, _, vb, _) = sides
+    c, s = ca * cb + sa * sb, ca * sb - sa * cb
+    half_a, half_b = (a[3] / 2.0, a[4] / 2.0), (b[3] / 2.0, b[4] / 2.0)
+    squared = min(
+        _nearest_corner(ua, va, c, s, half_b, half_a),
+        _nearest_corner(-ub, -vb, c, -s, half_a, half_b),
+    )
+    return math.sqrt(squared)
 
 
 @njit(cache=True)
@@ -381,18 +397,14 @@ def contact_time(
     Returns:
         s; 0 where they overlap, infinite where they never touch.
     """
-    ca, cb = _corners(a), _corners(b)
     enter, leave = 0.0, np.inf
-    for theta in (a[2], a[2] + math.pi / 2, b[2], b[2] + math.pi / 2):
-        nx, ny = math.cos(theta), math.sin(theta)
-        a_low, a_high = _shadow(ca, nx, ny)
-        b_low, b_high = _shadow(cb, nx, ny)
+    for nx, ny, ahead, touching in _sides(a, b):
         speed = vx * nx + vy * ny
         if abs(speed) < 1e-12:
-            if a_high < b_low or b_high < a_low:
+            if abs(ahead) > touching:
                 return np.inf
             continue
-        first, second = (b_low - a_high) / speed, (b_high - a_low) / speed
+        first, second = (ahead - touching) / speed, (ahead + touching) / speed
         enter = max(enter, min(first, second))
         leave = min(leave, max(first, second))
     return enter if enter <= leave else np.inf

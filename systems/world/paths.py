@@ -15,6 +15,7 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
+from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
@@ -164,41 +165,58 @@ class WaypointPath:
 
     def poses(self, times: ArrayLike) -> NDArray[np.float64]:
         """(n, 3) poses at many times at once, as ``pose`` gives them one by one."""
-        (x, y, theta, curvature), s, _ = self._find_all(times)
-        # Chord of the arc: its length tends to s as the curvature vanishes.
-        half = 0.5 * curvature * s
-        chord = s * np.sinc(half / np.pi)
-        return np.stack(
-            [
-                x + chord * np.cos(theta + half),
-                y + chord * np.sin(theta + half),
-                theta + 2.0 * half,
-            ],
-            axis=1,
-        )
+        times = np.asarray(times, dtype=float)
+        if not self._moves:
+            return np.full((len(times), 3), self._pieces[0][1:4])
+        return _poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
         """(n, 2) speeds ahead, negative where a shuttle goes back, and yaw rates.
 
         In m/s and rad/s.
         """
-        (_, _, _, curvature), _, rate = self._find_all(times)
+        elapsed, direction = self._elapsed(np.asarray(times, dtype=float))
+        index = np.searchsorted(self._begins, elapsed, side="right") - 1
+        begin, *_, curvature, speed, acceleration = np.array(self._pieces)[index].T
+        rate = direction * (speed + acceleration * (elapsed - begin))
         return np.stack([rate, rate * curvature], axis=1)
 
-    def _find_all(self, times: ArrayLike) -> tuple[Any, Any, Any]:
-        """As ``_find``: starts and curvatures, distances and rates."""
-        elapsed = np.maximum(np.asarray(times, dtype=float) - self._start_time, 0.0)
-        direction = np.ones_like(elapsed)
-        if self._shuttles:
-            laps, elapsed = np.divmod(elapsed, self._duration)
-            back = laps % 2 == 1
-            elapsed = np.where(back, self._duration - elapsed, elapsed)
-            direction[back] = -1.0
-        index = np.searchsorted(self._begins, elapsed, side="right") - 1
-        begin, *start, speed, acceleration = np.array(self._pieces)[index].T
-        since = elapsed - begin
-        distance = (speed + 0.5 * acceleration * since) * since
-        return start, distance, direction * (speed + acceleration * since)
+    def _elapsed(self, times: NDArray[np.float64]) -> tuple[Any, Any]:
+        """Times since the first instant of a lap, s, and 1, or -1 on the way back."""
+        elapsed = np.maximum(times - self._start_time, 0.0)
+        if not self._shuttles:
+            return elapsed, 1.0
+        laps, elapsed = np.divmod(elapsed, self._duration)
+        back = laps % 2 == 1
+        return (
+            np.where(back, self._duration - elapsed, elapsed),
+            np.where(back, -1.0, 1.0),
+        )
+
+
+@njit(cache=True)
+def _poses_on(
+    pieces: NDArray[np.float64], elapsed: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n, 3) poses at times since the first of the pieces, (m, 7), began."""
+    poses = np.empty((elapsed.size, 3))
+    begins = np.ascontiguousarray(pieces[:, 0])
+    cosines, sines = np.cos(pieces[:, 3]), np.sin(pieces[:, 3])
+    for i in range(elapsed.size):
+        k = np.searchsorted(begins, elapsed[i], side="right") - 1
+        begin, x, y, theta, curvature, speed, acceleration = pieces[k]
+        since = elapsed[i] - begin
+        chord = (speed + 0.5 * acceleration * since) * since
+        half = 0.5 * curvature * chord
+        c, s = cosines[k], sines[k]
+        if half != 0.0:
+            # The chord of an arc: it tends to the arc as the curvature vanishes.
+            chord *= math.sin(half) / half
+            c, s = math.cos(theta + half), math.sin(theta + half)
+        poses[i, 0] = x + chord * c
+        poses[i, 1] = y + chord * s
+        poses[i, 2] = theta + 2.0 * half
+    return poses
 
 
 def _along(

@@ -124,7 +124,8 @@ def test_causes_are_the_same_elsewhere(shift, distance, cause):
     def end(x: float, y: float) -> tuple[str, float, float | None]:
         cart = {
             "name": "cart",
-            "waypoints_m": [[x - 0.5, y + 0.3], [x + 1.0, y + 0.3]],
+            # Touches between the instants that are looked at, by 0.5 mm or more.
+            "waypoints_m": [[x - 0.503, y + 0.3], [x + 1.0, y + 0.3]],
             "size_m": [0.1, 0.1],
             "speed_m_s": 0.5,
         }

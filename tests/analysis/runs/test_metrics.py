@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from analysis.runs.metrics import frames_with_sound, run_metrics
@@ -18,6 +20,7 @@ from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import Collision
 from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.world.geometry import contact_time, rectangle_clearance
 
 TICK = 0.025
 #: Half the robot's length: P and its front face.
@@ -87,6 +90,35 @@ def test_time_to_contact_on_the_way_to_the_source():
     assert away["minimum_time_to_contact_s"] is None
 
 
+@given(seed=st.integers(0, 1000))
+def test_bodies_that_are_passed_over_are_not_the_nearest(seed):
+    """Clearances and contact times of all bodies at all ticks, one by one."""
+    rng = np.random.default_rng(seed)
+    ways = np.cumsum(rng.normal(0.0, 0.1, (3, 60)), axis=1)
+    boxes = [
+        {
+            "name": f"box {k}",
+            "size_m": rng.uniform(0.05, 1.0, 2).tolist(),
+            "waypoints_m": [[3.0 * k - 3.0, 2.5], rng.uniform(-1.0, 1.0, 2).tolist()],
+            "speed_m_s": 2.0,
+        }
+        for k in range(3)
+    ]
+    run = motion(*ways, obstacles=boxes, source={"waypoints_m": [[0.0, -3.0]]})
+    near = Proximity(run)
+    velocities = np.gradient(near.bodies[:, :, :2], run.time, axis=1)
+    clearances, times = np.empty((2, *near.bodies.shape[:2]))
+    for k, i in np.ndindex(clearances.shape):
+        clearances[k, i] = rectangle_clearance(near.robot[i], near.bodies[k, i])
+        relative = run.vector("v_WB")[:, i] - velocities[k, i]
+        times[k, i] = contact_time(near.robot[i], near.bodies[k, i], *relative)
+    np.testing.assert_allclose(near.clearance, np.min(clearances, axis=0), atol=1e-12)
+    assert np.all(near.least <= np.min(clearances, axis=1) + 1e-12)
+    assert near.least_time_to_contact == pytest.approx(np.min(times), rel=1e-9)
+    p05 = run_metrics(run)["clearance_p05_m"]
+    assert p05 == pytest.approx(np.quantile(near.clearance, 0.05), rel=1e-12)
+
+
 def test_time_to_contact_counts_both_motions():
     """Towards each other at 0.5 and 0.3 m/s."""
     cart = {
@@ -97,7 +129,7 @@ def test_time_to_contact_counts_both_motions():
     }
     run = straight(obstacles=[cart], source={"waypoints_m": [[0.0, 3.0]]})
     gap = 8.0 - 0.3 * (4.0 - 0.15) - 0.1 - (2.0 + FRONT)  # half of v/a to start
-    assert Proximity(run).time_to_contact[-1] == pytest.approx(gap / 0.8)
+    assert Proximity(run).least_time_to_contact == pytest.approx(gap / 0.8)
 
 
 @pytest.mark.parametrize(("speed", "passed"), [(4.0, 20.5), (7.0, 20.1), (7.0, 20.9)])
@@ -118,27 +150,34 @@ def test_clearance_between_ticks(speed, passed):
         "acceleration_m_s2": 1e6,
     }
     run = motion(still, still, still + math.pi / 4, obstacles=[speck])
-    assert np.min(Proximity(run).clearances[0]) > 0.015
+    assert np.min(Proximity(run).clearance) > 0.015
     least = run_metrics(run)["minimum_obstacle_clearance_m"]
     assert least == pytest.approx(0.01, abs=2e-4)
 
 
-def test_distance_of_P_is_from_the_turned_box():
-    """0.4 by 0.2 m at (2, 1), turned by 30 deg: beside it, off a corner, within."""
+@pytest.mark.parametrize(
+    ("u", "v", "distance"),
+    [(-0.5, 0.5, 0.5), (0.1, -0.4, 0.3), (0.7, 0.05, 0.5), (0.5, -0.5, 0.5), (0, 0, 0)],
+)
+def test_reaction_distance_is_from_the_turned_box(u, v, distance):
+    """P beside a box of 0.4 by 0.2 m at (2, 1) turned by 30 deg, off it, within."""
     turn = math.radians(30.0)
     cos, sin = math.cos(turn), math.sin(turn)
-    box = {
-        "size_m": [0.4, 0.2],
-        "waypoints_m": [[2.0, 1.0], [2.0 + 9.0 * cos, 1.0 + 9.0 * sin]],
-        "speed_m_s": 1e-6,
-    }
-    u = np.array([-0.5, 0.1, 0.7, 0.5, -0.1])
-    v = np.array([0.5, -0.4, 0.05, -0.5, 0.05])
-    x, y = 2.0 + cos * u - sin * v, 1.0 + sin * u + cos * v
-    run = motion(x - FRONT, y, 0.0 * x, obstacles=[box])
-    distances = Proximity(run).distances_from_P()
-    assert distances.shape == (2, 5)
-    np.testing.assert_allclose(distances[0], [0.5, 0.3, 0.5, 0.5, 0.0], atol=1e-6)
+    box = {"size_m": [0.4, 0.2], "waypoints_m": [[2.0, 1.0]], "heading_deg": 30.0}
+    run = motion(
+        np.full(2, 2.0 + cos * u - sin * v - FRONT),
+        np.full(2, 1.0 + sin * u + cos * v),
+        np.zeros(2),
+        obstacles=[box],
+        source={"waypoints_m": [[9.0, 9.0]]},
+        columns={
+            "repulsion_x": np.full(2, -1.0),
+            "feature_1": np.ones(2),
+            "collision_1_B_x": np.full(2, distance + 0.19),
+        },
+    )
+    reaction = run_metrics(run)["reaction_distance_m"]
+    assert reaction == pytest.approx(distance, abs=1e-9)
 
 
 def to_and_fro(rest_s: float, **scenario: Any) -> dict[str, float | None]:
