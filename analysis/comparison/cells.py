@@ -10,7 +10,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from analysis.comparison.mechanisms import failure_mechanisms
-from analysis.reporting.intervals import bootstrap_interval, wilson_interval
+from analysis.reporting.intervals import (
+    bootstrap_interval,
+    median_interval,
+    wilson_interval,
+)
 from analysis.runs.run_table import (
     ALL_RUNS,
     SUCCESSES,
@@ -91,7 +95,7 @@ def make_cell(
         scenario: Its name.
         fields: Values of the grid.
         rows: Its runs, in the order of the layouts.
-        seed: Of the bootstraps.
+        seed: Of the bootstrap.
 
     Returns:
         Rates, medians with intervals, causes and examples.
@@ -106,8 +110,8 @@ def make_cell(
             values = values[success]
         values = values[np.isfinite(values)]
         if len(values):
-            interval = bootstrap_interval(values, seed=bootstrap_seed(seed, name))
-            metrics[name] = Median(float(np.median(values)), *interval, len(values))
+            ends = median_interval(values)
+            metrics[name] = Median(float(np.median(values)), *ends, len(values))
     return LawCell(
         scenario=scenario,
         law=str(fields["law"]),

@@ -25,7 +25,6 @@ from analysis.comparison.paired_statistics import (
 from analysis.runs.run_table import (
     ALL_RUNS,
     SUCCESSES,
-    bootstrap_seed,
     collisions,
     column,
     successes,
@@ -81,10 +80,7 @@ def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Compari
         make_cell(scenario, fields, rows, plan.seed)
         for fields, rows in zip(plan.cells(), _runs(plan, table), strict=True)
     ]
-    pairs = [
-        _pair(scenario, neighbours, plan.seed)
-        for neighbours in _neighbours(plan, table)
-    ]
+    pairs = [_pair(scenario, neighbours) for neighbours in _neighbours(plan, table)]
     return Comparison(cells, pairs)
 
 
@@ -95,8 +91,7 @@ def pooled_pairs(sweeps: Sequence[tuple[SweepPlan, pd.DataFrame]]) -> list[Pair]
         for one in _neighbours(plan, table):
             key = (one.field, str(one.first), str(one.second))
             groups.setdefault(key, []).append(one)
-    seed = sweeps[0][0].seed
-    return [_pair("all", _joined(group), seed) for group in groups.values()]
+    return [_pair("all", _joined(group)) for group in groups.values()]
 
 
 @dataclass(frozen=True)
@@ -135,7 +130,7 @@ def _joined(group: Sequence[_Neighbours]) -> _Neighbours:
     )
 
 
-def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
+def _pair(scenario: str, runs: _Neighbours) -> Pair:
     first, second = runs.first_rows, runs.second_rows
     both = successes(first) & successes(second)
     met = both & _pushed(first) & _pushed(second)
@@ -149,10 +144,10 @@ def _pair(scenario: str, runs: _Neighbours, seed: int) -> Pair:
         success=paired_rate(successes(first), successes(second)),
         collision=paired_rate(collisions(first), collisions(second)),
         metrics={
-            **_medians(first, second, ALL_RUNS, everywhere, seed),
-            **_medians(first, second, SUCCESSES, both, seed),
+            **_medians(first, second, ALL_RUNS, everywhere),
+            **_medians(first, second, SUCCESSES, both),
         },
-        encounters=_medians(first, second, SUCCESSES, met, seed),
+        encounters=_medians(first, second, SUCCESSES, met),
     )
 
 
@@ -166,15 +161,10 @@ def _medians(
     second: pd.DataFrame,
     names: Sequence[str],
     chosen: NDArray[np.bool_],
-    seed: int,
 ) -> dict[str, PairedMedian]:
     """Figures of the chosen pairs; those that no pair has are left out."""
     medians = {
-        name: paired_median(
-            column(first, name)[chosen],
-            column(second, name)[chosen],
-            seed=bootstrap_seed(seed, name),
-        )
+        name: paired_median(column(first, name)[chosen], column(second, name)[chosen])
         for name in names
     }
     return {name: median for name, median in medians.items() if median.pairs}

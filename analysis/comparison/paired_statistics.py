@@ -85,14 +85,13 @@ def paired_rate(
 
 
 def paired_median(
-    first: ArrayLike, second: ArrayLike, *, seed: int, confidence: float = 0.95
+    first: ArrayLike, second: ArrayLike, *, confidence: float = 0.95
 ) -> PairedMedian:
     """Compares a figure of two methods, run by run.
 
     Args:
         first: (n,) figure of the first method; NaN where it has none.
         second: (n,) the same of the second, on the same layouts.
-        seed: Of the bootstrap.
         confidence: Of the interval.
 
     Returns:
@@ -100,14 +99,14 @@ def paired_median(
     """
     from scipy.stats import wilcoxon
 
-    from analysis.reporting.intervals import bootstrap_interval
+    from analysis.reporting.intervals import median_interval
 
     a, b = np.asarray(first, dtype=float), np.asarray(second, dtype=float)
     both = np.isfinite(a) & np.isfinite(b)
     differences = a[both] - b[both]
     if len(differences) == 0:
         return PairedMedian(0, None, None, None, None, None, None)
-    low, high = bootstrap_interval(differences, seed=seed, confidence=confidence)
+    low, high = median_interval(differences, confidence=confidence)
     apart = np.any(differences != 0.0)
     return PairedMedian(
         pairs=len(differences),

@@ -111,7 +111,7 @@ def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunRe
         )
         file = prepared.out / _example_file(cell, example.kind)
         file.write_text(dump_scenario(scenario), "utf-8")
-        yield simulate(scenario)
+        yield simulate(scenario, engine=sweep.engine(scenario))
 
 
 def _example_file(cell: LawCell, kind: str) -> str:

@@ -6,6 +6,7 @@ import copy
 import hashlib
 import json
 import math
+import pickle
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -124,6 +125,11 @@ class SweepPlan(Parameters):
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data).model_dump(mode="json")
 
+    @cached_property
+    def _base_copy(self) -> bytes:
+        """To copy ``base`` from, a fifth of ``deepcopy``'s time."""
+        return pickle.dumps(self.base)
+
     @property
     def source(self) -> str:
         """Library name, or whole path of the scenario's file."""
@@ -171,7 +177,7 @@ class SweepPlan(Parameters):
 
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """The scenario of a run."""
-        data = copy.deepcopy(self.base)
+        data = pickle.loads(self._base_copy)
         for path, value in point.fields.items():
             set_field(data, path, copy.deepcopy(value))
         data["seed"] = point.seed

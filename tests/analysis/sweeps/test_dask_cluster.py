@@ -46,7 +46,7 @@ def test_a_lost_worker_changes_nothing(cluster, tmp_path):
     )
     assert lost
     expected = results_table(
-        run_task(Task(point, plan.scenario_of(point), trajectory=False)).row
+        run_task(Task(point, plan.scenario_of(point), "drake", trajectory=False)).row
         for point in plan.points()
     )
     pd.testing.assert_frame_equal(

@@ -50,6 +50,7 @@ def made_up(**changes):
             "simulated_s": 10.0,
             "wall_s": 0.1,
             "error": None,
+            "engine": "drake",
         }
     )
     active = (table["law"] == "active") & (table["run"] < 10)
