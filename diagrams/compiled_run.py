@@ -24,14 +24,15 @@ from numpy.typing import NDArray
 from diagrams.bodies import Surroundings
 from diagrams.compiled_judge import contacts_of, judge_all
 from diagrams.compiled_source import PACKED, Packing, compiled_from
-from diagrams.robot import columns_of, require_published, robot_blocks, seed_of
+from diagrams.loop_blocks import LoopBlocks
+from diagrams.robot import seed_of
 from diagrams.run_parameters import COMPILED_ORDERS
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
 from systems.framework.input_error import InputError, shortened
-from systems.framework.step_block import RunFacts, Step
+from systems.framework.step_block import RunFacts
 
-__all__ = ["CompiledLoop", "compile_loop", "shared_blocks"]
+__all__ = ["CompiledLoop", "compile_loop"]
 
 
 @dataclass
@@ -151,14 +152,13 @@ def _complaint(error: Exception) -> str:
 
 
 def compile_loop(
-    scenario: Scenario, blocks: Mapping[str, Mapping[str, Any]], rules: RunRules
+    scenario: Scenario, blocks: Mapping[str, LoopBlocks], rules: RunRules
 ) -> CompiledLoop:
     """The loop of a scenario that has one.
 
     Args:
         scenario: What to run.
-        blocks: Of each robot, by part (``robot_blocks``); they may be those of another
-            start or seed.
+        blocks: Of each robot; they may be made for another start or seed.
         rules: When the run ends.
 
     Returns:
@@ -190,12 +190,12 @@ def compile_loop(
         tuple(
             robot.view(port)
             for robot in robots.values()
-            for _, port in columns_of(robot.blocks)
+            for _, port in robot.made.columns
         ),
     )
     width, columns = 0, {}
     for name, own in blocks.items():
-        wanted = [text for texts in columns_of(own).values() for text in texts]
+        wanted = [text for texts in own.columns.values() for text in texts]
         columns[name] = {text: width + k for k, text in enumerate(wanted)}
         width += len(wanted)
     return CompiledLoop(
@@ -208,71 +208,15 @@ def compile_loop(
     )
 
 
-#: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
-_NO_BLOCKS = {
-    "name",
-    "description",
-    "engine",
-    "seed",
-    "duration_s",
-    "arena_m",
-    "start",
-    "obstacles",
-    "stop",
-    "robots",
-    "sources",
-    "source",
-}
-#: Blocks by what they were made from, the last used ones last.
-_SHARED: dict[str, dict[str, Any]] = {}
-_MOST_SHARED = 64
-
-
-def shared_blocks(scenario: Scenario) -> dict[str, dict[str, Any]]:
-    """Blocks for ``compile_loop``, those of an earlier scenario where they serve.
-
-    They do where scenarios differ in layout, start and seed alone: Drake never frees
-    blocks written in Python.
-
-    Args:
-        scenario: What to run.
-
-    Returns:
-        Of each robot, by part.
-
-    Raises:
-        InputError: As ``robot_blocks``.
-    """
-    scenario.require_compilable()
-    blocks = {}
-    for name in scenario.all_robots:
-        own, bodies = (
-            scenario.of_robot(name),
-            len(scenario.surroundings(name).bodies) - 1,
-        )
-        if own.blocks:  # may ask for the whole scenario
-            blocks[name] = robot_blocks(own, name, bodies=bodies)
-            continue
-        made_from = own.model_dump_json(exclude=_NO_BLOCKS)
-        key = f"{bodies} {own.source_size} {made_from}"
-        found = _SHARED.pop(key, None) or robot_blocks(own, name, bodies=bodies)
-        blocks[name] = _SHARED[key] = found
-        if len(_SHARED) > _MOST_SHARED:
-            del _SHARED[next(iter(_SHARED))]
-    return blocks
-
-
-#: What a robot takes from the world.
-_WORLD = "pose_WS", "poses_WO", "sizes"
 #: What a robot is judged by, and its pose at the tick before.
 _WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
 
 
 class _LoopRobot:
-    """One robot's blocks, their steps, and what their ports carry."""
+    """One robot of a run: its blocks' steps, and what their ports carry."""
 
     def __init__(
-        self, scenario: Scenario, name: str, blocks: Mapping[str, Any], ticks: int
+        self, scenario: Scenario, name: str, made: LoopBlocks, ticks: int
     ) -> None:
         own = scenario.all_robots[name]
         self.facts = RunFacts(
@@ -283,61 +227,12 @@ class _LoopRobot:
             scenario.integrator.step_s,
             partial(seed_of, scenario, owner=name),
         )
-        self.blocks = blocks
-        require_published(blocks.values(), _WORLD)
-        self.steps = {part: _step_for(b, self.facts) for part, b in blocks.items()}
-        self._views: dict[str, NDArray[np.float64]] = {}
-        for block in blocks.values():
-            for port in _ports(block, "output"):
-                self._views[port.get_name()] = np.zeros(port.size())
-        self.outside = {
-            port.get_name(): port.size()
-            for block in blocks.values()
-            for port in _ports(block, "input")
-            if port.get_name() not in self._views
-        }
-        self._views |= {name: np.zeros(size) for name, size in self.outside.items()}
+        self.made, self.steps = made, made.steps(self.facts)
+        self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
 
     def view(self, port: str) -> NDArray[np.float64]:
         """What a port carries."""
         return self._views[port]
-
-    def order(self) -> tuple[list[str], list[str]]:
-        """Parts as they do their steps: before the log, or with state outputs after."""
-        late = [part for part, step in self.steps.items() if step.publish is not None]
-        known = {*self.outside}.union(*(_names(self.blocks[p], "output") for p in late))
-        waiting, early = [part for part in self.blocks if part not in late], []
-        while waiting:
-            part = next(
-                part
-                for part in waiting
-                if known.issuperset(_names(self.blocks[part], "input"))
-            )
-            waiting.remove(part)
-            early.append(part)
-            known.update(_names(self.blocks[part], "output"))
-        return early, late
-
-
-def _step_for(block: Any, run: RunFacts) -> Step:
-    if not hasattr(block, "step_for"):
-        raise InputError(
-            "engine",
-            f"{block.get_name()} has no method step_for, by which it would join a "
-            "compiled loop; give it one, or run with engine drake",
-        )
-    step: Step = block.step_for(run)
-    return step
-
-
-def _ports(block: Any, kind: str) -> list[Any]:
-    """Input or output ports."""
-    count = getattr(block, f"num_{kind}_ports")()
-    return list(map(getattr(block, f"get_{kind}_port"), range(count)))
-
-
-def _names(block: Any, kind: str) -> list[str]:
-    return [port.get_name() for port in _ports(block, kind)]
 
 
 class _Source:
@@ -355,13 +250,13 @@ class _Source:
 
     def add(self, robot: _LoopRobot) -> None:
         """A robot's blocks."""
-        early, late = robot.order()
+        made, (early, late) = robot.made, robot.made.order(robot.steps)
         for part in (*early, *late):
-            block, step = robot.blocks[part], robot.steps[part]
+            step = robot.steps[part]
             parts = (
                 np.array(step.state, dtype=float),
-                tuple(map(robot.view, _names(block, "input"))),
-                tuple(map(robot.view, _names(block, "output"))),
+                tuple(map(robot.view, made.inputs[part])),
+                tuple(map(robot.view, made.outputs[part])),
                 step.numbers,
             )
             names = ("state", "inputs", "outputs", "numbers")
@@ -390,7 +285,7 @@ class _Source:
         """What a robot takes from the world in every tick."""
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
-            if port not in robot.outside:
+            if port not in robot.made.outside:
                 continue
             into = self._packing.expression(robot.view(port))
             for k, body in enumerate(bodies):
@@ -402,7 +297,7 @@ class _Source:
                 poses = path.poses(times if path.moves else times[:1])
                 rows = self._packing.expression(np.ascontiguousarray(poses))
                 self._filled.append(self._call(_fill, into, f"{3 * k}", rows, "tick"))
-        if "sizes" in robot.outside:
+        if "sizes" in robot.made.outside:
             sizes = [body.size for body in around.obstacles.values()]
             robot.view("sizes")[:] = np.ravel(sizes)
 

@@ -1,0 +1,132 @@
+"""A robot's blocks for compiled loops, made once for runs that differ in layout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property
+from typing import Any
+
+from diagrams.robot import columns_of, require_published, robot_blocks
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.framework.step_block import RunFacts, Step
+
+__all__ = ["LoopBlocks", "shared_blocks"]
+
+#: What a robot takes from the world.
+_WORLD = "pose_WS", "poses_WO", "sizes"
+#: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
+_NO_BLOCKS = {
+    "name",
+    "description",
+    "engine",
+    "seed",
+    "duration_s",
+    "arena_m",
+    "start",
+    "obstacles",
+    "stop",
+    "robots",
+    "sources",
+    "source",
+}
+#: Blocks by what they were made from, the last used ones last.
+_SHARED: dict[str, LoopBlocks] = {}
+_MOST_SHARED = 64
+
+
+class LoopBlocks:
+    """Blocks of a robot by part, and how their ports are joined."""
+
+    def __init__(self, blocks: Mapping[str, Any]) -> None:
+        """Takes blocks that are in a diagram or in none.
+
+        Raises:
+            InputError: Not every input is published by one block or by the world.
+        """
+        require_published(blocks.values(), _WORLD)
+        self.blocks = blocks
+        self.sizes: dict[str, int] = {}
+        """Of all that the ports carry, by name."""
+        self.inputs = {part: self._names(b, "input") for part, b in blocks.items()}
+        """Names of each part's input ports."""
+        self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
+        """Names of each part's output ports."""
+        self.columns = columns_of(blocks)
+        """What the log holds, in order: the columns of each (part, port)."""
+
+    def _names(self, block: Any, kind: str) -> list[str]:
+        port: Callable[[int], Any] = getattr(block, f"get_{kind}_port")
+        ports = list(map(port, range(getattr(block, f"num_{kind}_ports")())))
+        self.sizes |= {port.get_name(): port.size() for port in ports}
+        return [port.get_name() for port in ports]
+
+    @cached_property
+    def outside(self) -> set[str]:
+        """Names of what comes from the world."""
+        return {*self.sizes}.difference(*self.outputs.values())
+
+    def steps(self, run: RunFacts) -> dict[str, Step]:
+        """What each part does in a run.
+
+        Raises:
+            InputError: A block of a user's own has no step.
+        """
+        return {part: _step_for(block, run) for part, block in self.blocks.items()}
+
+    def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
+        """Parts as they do their steps: before the log, or with state outputs after."""
+        late = [part for part, step in steps.items() if step.publish is not None]
+        known = self.outside.union(*(self.outputs[part] for part in late))
+        waiting, early = [part for part in self.blocks if part not in late], []
+        while waiting:
+            part = next(p for p in waiting if known.issuperset(self.inputs[p]))
+            waiting.remove(part)
+            early.append(part)
+            known.update(self.outputs[part])
+        return early, late
+
+
+def _step_for(block: Any, run: RunFacts) -> Step:
+    if not hasattr(block, "step_for"):
+        raise InputError(
+            "engine",
+            f"{block.get_name()} has no method step_for, by which it would join a "
+            "compiled loop; give it one, or run with engine drake",
+        )
+    step: Step = block.step_for(run)
+    return step
+
+
+def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
+    """Blocks for a compiled loop, those of an earlier scenario where they serve.
+
+    They do where scenarios differ in layout, start and seed alone: Drake never frees
+    blocks written in Python.
+
+    Args:
+        scenario: What to run.
+
+    Returns:
+        Of each robot.
+
+    Raises:
+        InputError: As ``robot_blocks``, and where a scenario has no loop.
+    """
+    scenario.require_compilable()
+    blocks = {}
+    for name in scenario.all_robots:
+        own = scenario.of_robot(name)
+        bodies = len(scenario.surroundings(name).obstacles)
+        if own.blocks:  # they may ask for the whole scenario
+            blocks[name] = LoopBlocks(robot_blocks(own, name, bodies=bodies))
+            continue
+        made_from = own.model_dump_json(exclude=_NO_BLOCKS)
+        key = f"{name} {bodies} {own.source_size} {made_from}"
+        found = _SHARED.pop(key, None)
+        if found is None:
+            found = LoopBlocks(robot_blocks(own, name, bodies=bodies))
+        blocks[name] = _SHARED[key] = found
+        if len(_SHARED) > _MOST_SHARED:
+            del _SHARED[next(iter(_SHARED))]
+    return blocks
