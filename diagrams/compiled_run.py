@@ -26,7 +26,6 @@ from diagrams.compiled_judge import contacts_of, judge_all
 from diagrams.compiled_source import PACKED, Packing, compiled_from
 from diagrams.loop_blocks import LoopBlocks
 from diagrams.robot import seed_of
-from diagrams.run_parameters import COMPILED_ORDERS
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
 from systems.framework.input_error import InputError, shortened
@@ -223,7 +222,7 @@ class _LoopRobot:
             ticks,
             scenario.tick_s,
             own.start.pose,
-            COMPILED_ORDERS[scenario.integrator.scheme],
+            scenario.integrator.scheme,
             scenario.integrator.step_s,
             partial(seed_of, scenario, owner=name),
         )

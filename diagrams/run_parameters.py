@@ -23,16 +23,12 @@ from systems.sound.waveforms import SoundParameters
 from systems.world.obstacles import ObstacleParameters
 
 __all__ = [
-    "COMPILED_ORDERS",
     "MANY_RUNS",
     "Engine",
     "IntegratorParameters",
     "RunParameters",
     "StopParameters",
 ]
-
-#: What compiled loops integrate with, and its order.
-COMPILED_ORDERS = {"runge_kutta2": 2, "runge_kutta3": 3}
 
 #: What carries a run out.
 Engine = Literal["drake", "compiled"]

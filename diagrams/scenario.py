@@ -23,7 +23,7 @@ from diagrams.bodies import (
 )
 from diagrams.explain import explain
 from diagrams.participants import FollowerParameters, SourceParameters, joined
-from diagrams.run_parameters import COMPILED_ORDERS, RunParameters
+from diagrams.run_parameters import RunParameters
 from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
@@ -165,13 +165,9 @@ class Scenario(FollowerParameters, RunParameters):
 
     def _no_loop(self) -> str:
         """Why there is no compiled loop for it, and what to do; empty if there is."""
-        reason = ""
         if any(robot.hearing != "ideal" for robot in self.all_robots.values()):
-            reason = "sound waves are not compiled; set hearing to ideal"
-        elif self.integrator.scheme not in COMPILED_ORDERS:
-            schemes = " or ".join(COMPILED_ORDERS)
-            reason = f"compiled loops integrate with {schemes}; set that scheme"
-        return reason
+            return "sound waves are not compiled; set hearing to ideal"
+        return ""
 
     @model_validator(mode="after")
     def _check_engine(self) -> Scenario:

@@ -238,8 +238,8 @@ class PlantStepNumbers(NamedTuple):
     """``derivatives(state, commanded, *of_plant)``."""
     of_plant: tuple[Any, ...]
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
-    order: int
-    """Order of the Runge-Kutta steps, 2 or 3."""
+    advance: Any
+    """One of ``_SCHEMES``."""
     step_s: float
     """Largest step, s."""
     tick_s: float
@@ -267,21 +267,59 @@ def plant_step(tick, state, inputs, outputs, numbers):
         h = end - time
         if h > _STRETCH * numbers.step_s:
             h = numbers.step_s
-        k1 = derivatives(state, commanded, *of_plant)
-        if numbers.order == 2:
-            k2 = derivatives(state + h * k1, commanded, *of_plant)
-            change = h * k1
-            correction = h / 2.0 * k2 + -h / 2.0 * k1
-            for k in range(len(state)):
-                state[k] = state[k] + change[k] + correction[k]
-        else:
-            k2 = derivatives(state + h / 2.0 * k1, commanded, *of_plant)
-            k3 = derivatives(state + (-h * k1 + 2.0 * h * k2), commanded, *of_plant)
-            part = h / 6.0
-            change = part * k1 + 4.0 * part * k2 + part * k3
-            for k in range(len(state)):
-                state[k] += change[k]
+        numbers.advance(state, h, commanded, derivatives, of_plant)
         time += h
+
+
+def _second_order(state, h, commanded, derivatives, of_plant):
+    k1 = derivatives(state, commanded, *of_plant)
+    k2 = derivatives(state + h * k1, commanded, *of_plant)
+    change = h * k1
+    correction = h / 2.0 * k2 + -h / 2.0 * k1
+    for k in range(len(state)):
+        state[k] = state[k] + change[k] + correction[k]
+
+
+def _third_order(state, h, commanded, derivatives, of_plant):
+    k1 = derivatives(state, commanded, *of_plant)
+    k2 = derivatives(state + h / 2.0 * k1, commanded, *of_plant)
+    k3 = derivatives(state + (-h * k1 + 2.0 * h * k2), commanded, *of_plant)
+    part = h / 6.0
+    change = part * k1 + 4.0 * part * k2 + part * k3
+    for k in range(len(state)):
+        state[k] += change[k]
+
+
+#: Weights of earlier slopes in each stage of Dormand and Prince (1980), and at the end.
+_STAGES = (
+    (1 / 5, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (3 / 40, 9 / 40, 0.0, 0.0, 0.0, 0.0),
+    (44 / 45, -56 / 15, 32 / 9, 0.0, 0.0, 0.0),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0.0, 0.0),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656, 0.0),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+
+
+def _fifth_order(state, h, commanded, derivatives, of_plant):
+    size = len(state)
+    slopes, reached = np.empty((6, size)), np.copy(state)
+    for stage in range(6):
+        slope = derivatives(reached, commanded, *of_plant)
+        for k in range(size):
+            slopes[stage, k] = slope[k]
+            reached[k] = state[k]
+            for earlier in range(stage + 1):
+                reached[k] += h * _STAGES[stage][earlier] * slopes[earlier, k]
+    for k in range(size):
+        state[k] = reached[k]
+
+
+_SCHEMES = {
+    "runge_kutta2": _second_order,
+    "runge_kutta3": _third_order,
+    "runge_kutta5": _fifth_order,
+}
 
 
 def _publish_plant(state, outputs, numbers):
@@ -362,7 +400,7 @@ def DiffDrivePlant_(T):
             self._step_numbers = PlantStepNumbers(
                 self._derivatives,
                 tuple(self._numbers),
-                3,
+                _third_order,
                 TICK_S,
                 TICK_S,
                 *self._numbers[:2],
@@ -423,7 +461,7 @@ def DiffDrivePlant_(T):
         def step_for(self, run):
             """What the block does in each tick of a compiled loop, ``Step``."""
             numbers = self._step_numbers._replace(
-                order=run.order,
+                advance=_SCHEMES[run.scheme],
                 step_s=run.step_s,
                 tick_s=run.tick_s,
             )

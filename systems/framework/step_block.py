@@ -45,8 +45,8 @@ class RunFacts(NamedTuple):
     tick_s: float
     initial_pose: tuple[float, float, float]
     """Of the robot in W, m and rad."""
-    order: int
-    """Of the Runge-Kutta steps, 2 or 3."""
+    scheme: str
+    """Of the integrator, as ``runge_kutta3``."""
     step_s: float
     """Largest step of the integrator, s."""
     seed_of: Callable[[str], int]

@@ -94,6 +94,7 @@ def assert_same(name, *overrides):
         ("corridor", ("tick_s=0.0125", "microphones.frame_s=0.05")),
         ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
         ("wall", ("integrator.scheme=runge_kutta2", "integrator.step_s=0.01")),
+        ("wall", ("integrator.scheme=runge_kutta5",)),
         ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
@@ -147,7 +148,6 @@ def test_a_law_that_numba_cannot_compile_is_named(own_law):
     ("name", "override", "reason"),
     [
         ("default", "hearing=audio", "sound waves are not compiled"),
-        ("default", "integrator.scheme=runge_kutta5", "integrate with runge_kutta2 or"),
     ],
 )
 def test_what_has_no_compiled_loop_is_refused(name, override, reason):
