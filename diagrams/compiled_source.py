@@ -94,7 +94,8 @@ class Packing:
         for name, value in self.names.items():
             if value is known:
                 return name
-        name = f"{known.__name__}_{len(self.names)}"
+        # A lambda's name stands in brackets.
+        name = f"{known.__name__.strip('<>')}_{len(self.names)}"
         self.names[name] = known
         return name
 

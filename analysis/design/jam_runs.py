@@ -48,6 +48,7 @@ def jam_runs(
         f"tick_s={scenario.tick_s}",
         f"microphones.frame_s={scenario.microphones.frame_s}",
         f"ultrasonic.period_s={scenario.ultrasonic.period_s}",
+        f"engine={scenario.engine}",
     )
     layout = load_scenario("two_static_obstacles", ["hearing=ideal", *rates])
     static = layout.repulsion.active.speed_limit_m_s
