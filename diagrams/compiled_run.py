@@ -284,18 +284,22 @@ class _Source:
         """What a robot takes from the world in every tick."""
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
-            if port not in robot.made.outside:
-                continue
-            into = self._packing.expression(robot.view(port))
-            for k, body in enumerate(bodies):
-                if body in robots:
-                    pose = self._packing.expression(robots[body].view("pose_WB"))
-                    self._filled.append(self._call(_copy, into, f"{3 * k}", pose))
-                    continue
-                path = around.bodies[body].path
-                poses = path.poses(times if path.moves else times[:1])
-                rows = self._packing.expression(np.ascontiguousarray(poses))
-                self._filled.append(self._call(_fill, into, f"{3 * k}", rows, "tick"))
+            if port in robot.made.outside:
+                into = self._packing.expression(robot.view(port))
+                known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
+                paths = [around.bodies[body].path for body in known.values()]
+                at = times if any(path.moves for path in paths) else times[:1]
+                values = (
+                    np.array([*known], dtype=np.int64),
+                    np.reshape([path.poses(at) for path in paths], (-1, len(at), 3)),
+                )
+                expressions = map(self._packing.expression, values)
+                self._filled.append(self._call(_fill, into, *expressions, "tick"))
+                for k, body in enumerate(bodies):
+                    if body in robots:
+                        values = 3 * k, robots[body].view("pose_WB")
+                        expressions = map(self._packing.expression, values)
+                        self._filled.append(self._call(_copy, into, *expressions))
         if "sizes" in robot.made.outside:
             sizes = [body.size for body in around.obstacles.values()]
             robot.view("sizes")[:] = np.ravel(sizes)
@@ -346,12 +350,13 @@ def _indented(lines: Sequence[str]) -> list[str]:
 
 @njit(cache=True)
 def _fill(
-    out: Any, first: int, rows: Any, tick: int
+    out: Any, places: Any, poses: Any, tick: int
 ) -> None:  # pragma: no cover  (compiled)
-    """From the row of a tick; of what rests there is but one."""
-    row = min(tick, len(rows) - 1)
-    for k in range(rows.shape[1]):
-        out[first + k] = rows[row, k]
+    """From the row of a tick; where all rest there is but one."""
+    row = min(tick, poses.shape[1] - 1)
+    for body in range(len(places)):
+        for k in range(3):
+            out[places[body] + k] = poses[body, row, k]
 
 
 @njit(cache=True)

@@ -33,7 +33,7 @@ from systems.framework.parameters import Parameters
 __all__ = ["PACKED", "Packing", "compiled_from"]
 
 #: Arguments by which a generated function takes the values of a ``Packing``.
-PACKED = "floats, ints, flags, others"
+PACKED = "floats, ints, flags, vectors, others"
 
 #: Generated files that were not used for so long are removed, s.
 _KEPT_S = 30 * 86_400.0
@@ -53,11 +53,12 @@ class Packing:
     @property
     def values(self) -> tuple[Any, ...]:
         """What ``PACKED`` stands for."""
-        floats, ints, flags, others = self._lists.values()
+        floats, ints, flags, vectors, others = self._lists.values()
         return (
             np.array(floats, dtype=float),
             np.array(ints, dtype=np.int64),
             np.array(flags, dtype=bool),
+            np.array(vectors, dtype=float),
             tuple(others),
         )
 
@@ -118,9 +119,11 @@ class Packing:
                 and value.ndim == 1
                 and value.dtype == float
             ):
-                floats = self._lists["floats"]
-                text = f"floats[{len(floats)}:{len(floats) + len(value)}]"
-                floats += value.tolist()
+                # Its length is no part of the source: one serves all layouts.
+                vectors = self._lists["vectors"]
+                begin = self._place("ints", len(vectors))
+                vectors += value.tolist()
+                text = f"vectors[{begin}:{self._place('ints', len(vectors))}]"
             else:
                 text = self._place("others", value)
             self._arrays[id(value)] = value, text
