@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -20,6 +21,7 @@ from systems.sound.waveforms import SoundParameters, make_waveform
 __all__ = [
     "MAXIMUM_RANGE_M",
     "SoundEmitter",
+    "emissions_along",
     "emitted_samples",
     "history_ticks",
     "make_emission",
@@ -107,6 +109,39 @@ def make_emission(
         level_pa=sound.level_pa,
         sounding=samples is not None,
     )
+
+
+def emissions_along(
+    poses: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    waveform: NDArray[np.float32],
+    sound: SoundParameters,
+    ticks: int,
+    tick_s: float = TICK_S,
+) -> Callable[[int], Emission]:
+    """What a ``SoundEmitter`` puts out at each tick of a known motion.
+
+    Args:
+        poses: (n, 3) of the source at the ticks, m and rad.
+        velocities: (n, 3) of it, m/s and rad/s.
+        waveform: Bursts end to end, from ``make_waveform``.
+        sound: The gate.
+        ticks: How far back, from ``history_ticks``.
+        tick_s: From one tick to the next, s.
+
+    Returns:
+        A function of the tick, below n.
+    """
+    before = np.repeat(poses[:1, :2], ticks, axis=0)
+    p_WS = np.concatenate((before, poses[:, :2]))
+    v_WS = np.concatenate((np.zeros_like(before), velocities[:, :2]))
+
+    def emission(tick: int) -> Emission:
+        known = slice(tick, tick + ticks + 1)
+        path = p_WS[known], v_WS[known]
+        return make_emission(tick * tick_s, waveform, sound, *path, tick_s)
+
+    return emission
 
 
 @cache
