@@ -52,9 +52,7 @@ def emitted_samples(
         (count,) Pa at 1 m, a part of the waveform where it can be; None where all
         are zero.
     """
-    burst = round(sound.on_s * SAMPLE_RATE_HZ)
-    period = round(sound.period_s * SAMPLE_RATE_HZ)
-    start = round(sound.start_s * SAMPLE_RATE_HZ)
+    burst, period, start = _gate(sound.on_s, sound.period_s, sound.start_s)
     bursts = len(waveform) // burst
     out = None
     number = max(0, (first - start - burst) // period)
@@ -69,6 +67,15 @@ def emitted_samples(
             out[low - first : high - first] = waveform[low + offset : high + offset]
         number += 1
     return out
+
+
+@cache
+def _gate(on_s: float, period_s: float, start_s: float) -> tuple[int, int, int]:
+    """Samples of a burst, of a period, and before the first one."""
+    burst, period, start = (
+        round(time * SAMPLE_RATE_HZ) for time in (on_s, period_s, start_s)
+    )
+    return burst, period, start
 
 
 def make_emission(
@@ -99,15 +106,16 @@ def make_emission(
     emitted = _silence(count) if samples is None else samples
     knot_times = time - ages
     read_only(emitted, knot_times, p_WS, v_WS)
+    # By position: names would cost a microsecond.
     return Emission(
-        samples=emitted,
-        start_time=first / SAMPLE_RATE_HZ,
-        sample_rate_hz=float(SAMPLE_RATE_HZ),
-        knot_times=knot_times,
-        p_WS=p_WS,
-        v_WS=v_WS,
-        level_pa=sound.level_pa,
-        sounding=samples is not None,
+        emitted,
+        first / SAMPLE_RATE_HZ,
+        float(SAMPLE_RATE_HZ),
+        knot_times,
+        p_WS,
+        v_WS,
+        sound.level_pa,
+        samples is not None,
     )
 
 
