@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from contextlib import suppress
 from time import perf_counter
 from typing import Any
 
@@ -120,9 +121,10 @@ def prepared_loop(scenario: Scenario) -> CompiledLoop:
     audio = any(robot.hearing == "audio" for robot in scenario.all_robots.values())
     kind = "compiled", *_kind(scenario)
     if audio and kind not in _LOADED:
-        # What it calls in Python is compiled, too.
+        # What it calls in Python is compiled, too; errors are the run's to raise.
         aside = compile_loop(scenario, shared_blocks(scenario), RunRules(scenario))
-        aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
+        with suppress(ValueError):
+            aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
         _LOADED.add(kind)
     return loop
 

@@ -138,7 +138,7 @@ def _silent_counts(
     out: NDArray[np.int16],
 ) -> int:  # pragma: no cover  (compiled)
     """As ``_counts``, without pressure."""
-    spoiled = 0
+    spoiled: Any = 0
     for m in range(noise.shape[0]):
         level = np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):
@@ -159,7 +159,7 @@ def _counts(
     out: NDArray[np.int16],
 ) -> int:  # pragma: no cover  (compiled)
     """Fills in the counts; not 0 where a value was not finite."""
-    spoiled = 0
+    spoiled: Any = 0
     for m in range(noise.shape[0]):
         factor, level = np.float32(gains[m] * gain), np.float32(gains[m] * sigma)
         for k in range(noise.shape[1]):
