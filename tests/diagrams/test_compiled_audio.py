@@ -33,24 +33,25 @@ def sound_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return file
 
 
-def build(*overrides):
-    scenario = load_scenario("obstacle_free", ["duration_s=3", *overrides])
+def build(*overrides, name="obstacle_free"):
+    scenario = load_scenario(name, ["duration_s=3", *overrides])
     return scenario, build_sound_follower(scenario, log=True)
 
 
-def assert_same(*overrides):
-    scenario, follower = build(*overrides)
+def assert_same(*overrides, name="obstacle_free"):
+    scenario, follower = build(*overrides, name=name)
     drake = simulate(scenario, follower=follower)
-    assert drake.columns["detected"].any()
-    for _ in range(2):  # a build is used again from its start
-        compiled = simulate(scenario, follower=follower, engine="compiled")
-        assert compiled.cause == drake.cause
-        np.testing.assert_array_equal(compiled.time, drake.time)
-        assert compiled.columns.keys() == drake.columns.keys()
-        for column, values in drake.columns.items():
+    compiled = simulate(scenario, engine="compiled")
+    assert compiled.cause == drake.cause
+    assert compiled.robots.keys() == drake.robots.keys()
+    for robot, told in drake.robots.items():
+        columns = compiled.robots[robot].columns
+        assert columns.keys() == told.columns.keys()
+        assert told.columns["detected"].any()
+        for column, values in told.columns.items():
             # Speeds are differences of places over a tick.
             atol = 1e-6 if "speed" in column else 1e-9
-            found = compiled.columns[column]
+            found = columns[column]
             np.testing.assert_allclose(
                 found, values, rtol=0.0, atol=atol, err_msg=column
             )
@@ -63,9 +64,7 @@ def assert_same(*overrides):
         (),
         ROOM,
         NOISE,
-        ("tick_s=0.0125", "microphones.frame_s=0.05"),
         ("tdoa.method=ml", "tdoa.schedule_known=true"),
-        SOURCES,
     ],
 )
 def test_runs_are_those_of_drake(overrides):
@@ -76,6 +75,21 @@ def test_runs_are_those_of_drake(overrides):
 def test_files_of_sound_and_of_the_robots_own_noise(sound_file):
     played = "sound.kind=wav", f"sound.file={sound_file}"
     assert_same(*played, f"microphones.ego_noise_file={sound_file}")
+
+
+@pytest.mark.slow
+def test_several_robots_and_sources_at_other_rates():
+    rates = "tick_s=0.0125", "robots.far.microphones.frame_s=0.05"
+    assert_same(*rates, *SOURCES, name="two_followers")
+
+
+@pytest.mark.slow
+def test_blocks_that_are_shared_take_the_seed_of_the_run(sound_file):
+    noise = f"microphones.ego_noise_file={sound_file}"
+    tolerances = "position_tolerance_m=0.005", "delay_tolerance_s=5e-6"
+    fields = (noise, *(f"microphones.{text}" for text in tolerances))
+    for seed in (1, 2):
+        assert_same(*fields, f"seed={seed}", "sound.kind=band_noise")
 
 
 @pytest.mark.slow
