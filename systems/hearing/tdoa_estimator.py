@@ -224,6 +224,12 @@ class TDOAEstimator(LeafSystem):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each frame of a compiled loop, ``Step``."""
+        if "audio" not in run.carried:
+            raise InputError(
+                "engine",
+                "frames of sound come to compiled loops from a MicArray alone; run "
+                "with engine drake",
+            )
         audio = run.carried["audio"]
         memory, located = self._localiser.blank(), False
 
