@@ -30,11 +30,13 @@ __all__ = [
 REPEATS = 3
 
 
-def real_time_factor(overrides: tuple[str, ...]) -> float:
+def real_time_factor(overrides: tuple[str, ...], engine: Engine = "drake") -> float:
     """Simulated over wall time of ``simulate``, without building the diagram."""
     scenario = load_scenario("default", overrides)
     follower = build_sound_follower(scenario, log=True)
-    runs = [simulate(scenario, follower=follower) for _ in range(REPEATS + 1)]
+    runs = [
+        simulate(scenario, follower=follower, engine=engine) for _ in range(REPEATS + 1)
+    ]
     return max(run.simulated_s / run.wall_s for run in runs[1:])
 
 

@@ -11,7 +11,7 @@ the blocks with state outputs do theirs, and the plants move on by a tick.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -23,11 +23,13 @@ from numpy.typing import NDArray
 
 from diagrams.bodies import Surroundings
 from diagrams.compiled_judge import contacts_of, judge_all
+from diagrams.compiled_sound import emissions_at_ticks
 from diagrams.compiled_source import PACKED, Packing, compiled_from
 from diagrams.loop_blocks import LoopBlocks
 from diagrams.robot import seed_of
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
+from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
 from systems.framework.step_block import RunFacts
 
@@ -53,6 +55,8 @@ class CompiledLoop:
     _ended: NDArray[np.int64] = field(init=False)
     _function: Any = None
     _arguments: tuple[Any, ...] = ()
+    _hosts: Sequence[Any] = ()
+    """Steps in Python."""
 
     def __post_init__(self) -> None:
         robots = len(self.rules.robots)
@@ -103,7 +107,12 @@ class CompiledLoop:
 
     def _call(self, begin: int, end: int) -> tuple[int, bool]:
         state = self.log, self._judged, self._ended
-        done: tuple[int, bool] = self._function(begin, end, *state, *self._arguments)
+        try:
+            done: tuple[int, bool] = self._function(
+                begin, end, *state, *self._arguments
+            )
+        except HostError:
+            raise next(host.error for host in self._hosts if host.error) from None
         return done
 
     def advance(self, ticks: int) -> None:
@@ -170,8 +179,10 @@ def compile_loop(
     scenario.require_compilable()
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
+    heard = emissions_at_ticks(scenario, times)
     robots = {
-        name: _LoopRobot(scenario, name, own, ticks) for name, own in blocks.items()
+        name: _LoopRobot(scenario, name, own, ticks, heard[name])
+        for name, own in blocks.items()
     }
     packing = Packing()
     source = _Source(packing)
@@ -204,6 +215,12 @@ def compile_loop(
         columns,
         _function=compiled_from(text, packing.names),
         _arguments=packing.values,
+        _hosts=[
+            step.host
+            for robot in robots.values()
+            for step in robot.steps.values()
+            if step.host is not None
+        ],
     )
 
 
@@ -215,7 +232,12 @@ class _LoopRobot:
     """One robot of a run: its blocks' steps, and what their ports carry."""
 
     def __init__(
-        self, scenario: Scenario, name: str, made: LoopBlocks, ticks: int
+        self,
+        scenario: Scenario,
+        name: str,
+        made: LoopBlocks,
+        ticks: int,
+        heard: Mapping[str, Callable[[int], Any]],
     ) -> None:
         own = scenario.all_robots[name]
         self.facts = RunFacts(
@@ -225,6 +247,7 @@ class _LoopRobot:
             scenario.integrator.scheme,
             scenario.integrator.step_s,
             partial(seed_of, scenario, owner=name),
+            {**heard},
         )
         self.made, self.steps = made, made.steps(self.facts)
         self._views = {port: np.zeros(size) for port, size in made.sizes.items()}

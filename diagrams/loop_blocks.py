@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 from diagrams.robot import columns_of, require_published, robot_blocks
@@ -14,7 +14,7 @@ from systems.framework.step_block import RunFacts, Step
 __all__ = ["LoopBlocks", "shared_blocks"]
 
 #: What a robot takes from the world.
-_WORLD = "pose_WS", "poses_WO", "sizes"
+_WORLD = "pose_WS", "poses_WO", "sizes", "emission"
 #: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
 _NO_BLOCKS = {
     "name",
@@ -118,14 +118,17 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
     for name in scenario.all_robots:
         own = scenario.of_robot(name)
         bodies = len(scenario.surroundings(name).obstacles)
+        target = scenario.target(name)
+        others = [sound for sound in scenario.sounds() if sound != target]
+        made = partial(robot_blocks, own, name, bodies=bodies, others=others)
         if own.blocks:  # they may ask for the whole scenario
-            blocks[name] = LoopBlocks(robot_blocks(own, name, bodies=bodies))
+            blocks[name] = LoopBlocks(made())
             continue
         made_from = own.model_dump_json(exclude=_NO_BLOCKS)
-        key = f"{name} {bodies} {own.source_size} {made_from}"
+        key = f"{name} {bodies} {others} {own.source_size} {made_from}"
         found = _SHARED.pop(key, None)
         if found is None:
-            found = LoopBlocks(robot_blocks(own, name, bodies=bodies))
+            found = LoopBlocks(made())
         blocks[name] = _SHARED[key] = found
         if len(_SHARED) > _MOST_SHARED:
             del _SHARED[next(iter(_SHARED))]

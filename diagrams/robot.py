@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 from zlib import crc32
@@ -44,6 +45,7 @@ __all__ = [
     "make_robot",
     "make_source",
     "multiplexed",
+    "naming_sounds",
     "parts_of",
     "require_published",
     "robot_blocks",
@@ -280,7 +282,7 @@ def make_source(
 def _emitter(
     scenario: Scenario, name: str, sound: SoundParameters, frame_s: float
 ) -> SoundEmitter:
-    try:
+    with naming_sounds(scenario, name, sound):
         return SoundEmitter(
             sound=sound,
             acoustics=scenario.acoustics,
@@ -289,6 +291,27 @@ def _emitter(
             tick_s=scenario.tick_s,
             seed=seed_of(scenario, "sound_emitter", name),
         )
+
+
+@contextmanager
+def naming_sounds(
+    scenario: Scenario, name: str, sound: SoundParameters
+) -> Iterator[None]:
+    """Errors of a sound name its field in the scenario.
+
+    Args:
+        scenario: Has the sound.
+        name: Of the source or robot that plays it.
+        sound: What is played.
+
+    Yields:
+        Nothing.
+
+    Raises:
+        InputError: The sound cannot be played.
+    """
+    try:
+        yield
     except InputError as error:
         if not error.field.startswith("sound."):
             raise

@@ -81,8 +81,8 @@ class RunParameters(Parameters):
     description: str = Field(default="", pattern=r"\A[^\n]*\z")
     """One line for ``phonotaxis scenarios``."""
     engine: Engine | Literal["auto"] = "auto"
-    """What carries the run out: Drake's simulator, or one compiled loop over the blocks
-    of robots with ideal hearing, the same to 1e-9 m in a fraction of the time; auto:
+    """What carries the run out: Drake's simulator, or one compiled loop over the
+    same blocks, the same to 1e-9 m in a fraction of the time; auto:
     compiled where 100 runs or more are asked at once and can be."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""

@@ -165,8 +165,10 @@ class Scenario(FollowerParameters, RunParameters):
 
     def _no_loop(self) -> str:
         """Why there is no compiled loop for it, and what to do; empty if there is."""
-        if any(robot.hearing != "ideal" for robot in self.all_robots.values()):
-            return "sound waves are not compiled; set hearing to ideal"
+        robots = self.all_robots.values()
+        carries = any(robot.loudspeaker is not None for robot in robots)
+        if carries and any(robot.hearing == "audio" for robot in robots):
+            return "waves from a loudspeaker on a robot are not compiled; leave it out"
         return ""
 
     @model_validator(mode="after")

@@ -7,11 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import fft
 
 from systems.delays.correlation_peak import measure_peaks
 from systems.delays.overlap import EDGE_SAMPLES, cut_rows
-from systems.delays.transforms import filled_rows
+from systems.delays.transforms import filled_rows, transform_filled_rows
 
 __all__ = ["PairTables", "Peaks", "find_peaks", "whitening"]
 
@@ -120,7 +119,7 @@ def find_peaks(
     """
     rows = filled_rows(len(frame))
     cut, cut_samples = cut_rows(frame, np.rint(arrivals), rows, length)
-    spectra = fft.rfft(cut)[: len(frame), band]
+    spectra = transform_filled_rows(cut)[: len(frame), band]
     cross, weights, energy = _pair_spectra(spectra, tables.pairs)
     if phat:
         weights = whitening(cross)

@@ -63,7 +63,7 @@ class DelayPlan:
                 "use longer frames",
             )
 
-    @property
+    @cached_property
     def max_lag(self) -> int:
         """Largest delay between any two channels, samples."""
         return math.ceil(self.shape.max_delay(self.c) * self.sample_rate_hz)

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from scipy import fft
+from rocket_fft import c2r
 
 from systems.delays.delay_peaks import whitening
 from systems.delays.delay_plan import DelayPlan
@@ -183,7 +183,8 @@ def _chance_of_noise(
 
 @njit(cache=True)
 def _judge(
-    correlation: NDArray[np.float32],
+    cross: NDArray[np.complex64],
+    grid: int,
     moments: NDArray[np.float64],
     edges: NDArray[np.int64],
     gates: NDArray[np.int64],
@@ -193,14 +194,18 @@ def _judge(
     """Arrivals, ambiguity, chance and weakest of ``DelaySearch``.
 
     Args:
-        correlation: (e, grid) of the edges.
+        cross: (e, grid // 2 + 1) cross-spectra of the edges.
+        grid: Samples of their correlations.
         moments: From ``_cross_spectra``.
         edges: (e, 2) channels, a tree.
         gates: (e,) largest lags.
         padding: Length of the transform over that of the frame.
         stretch: Samples of the frame a sample of the correlation.
     """
-    count, grid = correlation.shape
+    count = len(cross)
+    correlation = np.empty((count, grid), dtype=np.float32)
+    forward = False
+    c2r(cross, correlation, np.array([1]), forward, 1.0, 1)
     arrivals, ambiguity = np.zeros(count + 1), 0.0
     heights, counts = np.empty(count), np.empty(count)
     for e in range(count):
@@ -249,11 +254,10 @@ def _correlation_search(
     energy: float,
     plan: DelayPlan,
 ) -> DelaySearch:
-    correlation = fft.irfft(cross, plan.grid, overwrite_x=True, norm="forward")
     padding = plan.length / plan.frame_samples
     stretch = plan.length / plan.grid
     arrivals, ambiguity, chance, weakest = _judge(
-        correlation, moments, plan.edges, plan.gates, padding, stretch
+        cross, plan.grid, moments, plan.edges, plan.gates, padding, stretch
     )
     return DelaySearch(arrivals, ambiguity, chance, weakest, energy / plan.length)
 

@@ -1,24 +1,61 @@
-"""Fourier transforms of the channels of a frame."""
+"""Fourier transforms of the channels of a frame, in compiled code.
+
+They are SciPy's to the last bit, without the microseconds that SciPy takes to find out
+who is to do a transform: as long again as a frame's transforms themselves.
+"""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
-from scipy import fft
+from rocket_fft import r2c
 
-__all__ = ["filled_rows", "transform_rows"]
+__all__ = ["filled_rows", "transform_filled_rows", "transform_rows"]
 
 
-def filled_rows(channels: int) -> int:
+@njit(cache=True)
+def filled_rows(channels: int) -> int:  # pragma: no cover  (compiled)
     """Rows to transform for so many channels.
 
     Single precision is transformed four rows at a time, and a rest of three one
     by one: with a fourth row of zeros it takes two thirds of the time.
+
+    Args:
+        channels: Their number.
+
+    Returns:
+        Their number, or one more.
     """
-    return channels + (channels % 4 == 3)
+    return channels + (1 if channels % 4 == 3 else 0)
 
 
-def transform_rows(frame: NDArray[np.float32], length: int) -> NDArray[np.complex64]:
+@njit(cache=True)
+def transform_filled_rows(
+    rows: NDArray[Any],
+) -> NDArray[Any]:  # pragma: no cover  (compiled)
+    """Spectra of rows.
+
+    Args:
+        rows: (n, length) of single or double precision.
+
+    Returns:
+        (n, length // 2 + 1) of the same.
+    """
+    precision = rows[:1, :1] * np.complex64(1.0)
+    shape = rows.shape[0], rows.shape[1] // 2 + 1
+    out = np.empty(shape, dtype=precision.dtype)
+    forward = True
+    r2c(rows, out, np.array([1]), forward, 1.0, 1)
+    return out
+
+
+@njit(cache=True)
+def transform_rows(
+    frame: NDArray[np.float32], length: int
+) -> NDArray[np.complex64]:  # pragma: no cover  (compiled)
     """Spectra of channels that are padded with zeros.
 
     Args:
@@ -30,5 +67,7 @@ def transform_rows(frame: NDArray[np.float32], length: int) -> NDArray[np.comple
     """
     channels, samples = frame.shape
     rows = np.zeros((filled_rows(channels), length), dtype=np.float32)
-    rows[:channels, :samples] = frame
-    return fft.rfft(rows)[:channels]
+    for m in range(channels):
+        for k in range(samples):
+            rows[m, k] = frame[m, k]
+    return transform_filled_rows(rows)[:channels]

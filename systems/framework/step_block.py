@@ -32,6 +32,8 @@ class Step(NamedTuple):
     publish: Callable[..., None] | None = None
     """``publish(state, outputs, numbers)`` fills the outputs of a block that has them
     in its state alone; the step then leaves them."""
+    host: Any = None
+    """``HostCall`` of a step that calls Python; the loop keeps it alive."""
 
 
 class RunFacts(NamedTuple):
@@ -51,6 +53,9 @@ class RunFacts(NamedTuple):
     """Largest step of the integrator, s."""
     seed_of: Callable[[str], int]
     """Seed of a block, by its name."""
+    carried: dict[str, Callable[[int], Any]]
+    """What abstract ports carry at a tick, by name: those from outside are there from
+    the start, a block adds its own."""
 
 
 class StepBlock:
@@ -114,7 +119,7 @@ class StepBlock:
 
     def _do_step(self: Any, context: Any) -> tuple[Any, Any]:
         """Outputs, and the state of the next tick."""
-        step, numbers, initial, _ = self.step
+        step, numbers, initial = self.step[:3]
         inputs, state = read_lists(context, self._read), []
         inputs += [[]] * (len(self._inputs) - len(inputs))
         if initial:

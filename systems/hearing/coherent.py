@@ -40,6 +40,20 @@ _RECUT = 0.02
 _LEAST_OVERLAP = 0.25
 
 
+@njit(cache=True)
+def _ranges(
+    p_AM: NDArray[np.float64], p_AS: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(n,) distances of the microphones from a place, m."""
+    ranges = np.empty(len(p_AM))
+    for m in range(len(p_AM)):
+        square = 0.0
+        for k in range(p_AM.shape[1]):
+            square += (p_AM[m, k] - p_AS[k]) ** 2
+        ranges[m] = math.sqrt(square)
+    return ranges
+
+
 def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.float64]:
     """Delays of the sound from a fix at the microphones.
 
@@ -52,7 +66,7 @@ def arrival_delays(fix: SourceFix, shape: ArrayShape, c: float) -> NDArray[np.fl
         (n - 1,) t_k - t_0, s.
     """
     if fix.range_valid:
-        ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
+        ranges = _ranges(shape.p_AM, fix.p_AS)
     else:
         ranges = -shape.p_AM @ fix.p_AS
     return np.asarray((ranges[1:] - ranges[0]) / c)

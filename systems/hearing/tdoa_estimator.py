@@ -13,8 +13,10 @@ from pydrake.systems.framework import LeafSystem
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_record
+from systems.framework.host_step import host_step
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
+from systems.framework.step_block import RunFacts, Step
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
@@ -178,21 +180,8 @@ class TDOAEstimator(LeafSystem):
                 "the audio of a MicArray"
             )
         check_record(context, self._audio, audio)
-        if audio.sample_rate_hz != self._microphones.sample_rate_hz:
-            raise InputError(
-                "TDOAEstimator",
-                f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
-                f"record at {self._microphones.sample_rate_hz:g} Hz",
-            )
         before, located = self._remembered(context)
-        fix, after = self._localiser.localise(audio.counts, before)
-        if self._schedule and not may_sound(
-            self._schedule,
-            audio.time,
-            self._longest_way_s,
-            self._microphones.frame_s,
-        ):
-            fix = None
+        fix, after = self.hear(audio, before)
         flags = after.echoes is not None, after.heard, fix is not None
         discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
         if after.echoes is not None and after.echoes is not before.echoes:
@@ -201,6 +190,61 @@ class TDOAEstimator(LeafSystem):
             return  # silence goes on, and the outputs are zero already
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
+
+    def hear(
+        self, audio: AudioFrame, memory: HearingMemory
+    ) -> tuple[SourceFix | None, HearingMemory]:
+        """Where the sound of a frame comes from, whatever context the block is in.
+
+        Args:
+            audio: The frame.
+            memory: What the last frame left.
+
+        Returns:
+            The source, or None where nothing is heard, and the new memory.
+
+        Raises:
+            InputError: The frame has another rate, or is none of this array.
+        """
+        if audio.sample_rate_hz != self._microphones.sample_rate_hz:
+            raise InputError(
+                "TDOAEstimator",
+                f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
+                f"record at {self._microphones.sample_rate_hz:g} Hz",
+            )
+        fix, after = self._localiser.localise(audio.counts, memory)
+        if self._schedule and not may_sound(
+            self._schedule,
+            audio.time,
+            self._longest_way_s,
+            self._microphones.frame_s,
+        ):
+            fix = None
+        return fix, after
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each frame of a compiled loop, ``Step``."""
+        if "audio" not in run.carried:
+            raise InputError(
+                "engine",
+                "frames of sound come to compiled loops from a MicArray alone; run "
+                "with engine drake",
+            )
+        audio = run.carried["audio"]
+        memory, located = self._localiser.blank(), False
+
+        def listen(tick: int, _: Any, outputs: Any) -> None:
+            nonlocal memory, located
+            fix, memory = self.hear(audio(tick), memory)
+            if fix is not None:
+                outputs[:] = np.concatenate(port_values(fix, self._p_PA_B))
+            elif located:
+                outputs[:] = 0.0
+            located = fix is not None
+
+        size = sum(size for _, size in _PORTS)
+        period = round(self._microphones.frame_s / run.tick_s)
+        return host_step(listen, 0, size, period)
 
     def _remembered(self, context: Any) -> tuple[HearingMemory, bool]:
         """What the last frame left, and whether it held a place."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from copy import copy
+
 import numpy as np
 import soxr
 from numpy.typing import ArrayLike, NDArray
@@ -61,12 +63,23 @@ class EgoNoise:
         self._samples = parameters.frame_samples
         self._level = 10.0 ** (-parameters.ego_noise_snr_db_at_1m / 20.0)
         self._at_rest = parameters.ego_noise_share_at_rest
+        together = len(self._loops) > 1
+        self._rows = np.arange(count) if together else np.zeros(count, dtype=int)
+        self._starts = self._drawn_starts(seed)
+
+    def _drawn_starts(self, seed: int) -> NDArray[np.int64]:
+        """(n,) places of the loops where the channels begin."""
+        count = len(self._rows)
         starts = tick_generator(seed, BEFORE_THE_RUN + 1).integers(
             self._loops.shape[1], size=count
         )
-        together = len(self._loops) > 1
-        self._starts = np.full(count, starts[0]) if together else starts
-        self._rows = np.arange(count) if together else np.zeros(count, dtype=int)
+        return np.full(count, starts[0]) if len(self._loops) > 1 else starts
+
+    def of_seed(self, seed: int) -> EgoNoise:
+        """The same recording from other places."""
+        other = copy(self)
+        other._starts = self._drawn_starts(seed)
+        return other
 
     def frame(self, number: int, share: float) -> NDArray[np.float32]:
         """(n, samples) of a frame.

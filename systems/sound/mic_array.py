@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from copy import copy
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
+from systems.framework.host_step import host_step
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import (
     SAMPLE_RATE_HZ,
@@ -21,6 +23,7 @@ from systems.framework.signals import (
     Emission,
     read_only,
 )
+from systems.framework.step_block import RunFacts, Step
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.array_tolerances import (
@@ -154,6 +157,170 @@ def _total(
     return heard[0] if heard else None
 
 
+class MicMemory(NamedTuple):
+    """What a frame leaves behind for the next one."""
+
+    last: NDArray[np.float64]
+    """(7,) time, pose and velocity of the robot at its end."""
+    places: NDArray[np.float64] | None = None
+    """Time, pose of the robot and place of each source at the last update of the
+    room; none in the free field."""
+
+
+class Recorder:
+    """Records frame by frame: what a ``MicArray`` does, without a context.
+
+    Args:
+        parameters: Microphones, amplifier and converter.
+        robot: Places of the microphones.
+        c: Speed of sound, m/s.
+        room: Walls, if there are any.
+        sources: How many sound.
+        seed: Seed of the noise and of the array's errors.
+
+    Raises:
+        ValueError: As ``MicArray``.
+    """
+
+    def __init__(
+        self,
+        parameters: MicArrayParameters,
+        robot: RobotParameters,
+        c: float,
+        *,
+        room: RoomParameters | None,
+        sources: int,
+        seed: int,
+    ) -> None:
+        self._parameters, self._robot, self._c = parameters, robot, c
+        self._reverberation, self._ego_noise, places = None, None, None
+        self._rise = room.rise_m if room else 0.0
+        if room:
+            self._reverberation = Reverberation(room, c, parameters)
+            self._update_frames = room.update_frames(parameters.frame_s)
+            places = np.r_[-np.inf, np.zeros(3 + 2 * sources)]
+        if parameters.ego_noise_file is not None:
+            self._ego_noise = EgoNoise(parameters, len(robot.microphones_m), seed)
+        self.blank = MicMemory(np.r_[-np.inf, np.zeros(6)], places)
+        """The memory before the first frame."""
+        self._draw(seed)
+
+    def _draw(self, seed: int) -> None:
+        self._seed = seed
+        count = len(self._robot.microphones_m)
+        generator = tick_generator(seed, BEFORE_THE_RUN)
+        self.tolerances = draw_tolerances(self._parameters, count, generator)
+        """Errors of the array."""
+        self.array = real_array(
+            microphones_B(self._robot), self._parameters, self.tolerances, self._c
+        )
+        """The array with these errors."""
+
+    def of_seed(self, seed: int) -> Recorder:
+        """The same with other noise and other errors of the array."""
+        other = copy(self)
+        if self._ego_noise is not None:
+            other._ego_noise = self._ego_noise.of_seed(seed)
+        other._draw(seed)
+        return other
+
+    def remembered(
+        self,
+        emissions: Sequence[Emission],
+        time: float,
+        now: tuple[NDArray[np.float64], NDArray[np.float64]],
+        memory: MicMemory,
+    ) -> MicMemory:
+        """What a frame leaves for the next one.
+
+        Args:
+            emissions: Of the sources, the followed one first.
+            time: Now, s.
+            now: Pose and velocity of the robot, (3,) each.
+            memory: What the last frame left.
+
+        Returns:
+            The new memory.
+        """
+        last = np.empty(7)
+        last[0], last[1:4], last[4:] = time, *now
+        places = memory.places
+        if self._reverberation and self.updates(time):
+            places = np.r_[time, self._places(now[0], emissions)]
+        return MicMemory(last, places)
+
+    def updates(self, time: float) -> bool:
+        """Whether reflections take new places at a frame's end."""
+        return round(time / self._parameters.frame_s) % self._update_frames == 0
+
+    def _places(
+        self, pose: NDArray[np.float64], emissions: Sequence[Emission]
+    ) -> NDArray[np.float64]:
+        """Pose of the robot and places of the sources, one after the other."""
+        now = [emission.p_WS[-1] for emission in emissions]
+        return np.concatenate([pose, *now])
+
+    def _reflections(
+        self,
+        emissions: Sequence[Emission],
+        time: float,
+        pose: NDArray[np.float64],
+        held: NDArray[np.float64] | None,
+        array: RealArray,
+    ) -> Sequence[NDArray[np.float32] | None]:
+        if self._reverberation is None or held is None:
+            return ()
+        present = self._places(pose, emissions)
+        old = held[1:] if np.isfinite(held[0]) else present
+        new = present if self.updates(time) else old
+        return self._reverberation.frames(emissions, time, old, new, array)
+
+    def record(
+        self,
+        emissions: Sequence[Emission],
+        time: float,
+        now: tuple[NDArray[np.float64], NDArray[np.float64]],
+        memory: MicMemory,
+        array: RealArray,
+    ) -> AudioFrame:
+        """The frame that ends now, whatever context the block is in.
+
+        Args:
+            emissions: Of the sources, the followed one first.
+            time: Now, s.
+            now: Pose and velocity of the robot, (3,) each.
+            memory: What the last frame left.
+            array: The microphones with their errors.
+
+        Returns:
+            Counts of all channels, see ``record_frame``.
+
+        Raises:
+            InputError: A source is out of the emission's reach, or out of the room.
+        """
+        frame_s, ego_noise = self._parameters.frame_s, None
+        pose, velocity = now
+        if self._ego_noise is not None:
+            share = driving_share(velocity, self._robot)
+            ego_noise = self._ego_noise.frame(round(time / frame_s), share)
+        last = memory.last
+        before = last[1:4], last[4:7]
+        if abs(last[0] - (time - frame_s)) > _SAME_INSTANT_S:
+            before = pose - frame_s * velocity, velocity
+        return record_frame(
+            emissions,
+            time,
+            before,
+            now,
+            array,
+            parameters=self._parameters,
+            seed=self._seed,
+            rise=self._rise,
+            reflections=self._reflections(emissions, time, pose, memory.places, array),
+            ego_noise=ego_noise,
+        )
+
+
 class MicArray(LeafSystem):
     """Records the sound at the robot's microphones.
 
@@ -220,18 +387,18 @@ class MicArray(LeafSystem):
         super().__init__()
         self._parameters = parameters or MicArrayParameters()
         self._robot = robot or RobotParameters()
-        self._seed = seed
         self.set_name("mic_array")
         c = (acoustics or AcousticParameters()).c
+        # Refuses a bad skew before anything runs.
+        self._recorder = Recorder(
+            self._parameters,
+            self._robot,
+            c,
+            room=room,
+            sources=1 + len(others),
+            seed=seed,
+        )
         self._declare_errors(c)
-        self._reverberation = None
-        if room:
-            self._reverberation = Reverberation(room, c, self._parameters)
-        self._ego_noise = None
-        if self._parameters.ego_noise_file is not None:
-            count = len(self._robot.microphones_m)
-            self._ego_noise = EgoNoise(self._parameters, count, seed)
-        self._rise = room.rise_m if room else 0.0
         self._sources = [
             self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
             for name in ("emission", *(f"emission_{name}" for name in others))
@@ -240,12 +407,10 @@ class MicArray(LeafSystem):
             self.DeclareVectorInputPort(name=name, size=3)
             for name in ("pose_WB", "velocity_WB")
         ]
-        self.DeclareDiscreteState(np.r_[-np.inf, np.zeros(6)])
-        if room:
-            self._update_frames = room.update_frames(self._parameters.frame_s)
-            self.DeclareDiscreteState(
-                np.r_[-np.inf, np.zeros(3 + 2 * len(self._sources))]
-            )
+        group: Any
+        for group in self._recorder.blank:
+            if group is not None:
+                self.DeclareDiscreteState(group)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._parameters.frame_s, offset_sec=0.0, update=self._remember
         )
@@ -262,13 +427,7 @@ class MicArray(LeafSystem):
         )
 
     def _declare_errors(self, c: float) -> None:
-        drawn = draw_tolerances(
-            self._parameters,
-            len(self._robot.microphones_m),
-            tick_generator(self._seed, BEFORE_THE_RUN),
-        )
-        # Refuses a bad skew before anything runs.
-        real_array(microphones_B(self._robot), self._parameters, drawn, c)
+        drawn = self._recorder.tolerances
         # In the order of the constants' numbers.
         groups: Any = (
             drawn.position_errors.ravel(),
@@ -298,18 +457,20 @@ class MicArray(LeafSystem):
         p_BM = microphones_B(self._robot)
         return real_array(p_BM, self._parameters, tolerances, float(c))
 
-    def _remember(self, context: Any, discrete_state: Any) -> None:
-        state = np.empty(7)
-        state[0] = context.get_time()
-        state[1:4], state[4:] = read_arrays(context, self._motion)
-        discrete_state.set_value(0, state)
-        if self._reverberation and self._updates(state[0]):
-            places = self._places(state[1:4], self._emissions(context))
-            discrete_state.set_value(1, np.r_[state[0], places])
+    def _memory(self, context: Any) -> MicMemory:
+        groups = range(context.num_discrete_state_groups())
+        return MicMemory(*(context.get_discrete_state(k).value() for k in groups))
 
-    def _updates(self, time: float) -> bool:
-        """Whether reflections take new places at a frame's end."""
-        return round(time / self._parameters.frame_s) % self._update_frames == 0
+    def _remember(self, context: Any, discrete_state: Any) -> None:
+        now: Any = read_arrays(context, self._motion)
+        old, time = self._memory(context), context.get_time()
+        emissions: Sequence[Emission] = ()
+        if old.places is not None and self._recorder.updates(time):
+            emissions = self._emissions(context)
+        new = self._recorder.remembered(emissions, time, now, old)
+        for group, values in enumerate(new):
+            if values is not None and values is not old[group]:
+                discrete_state.set_value(group, values)
 
     def _emissions(self, context: Any) -> list[Emission]:
         emissions = []
@@ -324,53 +485,27 @@ class MicArray(LeafSystem):
             emissions.append(emission)
         return emissions
 
-    def _places(
-        self, pose: NDArray[np.float64], emissions: list[Emission]
-    ) -> NDArray[np.float64]:
-        """Pose of the robot and places of the sources, one after the other."""
-        now = [emission.p_WS[-1] for emission in emissions]
-        return np.concatenate([pose, *now])
-
-    def _reflections(
-        self,
-        context: Any,
-        pose: NDArray[np.float64],
-        emissions: list[Emission],
-        array: RealArray,
-    ) -> Sequence[NDArray[np.float32] | None]:
-        if self._reverberation is None:
-            return ()
-        present = self._places(pose, emissions)
-        held = context.get_discrete_state(1).value()
-        old = held[1:] if np.isfinite(held[0]) else present
-        time = context.get_time()
-        new = present if self._updates(time) else old
-        return self._reverberation.frames(emissions, time, old, new, array)
-
     def _record(self, context: Any, output: Any) -> None:
-        emissions = self._emissions(context)
-        time, frame_s = context.get_time(), self._parameters.frame_s
-        pose, velocity = read_arrays(context, self._motion)
-        ego_noise = None
-        if self._ego_noise is not None:
-            share = driving_share(velocity, self._robot)
-            ego_noise = self._ego_noise.frame(round(time / frame_s), share)
+        emissions, time = self._emissions(context), context.get_time()
+        now: Any = read_arrays(context, self._motion)
+        memory = self._memory(context)
         array: Any = self._array.Eval(context)
-        last = context.get_discrete_state(0).value()
-        before = last[1:4], last[4:7]
-        if abs(last[0] - (time - frame_s)) > _SAME_INSTANT_S:
-            before = pose - frame_s * velocity, velocity
-        output.set_value(
-            record_frame(
-                emissions,
-                time,
-                before,
-                (pose, velocity),
-                array,
-                parameters=self._parameters,
-                seed=self._seed,
-                rise=self._rise,
-                reflections=self._reflections(context, pose, emissions, array),
-                ego_noise=ego_noise,
-            )
-        )
+        frame = self._recorder.record(emissions, time, now, memory, array)
+        output.set_value(frame)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each frame of a compiled loop, ``Step``."""
+        recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
+        emitted = [run.carried[port.get_name()] for port in self._sources]
+        memory = recorder.blank
+        frame: AudioFrame | None = None
+
+        def record(tick: int, inputs: Any, _: Any) -> None:
+            nonlocal memory, frame
+            time, now = tick * run.tick_s, (inputs[:3], inputs[3:])
+            emissions = [emission(tick) for emission in emitted]
+            frame = recorder.record(emissions, time, now, memory, recorder.array)
+            memory = recorder.remembered(emissions, time, now, memory)
+
+        run.carried["audio"] = lambda _: frame
+        return host_step(record, 6, 0, round(self._parameters.frame_s / run.tick_s))

@@ -194,6 +194,47 @@ def retarded_delays(
     return delays, rates
 
 
+@njit(cache=True)
+def _sample_delays(
+    times: NDArray[np.float64],
+    p_WM: NDArray[np.float64],
+    v_WM: NDArray[np.float64],
+    knot_times: NDArray[np.float64],
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
+    air: tuple[float, float],
+    samples: tuple[float, float],
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float
+]:  # pragma: no cover  (compiled)
+    """``retarded_delays`` as ``_interpolate`` takes them.
+
+    Args:
+        times: As there, and so on.
+        p_WM: m.
+        v_WM: m/s.
+        knot_times: s.
+        p_WS: m.
+        v_WS: m/s.
+        air: Speed of sound, m/s, and rise, m.
+        samples: Time of the first emitted one, s, and their rate, Hz.
+
+    Returns:
+        Places of the first instants among the samples (m,), delays in samples and
+        their rates (m, k), and the first place that is heard.
+    """
+    delays, rates = retarded_delays(
+        times, p_WM, v_WM, knot_times, p_WS, v_WS, air[0], air[1]
+    )
+    first, earliest = np.empty(len(times)), np.inf
+    for m in range(len(times)):
+        first[m] = (times[m, 0] - samples[0]) * samples[1]
+        for k in range(times.shape[1]):
+            delays[m, k] *= samples[1]
+        earliest = min(earliest, first[m] - delays[m, 0])
+    return first, delays, rates, earliest
+
+
 @njit(cache=True, fastmath=REORDER, forceinline=True)
 def _delayed(
     samples: NDArray[np.float32],
@@ -365,13 +406,18 @@ def propagate(
     Raises:
         InputError: A microphone hears what left before the emission begins.
     """
-    delays, rates = retarded_delays(
-        times, p_WM, v_WM, emission.knot_times, emission.p_WS, emission.v_WS, c, rise
-    )
     rate = emission.sample_rate_hz
-    first = (times[:, 0] - emission.start_time) * rate
-    delays *= rate
-    if (first - delays[:, 0]).min() < KERNEL_REACH:
+    first, delays, rates, earliest = _sample_delays(
+        times,
+        p_WM,
+        v_WM,
+        emission.knot_times,
+        emission.p_WS,
+        emission.v_WS,
+        (c, rise),
+        (emission.start_time, rate),
+    )
+    if earliest < KERNEL_REACH:
         raise _out_of_reach(delays[:, 0].max() * c / rate)
     step = float(times[0, -1] - times[0, 0]) * rate / count
     if abs(step - round(step)) < _SAME_RATE:

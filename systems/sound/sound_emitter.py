@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -20,6 +21,7 @@ from systems.sound.waveforms import SoundParameters, make_waveform
 __all__ = [
     "MAXIMUM_RANGE_M",
     "SoundEmitter",
+    "emissions_along",
     "emitted_samples",
     "history_ticks",
     "make_emission",
@@ -50,9 +52,7 @@ def emitted_samples(
         (count,) Pa at 1 m, a part of the waveform where it can be; None where all
         are zero.
     """
-    burst = round(sound.on_s * SAMPLE_RATE_HZ)
-    period = round(sound.period_s * SAMPLE_RATE_HZ)
-    start = round(sound.start_s * SAMPLE_RATE_HZ)
+    burst, period, start = _gate(sound.on_s, sound.period_s, sound.start_s)
     bursts = len(waveform) // burst
     out = None
     number = max(0, (first - start - burst) // period)
@@ -67,6 +67,15 @@ def emitted_samples(
             out[low - first : high - first] = waveform[low + offset : high + offset]
         number += 1
     return out
+
+
+@cache
+def _gate(on_s: float, period_s: float, start_s: float) -> tuple[int, int, int]:
+    """Samples of a burst, of a period, and before the first one."""
+    burst, period, start = (
+        round(time * SAMPLE_RATE_HZ) for time in (on_s, period_s, start_s)
+    )
+    return burst, period, start
 
 
 def make_emission(
@@ -97,16 +106,50 @@ def make_emission(
     emitted = _silence(count) if samples is None else samples
     knot_times = time - ages
     read_only(emitted, knot_times, p_WS, v_WS)
+    # By position: names would cost a microsecond.
     return Emission(
-        samples=emitted,
-        start_time=first / SAMPLE_RATE_HZ,
-        sample_rate_hz=float(SAMPLE_RATE_HZ),
-        knot_times=knot_times,
-        p_WS=p_WS,
-        v_WS=v_WS,
-        level_pa=sound.level_pa,
-        sounding=samples is not None,
+        emitted,
+        first / SAMPLE_RATE_HZ,
+        float(SAMPLE_RATE_HZ),
+        knot_times,
+        p_WS,
+        v_WS,
+        sound.level_pa,
+        samples is not None,
     )
+
+
+def emissions_along(
+    poses: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    waveform: NDArray[np.float32],
+    sound: SoundParameters,
+    ticks: int,
+    tick_s: float = TICK_S,
+) -> Callable[[int], Emission]:
+    """What a ``SoundEmitter`` puts out at each tick of a known motion.
+
+    Args:
+        poses: (n, 3) of the source at the ticks, m and rad.
+        velocities: (n, 3) of it, m/s and rad/s.
+        waveform: Bursts end to end, from ``make_waveform``.
+        sound: The gate.
+        ticks: How far back, from ``history_ticks``.
+        tick_s: From one tick to the next, s.
+
+    Returns:
+        A function of the tick, below n.
+    """
+    before = np.repeat(poses[:1, :2], ticks, axis=0)
+    p_WS = np.concatenate((before, poses[:, :2]))
+    v_WS = np.concatenate((np.zeros_like(before), velocities[:, :2]))
+
+    def emission(tick: int) -> Emission:
+        known = slice(tick, tick + ticks + 1)
+        path = p_WS[known], v_WS[known]
+        return make_emission(tick * tick_s, waveform, sound, *path, tick_s)
+
+    return emission
 
 
 @cache

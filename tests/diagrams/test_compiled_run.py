@@ -147,7 +147,7 @@ def test_a_law_that_numba_cannot_compile_is_named(own_law):
 @pytest.mark.parametrize(
     ("name", "override", "reason"),
     [
-        ("default", "hearing=audio", "sound waves are not compiled"),
+        ("convoy", "hearing=audio", "waves from a loudspeaker on a robot"),
     ],
 )
 def test_what_has_no_compiled_loop_is_refused(name, override, reason):
