@@ -312,20 +312,23 @@ class _Source:
                 known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
                 paths = [around.bodies[body].path for body in known.values()]
                 at = times if any(path.moves for path in paths) else times[:1]
-                values = (
-                    np.array([*known], dtype=np.int64),
-                    np.reshape([path.poses(at) for path in paths], (-1, len(at), 3)),
-                )
-                expressions = map(self._packing.expression, values)
-                self._filled.append(self._call(_fill, into, *expressions, "tick"))
+                places = np.array([*known], dtype=np.int64)
+                poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))
+                self._fill_by(_fill, into, places, poses, "tick")
                 for k, body in enumerate(bodies):
                     if body in robots:
-                        values = 3 * k, robots[body].view("pose_WB")
-                        expressions = map(self._packing.expression, values)
-                        self._filled.append(self._call(_copy, into, *expressions))
+                        self._fill_by(_copy, into, 3 * k, robots[body].view("pose_WB"))
         if "sizes" in robot.made.outside:
             sizes = [body.size for body in around.obstacles.values()]
             robot.view("sizes")[:] = np.ravel(sizes)
+
+    def _fill_by(self, function: Any, into: str, *values: Any) -> None:
+        """A line that fills a port from values; text stands for itself."""
+        expressions = (
+            value if isinstance(value, str) else self._packing.expression(value)
+            for value in values
+        )
+        self._filled.append(self._call(function, into, *expressions))
 
     def text(self, tick_s: float, watched: Any, contacts: Any, logged: Any) -> str:
         """The source, with what robots are judged by and what is logged."""

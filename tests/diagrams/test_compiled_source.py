@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import os
+import sys
 import time
-from typing import NamedTuple
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
@@ -17,8 +19,8 @@ from systems.laws.impedance import AttractionParameters
 
 class Numbers(NamedTuple):
     attraction: AttractionParameters
-    function: object
-    rest: tuple
+    function: Any
+    rest: tuple[Any, ...]
 
 
 def doubled(x):
@@ -104,9 +106,9 @@ def test_another_text_of_a_users_file_is_another_loop(folder, tmp_path, monkeypa
     for factor in ("2.0", "3.0"):
         file = tmp_path / "factors.py"
         file.write_text(f"def own(x):\n    return {factor} * x\n")
-        spec = importlib.util.spec_from_file_location("factors", file)
-        module = importlib.util.module_from_spec(spec)
-        monkeypatch.setitem(__import__("sys").modules, "factors", module)
+        module = ModuleType("factors")
+        module.__file__ = str(file)
+        monkeypatch.setitem(sys.modules, "factors", module)
         exec(compile(file.read_text(), str(file), "exec"), vars(module))
         compiled_from(SOURCE, {"doubled": module.own})
         names.append({path.name for path in folder.glob("*.source")})
@@ -134,7 +136,7 @@ def test_without_a_folder_nothing_is_kept(folder, monkeypatch):
     def refuse(*arguments, **options):
         raise OSError("no space left")
 
-    monkeypatch.setattr(compiled_source.Path, "mkdir", refuse)
+    monkeypatch.setattr(Path, "mkdir", refuse)
     packing = Packing()
     packing.expression(3.0)
     source = SOURCE.replace("doubled", packing.name(doubled))
