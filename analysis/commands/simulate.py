@@ -26,12 +26,21 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.run_error import RunError
     from analysis.runs.run_report import run_summary, summary_text, write_run
-    from diagrams import build_sound_follower, load_scenario, simulate
+    from diagrams import (
+        build_sound_follower,
+        load_scenario,
+        prepared_loop,
+        simulate,
+    )
     from systems.framework.input_error import InputError
 
     place = take(options.out)
     scenario = load_scenario(options.scenario, _settings(options))
-    follower = build_sound_follower(scenario, log=True)
+    follower = None
+    if scenario.engine == "compiled":
+        prepared_loop(scenario)
+    else:
+        follower = build_sound_follower(scenario, log=True)
 
     def run(progress: Progress) -> RunResult:
         try:
