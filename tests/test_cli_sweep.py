@@ -27,6 +27,10 @@ set: {hearing: ideal, obstacle_sensing: ideal, duration_s: 0.5}
 grid: {law: [none, active]}
 draw: {source.speed_m_s: {uniform: [0.1, 0.5]}}
 """
+#: The same, of the kind that other tests compile.
+COMPILED = SWEEP.replace("obstacle_sensing: ideal, ", "").replace(
+    "law: [none, active]", "repulsion.velocity_term: [printed, closing]"
+)
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:
@@ -159,7 +163,10 @@ def running_in(process: int) -> list[Path]:
 
 @pytest.mark.slow
 def test_killed_sweep_goes_on_where_it_was(capsys, tmp_path):
-    file, out = write(tmp_path / "sweep.yaml", SWEEP + "runs: 60\n"), tmp_path / "out"
+    file, out = (
+        write(tmp_path / "sweep.yaml", COMPILED + "runs: 60\n"),
+        tmp_path / "out",
+    )
     process = begin(file, out, "--workers", "2")
     after = int(np.random.default_rng(time.time_ns()).integers(1, 70))
     wait_for_runs(out, after)
@@ -184,7 +191,10 @@ def test_killed_sweep_goes_on_where_it_was(capsys, tmp_path):
 
 @pytest.mark.slow
 def test_interrupt_keeps_what_is_done(tmp_path):
-    file, out = write(tmp_path / "sweep.yaml", SWEEP + "runs: 500\n"), tmp_path / "out"
+    file, out = (
+        write(tmp_path / "sweep.yaml", COMPILED + "runs: 500\n"),
+        tmp_path / "out",
+    )
     process = begin(file, out, "--workers", "1")
     wait_for_runs(out, 3)
     workers = running_in(process.pid)

@@ -308,9 +308,10 @@ def _fifth_order(state, h, commanded, derivatives, of_plant):
         slope = derivatives(reached, commanded, *of_plant)
         for k in range(size):
             slopes[stage, k] = slope[k]
-            reached[k] = state[k]
+            change = 0.0
             for earlier in range(stage + 1):
-                reached[k] += h * _STAGES[stage][earlier] * slopes[earlier, k]
+                change += slopes[earlier, k] * (_STAGES[stage][earlier] * h)
+            reached[k] = state[k] + change
     for k in range(size):
         state[k] = reached[k]
 

@@ -10,6 +10,9 @@ import pytest
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
+TOUCHING = ("robots.second.attraction={follow_distance_m: 0.1}",)
+RK2 = "integrator.scheme=runge_kutta2", "integrator.step_s=0.01"
+
 OWN_LAW = """
 from pydrake.math import exp
 
@@ -92,25 +95,25 @@ def assert_same(name, *overrides):
         ("one_moving_obstacle", ("ultrasonic.dropout_probability=0.1",)),
         ("two_moving_obstacles", ("ultrasonic.firing=sequential",)),
         ("corridor", ("tick_s=0.0125", "microphones.frame_s=0.05")),
-        ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
-        ("wall", ("integrator.scheme=runge_kutta2", "integrator.step_s=0.01")),
-        ("wall", ("integrator.scheme=runge_kutta5",)),
         ("obstacle_free", ("ideal_hearing.bearing_noise_deg=3", "tracker.hold=robot")),
         ("default", ("sound.start_s=30", "stop.lost_after_s=5")),
         ("default", ("start.heading_deg=180", "stop.diverged_range_m=2.5")),
-        ("convoy", ("ideal_hearing.range_noise_fraction=0.01",)),
-        ("convoy", ("robots.second.attraction={follow_distance_m: 0.1}", "law=none")),
+        ("u_trap", ("ultrasonic.axes_deg=8", "collision_vector.aggregation=sum")),
+        ("convoy", ("ideal_hearing.range_noise_fraction=0.01", "law=none", *RK2)),
+        ("convoy", (*TOUCHING, "law=none", *RK2)),
     ],
 )
 def test_runs_are_those_of_drake(name, overrides):
+    """Seven scenarios are of one kind, which is compiled once."""
     assert_same(name, *overrides)
 
 
 @pytest.mark.slow
-def test_a_users_law_on_wheels_that_slip(own_law):
-    law = f"law={own_law}:gaussian"
+@pytest.mark.parametrize("name", ["wall", "one_moving_obstacle"])
+def test_a_users_law_on_wheels_that_slip(own_law, name):
+    law, scheme = f"law={own_law}:gaussian", "integrator.scheme=runge_kutta5"
     slip = "plant.friction=0.05", "obstacle_sensing=ideal"
-    assert_same("one_moving_obstacle", law, *slip)
+    assert_same(name, law, scheme, *slip)
 
 
 @pytest.fixture
