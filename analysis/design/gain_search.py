@@ -166,6 +166,8 @@ def _matched_spring(
     for the contact, the shortest that is not.
     """
     reach = getattr(scenario.repulsion, law).reach_m
+    # Of the attraction alone: no alpha changes it.
+    allowed = allowed_stiffness(scenario, requirements)
 
     def with_alpha(alpha: float) -> Scenario:
         inverse_ratio = math.exp(-reach / (2.0 * alpha))
@@ -187,7 +189,6 @@ def _matched_spring(
         return rest_offset(law, with_alpha(alpha)) - scenario.stop.goal_margin_m
 
     def too_stiff(alpha: float) -> float:
-        allowed = allowed_stiffness(scenario, requirements)
         return stiffest(law, with_alpha(alpha)) - allowed
 
     field = f"repulsion.{law}.reference_stiffness_n_m"
