@@ -23,13 +23,13 @@ from numpy.typing import NDArray
 
 from diagrams.bodies import Surroundings
 from diagrams.compiled_judge import contacts_of, judge_all
-from diagrams.compiled_sound import emissions_at_ticks
+from diagrams.compiled_sound import sounds_of_a_run
 from diagrams.compiled_source import PACKED, Packing, compiled_from
 from diagrams.loop_blocks import LoopBlocks
 from diagrams.robot import seed_of
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
-from systems.framework.host_step import HostError
+from systems.framework.host_step import HostCall, HostError, HostFunction, host_step
 from systems.framework.input_error import InputError, shortened
 from systems.framework.step_block import RunFacts
 
@@ -173,23 +173,26 @@ def compile_loop(
         The loop, before its first tick.
 
     Raises:
-        InputError: The scenario has none (``Scenario.require_compilable``), or a
-            block of a user's own has no step.
+        InputError: A block of a user's own has no step, or a sound file cannot be
+            played.
     """
-    scenario.require_compilable()
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
-    heard = emissions_at_ticks(scenario, times)
+    sounds = sounds_of_a_run(scenario, times)
     robots = {
-        name: _LoopRobot(scenario, name, own, ticks, heard[name])
+        name: _LoopRobot(scenario, name, own, ticks, sounds.heard[name])
         for name, own in blocks.items()
     }
     packing = Packing()
     source = _Source(packing)
     for name, robot in robots.items():
         source.surround(rules.robots[name].surroundings, robot, robots, times)
+    hosts = [
+        source.remember(robots[name], function)
+        for name, function in sounds.carried.items()
+    ]
     for robot in robots.values():
-        source.add(robot)
+        hosts += source.add(robot)
     text = source.text(
         scenario.tick_s,
         tuple(
@@ -215,17 +218,16 @@ def compile_loop(
         columns,
         _function=compiled_from(text, packing.names),
         _arguments=packing.values,
-        _hosts=[
-            step.host
-            for robot in robots.values()
-            for step in robot.steps.values()
-            if step.host is not None
-        ],
+        _hosts=hosts,
     )
 
 
 #: What a robot is judged by, and its pose at the tick before.
 _WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
+
+
+#: What a step is called with after the tick.
+_STEP_PARTS = "state", "inputs", "outputs", "numbers"
 
 
 class _LoopRobot:
@@ -270,8 +272,8 @@ class _Source:
         self._plants: list[str] = []
         self._published: dict[bool, list[str]] = {False: [], True: []}
 
-    def add(self, robot: _LoopRobot) -> None:
-        """A robot's blocks."""
+    def add(self, robot: _LoopRobot) -> list[HostCall]:
+        """A robot's blocks; returns what they call in Python."""
         made, (early, late) = robot.made, robot.made.order(robot.steps)
         for part in (*early, *late):
             step = robot.steps[part]
@@ -281,10 +283,9 @@ class _Source:
                 tuple(map(robot.view, made.outputs[part])),
                 step.numbers,
             )
-            names = ("state", "inputs", "outputs", "numbers")
             own = [
                 self._let(f"{n}_{self._blocks}", x)
-                for n, x in zip(names, parts, strict=True)
+                for n, x in zip(_STEP_PARTS, parts, strict=True)
             ]
             self._blocks += 1
             call = self._call(step.step, "tick", *own)
@@ -296,6 +297,17 @@ class _Source:
             state, _, outputs, numbers = own
             publish = self._call(step.publish, state, outputs, numbers)
             self._published[plant].append(publish)
+        return [step.host for step in robot.steps.values() if step.host is not None]
+
+    def remember(self, robot: _LoopRobot, function: HostFunction) -> HostCall:
+        """Shows a robot's motion to a Python function at the begin of every tick."""
+        motion = tuple(map(robot.view, ("pose_WB", "velocity_WB")))
+        step = host_step(function, sum(map(len, motion)), 0, 1)
+        names = [f"{each}_of_sound_{len(self._filled)}" for each in _STEP_PARTS]
+        parts = np.array(step.state), motion, (), step.numbers
+        own = [self._let(n, part) for n, part in zip(names, parts, strict=True)]
+        self._filled.append(self._call(step.step, "tick", *own))
+        return step.host
 
     def surround(
         self,

@@ -1,62 +1,88 @@
-"""What sounds in a compiled run: functions of the tick, known beforehand."""
+"""What sounds in a compiled run: functions of the tick."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.robot import naming_sounds, seed_of
 from diagrams.scenario import Scenario
+from systems.framework.host_step import HostFunction
 from systems.framework.signals import Emission
 from systems.sound.mic_array import microphone_reach
 from systems.sound.sound_emitter import emissions_along, history_ticks
-from systems.sound.waveforms import make_waveform
+from systems.sound.waveforms import SoundParameters, make_waveform
 
-__all__ = ["emissions_at_ticks"]
+__all__ = ["Sounds", "sounds_of_a_run"]
 
 
-def emissions_at_ticks(
-    scenario: Scenario, times: NDArray[np.float64]
-) -> dict[str, dict[str, Callable[[int], Emission]]]:
-    """What robots hear of sources, on which nothing acts back.
+class Sounds(NamedTuple):
+    """What robots hear in a run."""
+
+    heard: dict[str, dict[str, Callable[[int], Emission]]]
+    """Of each robot, by its input port, the emission at a tick; nothing where it hears
+    no waves."""
+    carried: dict[str, HostFunction]
+    """Of each robot with a loudspeaker, what has to see its pose and velocity at every
+    tick before anybody hears it."""
+
+
+def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
+    """What robots hear: sources, on which nothing acts back, and loudspeakers.
 
     Args:
-        scenario: Its robots carry no loudspeakers.
+        scenario: What is run.
         times: (n,) of the ticks, s.
 
     Returns:
-        Of each robot, by its input port, the emission at a tick below n; nothing where
-        it hears no waves.
+        Functions of ticks below n.
 
     Raises:
         InputError: A sound file cannot be played.
     """
-    heard: dict[str, dict[str, Callable[[int], Emission]]] = {
-        name: {} for name in scenario.all_robots
-    }
-    hearing = [
-        name for name, own in scenario.all_robots.items() if own.hearing == "audio"
-    ]
-    for source, parameters in scenario.all_sources.items() if hearing else ():
-        path, sound = parameters.path(), parameters.sound
-        with naming_sounds(scenario, source, sound):
-            waveform = make_waveform(sound, seed_of(scenario, "sound_emitter", source))
-        emission = emissions_along(
-            path.poses(times),
-            np.array([path.velocity(time) for time in times.tolist()]),
-            waveform,
-            sound,
-            history_ticks(
-                microphone_reach(scenario.room, scenario.acoustics),
-                scenario.acoustics.c,
-                scenario.longest_frame_s,
-                scenario.tick_s,
-            ),
-            scenario.tick_s,
-        )
+    robots = scenario.all_robots
+    sounds = Sounds({name: {} for name in robots}, {})
+    hearing = [name for name, own in robots.items() if own.hearing == "audio"]
+    ticks = history_ticks(
+        microphone_reach(scenario.room, scenario.acoustics),
+        scenario.acoustics.c,
+        scenario.longest_frame_s,
+        scenario.tick_s,
+    )
+    for source, sound in scenario.sounds().items() if hearing else ():
+        p_WS, v_WS = np.zeros((2, ticks + len(times), 2))
+        if source in robots:
+            p_WS[:] = robots[source].start.position_m
+            sounds.carried[source] = _remembering(p_WS[ticks:], v_WS[ticks:])
+        else:
+            path = scenario.all_sources[source].path()
+            p_WS[ticks:] = path.poses(times)[:, :2]
+            p_WS[:ticks] = p_WS[ticks]
+            v_WS[ticks:] = [path.velocity(time)[:2] for time in times.tolist()]
+        waveform = _waveform(scenario, source, sound)
+        emission = emissions_along(p_WS, v_WS, waveform, sound, ticks, scenario.tick_s)
         for name in hearing:
             followed = scenario.target(name) == source
-            heard[name]["emission" if followed else f"emission_{source}"] = emission
-    return heard
+            sounds.heard[name]["emission" if followed else f"emission_{source}"] = (
+                emission
+            )
+    return sounds
+
+
+def _remembering(p_WS: NDArray[np.float64], v_WS: NDArray[np.float64]) -> HostFunction:
+    """Writes a robot's places and velocities."""
+
+    def remember(tick: int, motion: Any, _: Any) -> None:
+        p_WS[tick], v_WS[tick] = motion[:2], motion[3:5]
+
+    return remember
+
+
+def _waveform(
+    scenario: Scenario, source: str, sound: SoundParameters
+) -> NDArray[np.float32]:
+    with naming_sounds(scenario, source, sound):
+        return make_waveform(sound, seed_of(scenario, "sound_emitter", source))

@@ -111,9 +111,8 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         Of each robot.
 
     Raises:
-        InputError: As ``robot_blocks``, and where a scenario has no loop.
+        InputError: As ``robot_blocks``.
     """
-    scenario.require_compilable()
     blocks = {}
     for name in scenario.all_robots:
         own = scenario.of_robot(name)

@@ -81,9 +81,9 @@ class RunParameters(Parameters):
     description: str = Field(default="", pattern=r"\A[^\n]*\z")
     """One line for ``phonotaxis scenarios``."""
     engine: Engine | Literal["auto"] = "auto"
-    """What carries the run out: Drake's simulator, or one compiled loop over the
-    same blocks, the same to 1e-9 m in a fraction of the time; auto:
-    compiled where 100 runs or more are asked at once and can be."""
+    """What carries the run out: Drake's simulator, or one compiled loop over the same
+    blocks, the same to 1e-9 m in a fraction of the time; auto: compiled where 100 runs
+    or more are asked at once."""
     seed: int = Field(default=1, ge=0, lt=2**63)
     """Every random number of the run comes from it."""
     tick_s: Period = TICK_S

@@ -149,34 +149,6 @@ class Scenario(FollowerParameters, RunParameters):
                     f"{self.tick_s:g} s",
                 )
 
-    @property
-    def compilable(self) -> bool:
-        """Whether there is a compiled loop for it, a user's own code apart."""
-        return not self._no_loop()
-
-    def require_compilable(self) -> None:
-        """Refuses what has no compiled loop.
-
-        Raises:
-            InputError: Says why, and what to do.
-        """
-        if reason := self._no_loop():
-            raise InputError("engine", reason)
-
-    def _no_loop(self) -> str:
-        """Why there is no compiled loop for it, and what to do; empty if there is."""
-        robots = self.all_robots.values()
-        carries = any(robot.loudspeaker is not None for robot in robots)
-        if carries and any(robot.hearing == "audio" for robot in robots):
-            return "waves from a loudspeaker on a robot are not compiled; leave it out"
-        return ""
-
-    @model_validator(mode="after")
-    def _check_engine(self) -> Scenario:
-        if self.engine == "compiled":
-            self.require_compilable()
-        return self
-
     def surroundings(
         self, robot: str = "", paths: Mapping[str, Path] | None = None
     ) -> Surroundings:

@@ -42,7 +42,7 @@ class PreparedSweep:
     """The open directory of the results; ``run`` closes it."""
     runner: Runner
     compiled: bool
-    """Whether what has a compiled loop runs in it."""
+    """Whether runs are compiled where the scenario leaves it open."""
 
     def run(self, progress: Callable[[int], None] | None = None) -> pd.DataFrame:
         """Does all runs that the directory does not hold yet.
@@ -88,7 +88,7 @@ class PreparedSweep:
         """What runs a scenario of the sweep."""
         if scenario.engine != "auto":
             return scenario.engine
-        return "compiled" if self.compiled and scenario.compilable else "drake"
+        return "compiled" if self.compiled else "drake"
 
 
 #: Processes, each of some 300 MB.
@@ -209,9 +209,7 @@ def _build_each_kind(plan: SweepPlan, points: list[SweepPoint]) -> bool:
         if point.index == 0 or not kinds <= seen:
             scenario = plan.scenario_of(point)
             auto = scenario.engine == "auto"
-            if scenario.engine == "compiled" or (
-                auto and compiled and scenario.compilable
-            ):
+            if scenario.engine == "compiled" or (auto and compiled):
                 try:
                     prepared_loop(scenario)
                 except InputError as error:

@@ -120,18 +120,19 @@ def make_emission(
 
 
 def emissions_along(
-    poses: NDArray[np.float64],
-    velocities: NDArray[np.float64],
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
     waveform: NDArray[np.float32],
     sound: SoundParameters,
     ticks: int,
     tick_s: float = TICK_S,
 ) -> Callable[[int], Emission]:
-    """What a ``SoundEmitter`` puts out at each tick of a known motion.
+    """What a ``SoundEmitter`` puts out at each tick of a motion.
 
     Args:
-        poses: (n, 3) of the source at the ticks, m and rad.
-        velocities: (n, 3) of it, m/s and rad/s.
+        p_WS: (ticks + n, 2) places of the source, so many ticks before the first one,
+            where it rested, and at n ticks, m. They need be known at their tick only.
+        v_WS: (ticks + n, 2) its velocity, m/s.
         waveform: Bursts end to end, from ``make_waveform``.
         sound: The gate.
         ticks: How far back, from ``history_ticks``.
@@ -140,9 +141,6 @@ def emissions_along(
     Returns:
         A function of the tick, below n.
     """
-    before = np.repeat(poses[:1, :2], ticks, axis=0)
-    p_WS = np.concatenate((before, poses[:, :2]))
-    v_WS = np.concatenate((np.zeros_like(before), velocities[:, :2]))
 
     def emission(tick: int) -> Emission:
         known = slice(tick, tick + ticks + 1)

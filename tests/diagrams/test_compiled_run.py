@@ -145,18 +145,3 @@ def test_a_law_that_numba_cannot_compile_is_named(own_law):
         InputError, match=r"engine: numba cannot compile '.*own_law.*drake"
     ):
         list(both("default", law, "duration_s=0.1"))
-
-
-@pytest.mark.parametrize(
-    ("name", "override", "reason"),
-    [
-        ("convoy", "hearing=audio", "waves from a loudspeaker on a robot"),
-    ],
-)
-def test_what_has_no_compiled_loop_is_refused(name, override, reason):
-    overrides = ["hearing=ideal", override]
-    scenario = load_scenario(name, overrides)
-    with pytest.raises(InputError, match=f"engine: .*{reason}"):
-        simulate(scenario, engine="compiled")
-    with pytest.raises(InputError, match=f"engine: .*{reason}"):
-        load_scenario(name, [*overrides, "engine=compiled"])
