@@ -35,7 +35,7 @@ from systems.ranging.ultrasonic_array import (
     world_rectangles,
 )
 from systems.sound.array_tolerances import draw_tolerances, real_array
-from systems.sound.mic_array import microphones_B, record_frame
+from systems.sound.recorder import microphones_B, record_frame
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.sound.waveforms import make_waveform
 from systems.world.geometry import control_point, rotate

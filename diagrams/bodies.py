@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters
-from systems.sound.mic_array import microphones_B
+from systems.sound.recorder import microphones_B
 from systems.world.geometry import rotate
 
 __all__ = [

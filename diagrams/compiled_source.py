@@ -17,6 +17,7 @@ from collections import namedtuple
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from functools import cache, cached_property
+from itertools import count
 from pathlib import Path
 from types import FunctionType, ModuleType
 from typing import Any
@@ -39,6 +40,7 @@ PACKED = "floats, ints, flags, vectors, others"
 _KEPT_S = 30 * 86_400.0
 
 _LOGGER = logging.getLogger("phonotaxis")
+_COUNT = count()
 
 
 class Packing:
@@ -169,8 +171,9 @@ def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
     file = _file(source, dict(named))
     if file is None or not any((file.parent / "__pycache__").glob(f"{file.stem}.*")):
         _LOGGER.info("compiling this kind of scenario, for some 15 s ...")
-    # numba asks for the module of what it loads.
-    module = ModuleType(f"phonotaxis.{file.stem}" if file else "phonotaxis.loop")
+    # numba asks for the module of what it loads; loops without a file are not one.
+    name = file.stem if file else f"loop_{next(_COUNT)}"
+    module = ModuleType(f"phonotaxis.{name}")
     sys.modules[module.__name__] = module
     vars(module).update(named)
     exec(compile(source, str(file or "<loop>"), "exec"), vars(module))

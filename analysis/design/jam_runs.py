@@ -37,20 +37,21 @@ def jam_runs(
     """Runs ``two_static_obstacles`` with exact hearing and ultrasonic cones.
 
     Args:
-        scenario: Its attraction, repulsion, tick and rates of sensors are used.
+        scenario: Its attraction, repulsion, tick and rates of sensors and
+            engine are used.
         laws: As ``Scenario.law``.
         progress: Called with the number of runs done.
 
     Returns:
         One a law, in their order.
     """
-    rates = (
+    settings = (
         f"tick_s={scenario.tick_s}",
         f"microphones.frame_s={scenario.microphones.frame_s}",
         f"ultrasonic.period_s={scenario.ultrasonic.period_s}",
         f"engine={scenario.engine}",
     )
-    layout = load_scenario("two_static_obstacles", ["hearing=ideal", *rates])
+    layout = load_scenario("two_static_obstacles", ["hearing=ideal", *settings])
     static = layout.repulsion.active.speed_limit_m_s
     active = scenario.repulsion.active.model_copy(update={"speed_limit_m_s": static})
     repulsion = scenario.repulsion.model_copy(update={"active": active})

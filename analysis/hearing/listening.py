@@ -17,7 +17,7 @@ from systems.framework.noise import tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.array_shape import ArrayShape
 from systems.sound.array_tolerances import draw_tolerances
-from systems.sound.mic_array import microphones_B
+from systems.sound.recorder import microphones_B
 from systems.sound.sound_emitter import emitted_samples
 from systems.sound.waveforms import make_waveform
 

@@ -121,7 +121,7 @@ def host_step(
         function: What is done, see ``HostFunction``.
         inputs: Numbers on the input ports.
         outputs: Numbers on the output ports; they are published for the next tick.
-            None: it is done before the blocks that publish for the next tick.
+            0: it is done before the blocks that publish for the next tick.
         period_ticks: From one time to the next, ticks.
 
     Returns:

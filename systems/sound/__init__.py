@@ -5,8 +5,9 @@ from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.array_shape import ArrayShape
 from systems.sound.array_tolerances import RealArray, Tolerances
 from systems.sound.ego_noise import EgoNoise
-from systems.sound.mic_array import MicArray, microphones_B, record_frame
+from systems.sound.mic_array import MicArray
 from systems.sound.propagation import propagate
+from systems.sound.recorder import microphones_B, record_frame
 from systems.sound.reverberation import Reverberation
 from systems.sound.room import RoomParameters, room_images
 from systems.sound.sound_emitter import SoundEmitter, make_emission

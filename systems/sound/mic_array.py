@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, LeafSystem
 
@@ -16,25 +14,20 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.host_step import host_step
-from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import (
     SAMPLE_RATE_HZ,
     AudioFrame,
     Emission,
-    read_only,
 )
 from systems.framework.step_block import RunFacts, Step
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import (
     RealArray,
     Tolerances,
-    draw_tolerances,
     real_array,
 )
-from systems.sound.ego_noise import EgoNoise, driving_share
-from systems.sound.propagation import check_reach, microphone_paths, propagate
-from systems.sound.reverberation import Reverberation
+from systems.sound.recorder import MicMemory, Recorder, microphones_B
 from systems.sound.room import RoomParameters, room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
@@ -42,17 +35,7 @@ __all__ = [
     "MicArray",
     "MicArrayParameters",
     "microphone_reach",
-    "microphones_B",
-    "record_frame",
 ]
-
-# Two instants closer than this are one tick of the clock, s.
-_SAME_INSTANT_S = 1e-6
-
-
-def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
-    """(n, 2) microphones in B, m, in the order of the channels."""
-    return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
 
 
 def microphone_reach(
@@ -71,254 +54,6 @@ def microphone_reach(
         return MAXIMUM_RANGE_M
     c = acoustics.c
     return max(MAXIMUM_RANGE_M, room_images(room, c).length / SAMPLE_RATE_HZ * c)
-
-
-def record_frame(
-    emissions: Sequence[Emission],
-    time: float,
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    now: tuple[NDArray[np.float64], NDArray[np.float64]],
-    array: RealArray,
-    *,
-    parameters: MicArrayParameters,
-    seed: int,
-    rise: float = 0.0,
-    reflections: Sequence[NDArray[np.float32] | None] = (),
-    ego_noise: NDArray[np.float32] | None = None,
-) -> AudioFrame:
-    """The frame that ends now.
-
-    Args:
-        emissions: What has left the sources; noise refers to the first one.
-        time: Now, s.
-        before: Pose and velocity of the robot a frame ago, (3,) each.
-        now: Pose and velocity of the robot now.
-        array: From ``real_array``.
-        parameters: Microphones, amplifier, converter and length of the frame.
-        seed: Seed of the noise.
-        rise: Height of the microphones above the sources, m.
-        reflections: (n, samples) Pa each, of the sources' reflections.
-        ego_noise: (n, samples) over the level of the first source at 1 m.
-
-    Returns:
-        (n, samples) counts, with their full scale, rate and time.
-
-    Raises:
-        ValueError: A source is out of the emission's reach.
-    """
-    direct = _direct_sound(emissions, time, before, now, array, parameters, rise)
-    pressure = _total([*direct, *reflections])
-    number = round(time / parameters.frame_s)
-    noise = frame_noise((len(array.p_BM), parameters.frame_samples), seed, number)
-    snr = 10.0 ** (parameters.snr_db_at_1m / 20.0)
-    if ego_noise is not None:
-        noise += np.float32(snr) * ego_noise
-    noise_pa = emissions[0].level_pa / snr
-    counts = convert(pressure, noise, noise_pa, parameters, array.gains)
-    read_only(counts)
-    return AudioFrame(
-        counts=counts,
-        full_scale=parameters.full_scale,
-        sample_rate_hz=parameters.sample_rate_hz,
-        time=time,
-    )
-
-
-def _direct_sound(
-    emissions: Sequence[Emission],
-    time: float,
-    before: tuple[NDArray[np.float64], NDArray[np.float64]],
-    now: tuple[NDArray[np.float64], NDArray[np.float64]],
-    array: RealArray,
-    parameters: MicArrayParameters,
-    rise: float,
-) -> list[NDArray[np.float32]]:
-    """(n, samples) Pa of each source that sounds."""
-    begin = time - parameters.frame_s
-    sounding = [emission for emission in emissions if emission.sounding]
-    for emission in emissions:
-        if not emission.sounding:  # the robot's place is good enough for silence
-            check_reach(emission, begin, before[0][:2], array.c)
-    if not sounding:
-        return []
-    times = begin + array.instants
-    p_WM, v_WM = microphone_paths(times, begin, *before, time, *now, array.p_BM)
-    arriving = (times, p_WM, v_WM, parameters.frame_samples, array.c, rise)
-    return [propagate(emission, *arriving) for emission in sounding]
-
-
-def _total(
-    pressures: Sequence[NDArray[np.float32] | None],
-) -> NDArray[np.float32] | None:
-    """Their sum, in the place of the first; None where all are silent."""
-    heard = [pressure for pressure in pressures if pressure is not None]
-    for pressure in heard[1:]:
-        heard[0] += pressure
-    return heard[0] if heard else None
-
-
-class MicMemory(NamedTuple):
-    """What a frame leaves behind for the next one."""
-
-    last: NDArray[np.float64]
-    """(7,) time, pose and velocity of the robot at its end."""
-    places: NDArray[np.float64] | None = None
-    """Time, pose of the robot and place of each source at the last update of the
-    room; none in the free field."""
-
-
-class Recorder:
-    """Records frame by frame: what a ``MicArray`` does, without a context.
-
-    Args:
-        parameters: Microphones, amplifier and converter.
-        robot: Places of the microphones.
-        c: Speed of sound, m/s.
-        room: Walls, if there are any.
-        sources: How many sound.
-        seed: Seed of the noise and of the array's errors.
-
-    Raises:
-        ValueError: As ``MicArray``.
-    """
-
-    def __init__(
-        self,
-        parameters: MicArrayParameters,
-        robot: RobotParameters,
-        c: float,
-        *,
-        room: RoomParameters | None,
-        sources: int,
-        seed: int,
-    ) -> None:
-        self._parameters, self._robot, self._c = parameters, robot, c
-        self._reverberation, self._ego_noise, places = None, None, None
-        self._rise = room.rise_m if room else 0.0
-        if room:
-            self._reverberation = Reverberation(room, c, parameters)
-            self._update_frames = room.update_frames(parameters.frame_s)
-            places = np.r_[-np.inf, np.zeros(3 + 2 * sources)]
-        if parameters.ego_noise_file is not None:
-            self._ego_noise = EgoNoise(parameters, len(robot.microphones_m), seed)
-        self.blank = MicMemory(np.r_[-np.inf, np.zeros(6)], places)
-        """The memory before the first frame."""
-        self._draw(seed)
-
-    def _draw(self, seed: int) -> None:
-        self._seed = seed
-        count = len(self._robot.microphones_m)
-        generator = tick_generator(seed, BEFORE_THE_RUN)
-        self.tolerances = draw_tolerances(self._parameters, count, generator)
-        """Errors of the array."""
-        self.array = real_array(
-            microphones_B(self._robot), self._parameters, self.tolerances, self._c
-        )
-        """The array with these errors."""
-
-    def of_seed(self, seed: int) -> Recorder:
-        """The same with other noise and other errors of the array."""
-        other = copy(self)
-        if self._ego_noise is not None:
-            other._ego_noise = self._ego_noise.of_seed(seed)
-        other._draw(seed)
-        return other
-
-    def remembered(
-        self,
-        emissions: Sequence[Emission],
-        time: float,
-        now: tuple[NDArray[np.float64], NDArray[np.float64]],
-        memory: MicMemory,
-    ) -> MicMemory:
-        """What a frame leaves for the next one.
-
-        Args:
-            emissions: Of the sources, the followed one first.
-            time: Now, s.
-            now: Pose and velocity of the robot, (3,) each.
-            memory: What the last frame left.
-
-        Returns:
-            The new memory.
-        """
-        last = np.empty(7)
-        last[0], last[1:4], last[4:] = time, *now
-        places = memory.places
-        if self._reverberation and self.updates(time):
-            places = np.r_[time, self._places(now[0], emissions)]
-        return MicMemory(last, places)
-
-    def updates(self, time: float) -> bool:
-        """Whether reflections take new places at a frame's end."""
-        return round(time / self._parameters.frame_s) % self._update_frames == 0
-
-    def _places(
-        self, pose: NDArray[np.float64], emissions: Sequence[Emission]
-    ) -> NDArray[np.float64]:
-        """Pose of the robot and places of the sources, one after the other."""
-        now = [emission.p_WS[-1] for emission in emissions]
-        return np.concatenate([pose, *now])
-
-    def _reflections(
-        self,
-        emissions: Sequence[Emission],
-        time: float,
-        pose: NDArray[np.float64],
-        held: NDArray[np.float64] | None,
-        array: RealArray,
-    ) -> Sequence[NDArray[np.float32] | None]:
-        if self._reverberation is None or held is None:
-            return ()
-        present = self._places(pose, emissions)
-        old = held[1:] if np.isfinite(held[0]) else present
-        new = present if self.updates(time) else old
-        return self._reverberation.frames(emissions, time, old, new, array)
-
-    def record(
-        self,
-        emissions: Sequence[Emission],
-        time: float,
-        now: tuple[NDArray[np.float64], NDArray[np.float64]],
-        memory: MicMemory,
-        array: RealArray,
-    ) -> AudioFrame:
-        """The frame that ends now, whatever context the block is in.
-
-        Args:
-            emissions: Of the sources, the followed one first.
-            time: Now, s.
-            now: Pose and velocity of the robot, (3,) each.
-            memory: What the last frame left.
-            array: The microphones with their errors.
-
-        Returns:
-            Counts of all channels, see ``record_frame``.
-
-        Raises:
-            InputError: A source is out of the emission's reach, or out of the room.
-        """
-        frame_s, ego_noise = self._parameters.frame_s, None
-        pose, velocity = now
-        if self._ego_noise is not None:
-            share = driving_share(velocity, self._robot)
-            ego_noise = self._ego_noise.frame(round(time / frame_s), share)
-        last = memory.last
-        before = last[1:4], last[4:7]
-        if abs(last[0] - (time - frame_s)) > _SAME_INSTANT_S:
-            before = pose - frame_s * velocity, velocity
-        return record_frame(
-            emissions,
-            time,
-            before,
-            now,
-            array,
-            parameters=self._parameters,
-            seed=self._seed,
-            rise=self._rise,
-            reflections=self._reflections(emissions, time, pose, memory.places, array),
-            ego_noise=ego_noise,
-        )
 
 
 class MicArray(LeafSystem):

@@ -12,7 +12,8 @@ from pydrake.common.value import Value
 from systems.base.robot import RobotParameters
 from systems.framework.signals import AudioFrame, Emission
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.mic_array import MicArray, MicArrayParameters, microphones_B
+from systems.sound.mic_array import MicArray, MicArrayParameters
+from systems.sound.recorder import microphones_B
 
 FS = 100_000.0
 TIME = 0.5

@@ -15,8 +15,9 @@ from systems.framework.signals import FRAME_SAMPLES, TICK_S, Emission
 from systems.sound import reverberation
 from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import draw_tolerances, real_array
-from systems.sound.mic_array import MicArray, microphones_B
+from systems.sound.mic_array import MicArray
 from systems.sound.propagation import microphone_paths, propagate
+from systems.sound.recorder import microphones_B
 from systems.sound.reverberation import Reverberation, _place
 from systems.sound.room import RoomParameters, room_images, room_impulse_responses
 
