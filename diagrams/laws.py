@@ -24,7 +24,7 @@ from systems.laws.catalogue import LAWS
 from systems.laws.law import Law
 from systems.ranging.collision_vector import SLOTS
 
-__all__ = ["LAWS", "make_command", "make_controller"]
+__all__ = ["LAWS", "commanded", "make_command", "make_controller"]
 
 #: What a controller may command, each of size 2, and the block that obeys.
 _COMMANDS: dict[str, Callable[..., Any]] = {
@@ -101,7 +101,7 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
             "law(c, s, repulsion), or derive it from a controller of ours",
         )
     block = made(name, "law", law, parts)
-    _commanded(block, name)
+    commanded(block, name)
     sizes = _output_sizes(block)
     for port, size in _TOLD.items():
         if sizes.get(port, size) != size:
@@ -131,12 +131,24 @@ def make_command(
     Raises:
         InputError: The controller has none of them, or several.
     """
-    command = _COMMANDS[_commanded(controller, controller.get_name())]
+    command = _COMMANDS[commanded(controller)]
     return command(robot=robot, tick_s=tick_s)
 
 
-def _commanded(controller: Any, name: str) -> str:
-    """Output port by which a controller commands; its law's name is for the error."""
+def commanded(controller: Any, name: str = "") -> str:
+    """Output port by which a controller commands.
+
+    Args:
+        controller: As of ``make_command``.
+        name: Of its law, for the error.
+
+    Returns:
+        Name of the port.
+
+    Raises:
+        InputError: It has none that is known, or several.
+    """
+    name = name or controller.get_name()
     sizes = _output_sizes(controller)
     found = [port for port in _COMMANDS if port in sizes]
     if len(found) == 1 and sizes[found[0]] == 2:

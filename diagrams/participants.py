@@ -20,6 +20,8 @@ from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.safety.free_space_map import FreeSpaceParameters
+from systems.safety.motion_guard import GuardParameters
 from systems.sound.adc import MicArrayParameters, channel_skew
 from systems.sound.waveforms import SoundParameters
 
@@ -69,6 +71,9 @@ class FollowerParameters(Parameters):
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
+    guard: GuardParameters | None = None
+    """Keeps the robot in space that its sensors have seen free, whatever the law."""
+    free_space: FreeSpaceParameters = FreeSpaceParameters()
 
     @model_validator(mode="after")
     def _check_channels(self) -> FollowerParameters:

@@ -13,16 +13,18 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
-from diagrams.laws import make_command, make_controller
+from diagrams.laws import commanded, make_command, make_controller
 from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.scenario import ROBOT, SOURCE, Scenario
 from systems import (
     CollisionVector,
     DiffDrivePlant,
+    FreeSpaceMap,
     IdealObstacleSensor,
     IdealSourceSensor,
     MicArray,
+    MotionGuard,
     SoundEmitter,
     SourceRobot,
     SourceTracker,
@@ -175,7 +177,7 @@ def robot_blocks(
         _tracker(scenario),
         *_obstacle_sensing(scenario, name, bodies),
         controller,
-        make_command(controller, scenario.robot, scenario.tick_s),
+        *_driving(scenario, controller),
     ]
     return with_own_blocks(
         {block_facts(block).part: block for block in ours},
@@ -410,6 +412,28 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             sensors=scenario.ultrasonic,
             robot=scenario.robot,
             initial_pose=scenario.start.pose,
+            tick_s=scenario.tick_s,
+        ),
+    ]
+
+
+def _driving(scenario: Scenario, controller: Any) -> list[Any]:
+    """What obeys the law; guarded, what it may obey as well."""
+    if scenario.guard is None:
+        return [make_command(controller, scenario.robot, scenario.tick_s)]
+    return [
+        FreeSpaceMap(
+            parameters=scenario.free_space,
+            sensors=scenario.ultrasonic,
+            robot=scenario.robot,
+            tick_s=scenario.tick_s,
+        ),
+        MotionGuard(
+            parameters=scenario.guard,
+            known=scenario.free_space,
+            robot=scenario.robot,
+            plant=scenario.plant,
+            command=commanded(controller),
             tick_s=scenario.tick_s,
         ),
     ]

@@ -22,6 +22,7 @@ from diagrams.bodies import (
     robot_rectangle,
 )
 from diagrams.explain import explain
+from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
 from diagrams.run_parameters import RunParameters
 from systems.base.source_robot import SourceRobotParameters
@@ -177,6 +178,14 @@ class Scenario(FollowerParameters, RunParameters):
     def bodies(self) -> dict[str, Body]:
         """All that the first robot can hit, by name; what it follows is last."""
         return dict(self.surroundings().bodies)
+
+    def guard_notes(self) -> list[str]:
+        """What a user should know of what guards do not promise, a line a robot."""
+        notes = (
+            guard_note(n, robot, self.surroundings(n).bodies, self.duration_s)
+            for n, robot in self.all_robots.items()
+        )
+        return [note for note in notes if note]
 
     @property
     def source_size(self) -> tuple[float, float]:
@@ -352,6 +361,13 @@ class Scenario(FollowerParameters, RunParameters):
                         f"{robot.start.position_m}; move its first waypoint or "
                         f"{prefix}start.position_m",
                     )
+        return self
+
+    @model_validator(mode="after")
+    def _check_guards(self) -> Scenario:
+        robots = zip(self.all_robots, self._robot_fields(), strict=True)
+        for name, (prefix, robot) in robots:
+            check_guard(prefix, robot, self.surroundings(name).bodies)
         return self
 
     def _robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:

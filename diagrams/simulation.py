@@ -12,8 +12,8 @@ import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.compiled_run import CompiledLoop, compile_loop
-from diagrams.loop_blocks import shared_blocks
+from diagrams.compiled.loop import CompiledLoop, compile_loop
+from diagrams.compiled.loop_blocks import shared_blocks
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import Scenario

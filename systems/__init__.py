@@ -42,6 +42,8 @@ from systems.ranging.ideal_obstacle_sensor import (
     IdealObstacleSensor_,
 )
 from systems.ranging.ultrasonic_array import UltrasonicArray
+from systems.safety.free_space_map import FreeSpaceMap
+from systems.safety.motion_guard import MotionGuard
 from systems.sound.mic_array import MicArray
 from systems.sound.sound_emitter import SoundEmitter
 from systems.world.obstacles import Obstacles, Obstacles_
@@ -59,11 +61,13 @@ __all__ = [
     "ConventionalImpedanceController_",
     "DiffDrivePlant",
     "DiffDrivePlant_",
+    "FreeSpaceMap",
     "IdealObstacleSensor",
     "IdealObstacleSensor_",
     "IdealSourceSensor",
     "IdealSourceSensor_",
     "MicArray",
+    "MotionGuard",
     "Obstacles",
     "Obstacles_",
     "RadialLawController",

@@ -35,6 +35,11 @@ def take_scenario(parser: ArgumentParser) -> None:
         help="printed (|dC/dt|) or closing (the speed of approach alone)",
     )
     parser.add_argument(
+        "--guard",
+        choices=("on", "off"),
+        help="keep the robot in space that its sensors have seen free",
+    )
+    parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
@@ -53,4 +58,6 @@ def overrides(options: Namespace) -> list[str]:
         value = getattr(options, option)
         if value is not None:
             found.append(f"{field}={value}")
+    if options.guard is not None:
+        found.append("guard={}" if options.guard == "on" else "guard=null")
     return found

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -36,6 +37,8 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
 
     place = take(options.out)
     scenario = load_scenario(options.scenario, _settings(options))
+    for note in scenario.guard_notes():
+        logging.getLogger("phonotaxis").warning("%s", note)
     follower = None
     if scenario.engine == "compiled":
         prepared_loop(scenario)

@@ -27,6 +27,8 @@ _ALL_IDEAL: dict[str, Any] = {
         "range_noise_fraction": 0.0,
     },
     "odometry": {"rounding": False},
+    # One that passes what the law wants changes nothing.
+    "guard": None,
 }
 
 
@@ -116,6 +118,11 @@ def require_ideal(scenario: Scenario) -> None:
             not scenario.odometry.rounding,
             "odometry.rounding",
             "a rounded wheel angle has no derivative",
+        ),
+        (
+            scenario.guard is None,
+            "guard",
+            "a guard decides, which has no derivative; one that passes changes nothing",
         ),
         (
             hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from systems.framework.step_block import Step
 from systems.world.geometry import rotate, safe_norm
 
 __all__ = [
+    "COMMANDS",
     "TwistWheelCommand",
     "TwistWheelCommand_",
     "VelocityWheelCommand",
@@ -178,6 +179,15 @@ def _at_velocity(v_WP, velocity_W, theta, robot, tick_s):
 def _at_twist(v_WP, twist_B, theta, robot, tick_s):
     vx, vy = hand_position_velocity(twist_B, theta, robot.control_point_m)
     return clamped_velocity(vx, vy, robot.top_speed_m_s)
+
+
+#: What a law may command, each of size 2, and the velocity of P that comes of it, as of
+#: ``CommandNumbers``.
+COMMANDS: Mapping[str, Callable[..., Any]] = {
+    "acceleration_W": _accelerated,
+    "velocity_W": _at_velocity,
+    "twist_B": _at_twist,
+}
 
 
 class _WheelCommand:

@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 
-from diagrams import compiled_source
-from diagrams.compiled_source import PACKED, Packing, compiled_from
+from diagrams.compiled import source as compiled_source
+from diagrams.compiled.source import PACKED, Packing, compiled_from
 from systems.laws.impedance import AttractionParameters
 
 

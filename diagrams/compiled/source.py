@@ -238,7 +238,10 @@ def _origins(names: Mapping[str, Any]) -> Iterator[str]:
 def _digest() -> str:
     """Of the package's own source and of what compiles it."""
     digest = hashlib.sha256()
-    for package in (Path(__file__).parent, Path(sys.modules["systems"].__path__[0])):
+    for package in (
+        Path(__file__).parents[1],
+        Path(sys.modules["systems"].__path__[0]),
+    ):
         for file in sorted(package.rglob("*.py")):
             digest.update(file.read_bytes())
     return f"{digest.hexdigest()} numba {numba.__version__} numpy {np.__version__}"

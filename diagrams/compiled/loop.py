@@ -22,10 +22,10 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from diagrams.bodies import Surroundings
-from diagrams.compiled_judge import contacts_of, judge_all
-from diagrams.compiled_sound import sounds_of_a_run
-from diagrams.compiled_source import PACKED, Packing, compiled_from
-from diagrams.loop_blocks import LoopBlocks
+from diagrams.compiled.judge import contacts_of, judge_all
+from diagrams.compiled.loop_blocks import LoopBlocks
+from diagrams.compiled.sounds import sounds_of_a_run
+from diagrams.compiled.source import PACKED, Packing, compiled_from
 from diagrams.robot import seed_of
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules

@@ -1,0 +1,301 @@
+"""Whether a command can be obeyed for a tick, and then braked to rest in free space."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from systems.safety.free_space import (
+    ROLLED,
+    FreeSpace,
+    cell_is_free,
+    edge_cells,
+    nearest_cell,
+)
+
+__all__ = [
+    "BRAKED",
+    "PASSED",
+    "SLOWED",
+    "TURNED",
+    "BrakingNumbers",
+    "Danger",
+    "braked",
+    "can_be_braked",
+    "chosen",
+    "danger_of",
+    "drive_a_tick",
+]
+
+#: What was done with a wish.
+PASSED, SLOWED, TURNED, BRAKED = range(4)
+#: Shares of a wish that are tried, from all of it on.
+_SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
+#: Cells that a robot may have to keep off at once.
+_MOST_CORNERS = 2_000
+
+#: Slower rims are at rest, m/s: what the lag leaves of them is a fifth of a millimetre.
+_REST_M_S = 0.004
+#: No faster ahead, a robot turns in its place, m/s: the lag leaves 0.05 mm of it.
+_IN_PLACE_M_S = 1e-3
+#: Where a robot is nearer than it should be, it may come so much nearer in a tick, m.
+_SLACK_M = 5e-4
+
+
+class BrakingNumbers(NamedTuple):
+    """How the robot moves and brakes, and how far it keeps off."""
+
+    wheel_radius_m: float
+    wheel_separation_m: float
+    motor_lag_s: float
+    """Time constant of the wheels' speeds, s."""
+    braking_m_s2: float
+    """Of the faster rim's commanded speed."""
+    tick_s: float
+    keep_m: float
+    """Distance of the axle from what is not free, m: radius of the body, and margin."""
+    least_m: float
+    """The same where a robot has come nearer than it should, m."""
+    obstacle_speed_m_s: float
+    """Largest speed of what is in view, m/s; 0: all rests."""
+    slow_turn_rad_s: float
+    """A robot that turns no faster, in its place, counts as at rest."""
+
+
+class Danger(NamedTuple):
+    """What a robot has to keep off, at one tick."""
+
+    corners: NDArray[np.float64]
+    """(m, 2) of cells that are not free, ``edge_cells``, m."""
+    corner_count: int
+    """How many of them there are."""
+    cell_m: float
+    distance_m: float
+    """Of the axle from the nearest of them now, m."""
+    arcs: NDArray[np.float64]
+    """(sensors, points, 2) where each sensor's view ends, m."""
+    ages: NDArray[np.float64]
+    """(sensors,) for how long that is so, s."""
+    view_distance_m: float
+    """Of the axle from where the view ends now, m."""
+
+
+@njit(cache=True)
+def drive_a_tick(
+    pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
+) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
+    """Pose and wheel speeds a tick later, of a plant without slip.
+
+    Args:
+        pose: (x, y, theta), m and rad.
+        speeds: Of the left and the right wheel, rad/s.
+        commanded: The same, held for the tick.
+        numbers: The plant.
+
+    Returns:
+        (x, y, theta) and the speeds. Speeds are exact; the chord is as long as its
+        arc, along the mean heading.
+    """
+    tick, lag = numbers.tick_s, numbers.motor_lag_s
+    kept = math.exp(-tick / lag)
+    left = commanded[0] + (speeds[0] - commanded[0]) * kept
+    right = commanded[1] + (speeds[1] - commanded[1]) * kept
+    way_left = commanded[0] * tick + (speeds[0] - commanded[0]) * lag * (1.0 - kept)
+    way_right = commanded[1] * tick + (speeds[1] - commanded[1]) * lag * (1.0 - kept)
+    radius = numbers.wheel_radius_m
+    way = 0.5 * radius * (way_left + way_right)
+    turn = radius * (way_right - way_left) / numbers.wheel_separation_m
+    middle = pose[2] + 0.5 * turn
+    moved = (
+        pose[0] + way * math.cos(middle),
+        pose[1] + way * math.sin(middle),
+        pose[2] + turn,
+    )
+    return moved, (left, right)
+
+
+@njit(cache=True)
+def braked(
+    commanded: Any, numbers: BrakingNumbers
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """The command of a tick later when braking: slower, along the same curve.
+
+    Args:
+        commanded: Left and right wheel, rad/s.
+        numbers: How it brakes.
+
+    Returns:
+        Left and right wheel, rad/s.
+    """
+    fastest = max(abs(commanded[0]), abs(commanded[1])) * numbers.wheel_radius_m
+    less = numbers.braking_m_s2 * numbers.tick_s
+    if fastest <= less:
+        return 0.0, 0.0
+    share = 1.0 - less / fastest
+    return commanded[0] * share, commanded[1] * share
+
+
+@njit(cache=True)
+def _nearest_view(
+    danger: Danger, x: float, y: float, ahead_s: float, speed: float
+) -> float:  # pragma: no cover  (compiled)
+    """Of a place from where the view ends, less what may come nearer until then, m."""
+    nearest = np.inf
+    for sensor in range(danger.arcs.shape[0]):
+        best = np.inf
+        for k in range(danger.arcs.shape[1]):
+            dx, dy = danger.arcs[sensor, k, 0] - x, danger.arcs[sensor, k, 1] - y
+            best = min(best, dx * dx + dy * dy)
+        comes = 0.0
+        if speed > 0.0:
+            comes = speed * (danger.ages[sensor] + ahead_s)
+        nearest = min(nearest, math.sqrt(best) - comes)
+    return nearest
+
+
+@njit(cache=True)
+def can_be_braked(
+    pose: Any, speeds: Any, commanded: Any, danger: Danger, numbers: BrakingNumbers
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a command may be obeyed for a tick.
+
+    It may if on the way to rest, braking after that tick, the axle keeps off by
+    ``keep_m`` what is not free. Where it is nearer now, it may not come nearer (but for
+    ``_SLACK_M``, so that it can drive along an edge), nor below ``least_m``; where it
+    is nearer than that, the way has to lead away.
+
+    Of what is in view the same holds after each time t with ``obstacle_speed_m_s`` t
+    more; or the robot withdraws from it.
+
+    Args:
+        pose: (x, y, theta) now, m and rad.
+        speeds: Of the left and the right wheel now, rad/s.
+        commanded: The command, rad/s.
+        danger: What to keep off.
+        numbers: The robot.
+
+    Returns:
+        Whether it may.
+    """
+    tick, radius = numbers.tick_s, numbers.wheel_radius_m
+    now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
+    need = max(min(keep, now - _SLACK_M), least) if now >= least else now
+    # A robot that turns in its place stays within its disc.
+    in_place = max(_ahead(commanded, radius) * 1e3, _ahead(speeds, radius)) < (
+        _IN_PLACE_M_S
+    )
+    turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
+    slow = in_place and turn <= numbers.slow_turn_rad_s
+    moving = numbers.obstacle_speed_m_s > 0.0 and not slow
+    begin_x, begin_y = pose[0], pose[1]
+    ahead_s = 0.0
+    while True:
+        pose, speeds = drive_a_tick(pose, speeds, commanded, numbers)
+        ahead_s += tick
+        x, y = pose[0], pose[1]
+        way = math.hypot(x - begin_x, y - begin_y)
+        reached = nearest_cell(danger.corners, danger.corner_count, danger.cell_m, x, y)
+        if reached < need and not in_place:
+            return False
+        if moving and not _keeps_off_moving((x, y), ahead_s, way, danger, numbers):
+            return False
+        fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
+        if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest < _REST_M_S:
+            return in_place or now >= least or reached >= now + 0.05 * way
+        commanded = braked(commanded, numbers)
+
+
+@njit(cache=True)
+def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (compiled)
+    """Speed of the axle, ahead or back, m/s."""
+    return abs(0.5 * (speeds[0] + speeds[1]) * wheel_radius_m)
+
+
+@njit(cache=True)
+def _keeps_off_moving(
+    place: Any, ahead_s: float, way: float, danger: Danger, numbers: BrakingNumbers
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether nothing in view can come near by then, or the robot withdraws from it."""
+    x, y = place
+    speed = numbers.obstacle_speed_m_s
+    if _nearest_view(danger, x, y, ahead_s, speed) >= numbers.keep_m:
+        return True
+    withdrawn = _nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
+    return way > 0.0 and withdrawn >= 0.5 * way
+
+
+@njit(cache=True)
+def danger_of(
+    space: FreeSpace, time: float, pose: Any, reach: Any, numbers: BrakingNumbers
+) -> Danger:  # pragma: no cover  (compiled)
+    """What a robot has to keep off.
+
+    Args:
+        space: What it knows.
+        time: s.
+        pose: (x, y, theta) now, m and rad.
+        reach: How far from the axle cells are looked at, m, and for what rolled way
+            they have to stay free, m.
+        numbers: The robot.
+
+    Returns:
+        All that ``can_be_braked`` takes.
+    """
+    corners = np.empty((_MOST_CORNERS, 2))
+    until = space.facts[0, ROLLED] + reach[1]
+    x, y = pose[0], pose[1]
+    count = edge_cells(space, x, y, reach[0], until, corners)
+    distance = nearest_cell(corners, count, space.cell_m, x, y)
+    i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
+    if count > _MOST_CORNERS or not cell_is_free(space, i, j, until):
+        distance = 0.0
+    ages = time - space.arcs_s[:, 0]
+    danger = Danger(corners, count, space.cell_m, distance, space.arcs, ages, np.inf)
+    view_distance = np.inf
+    if numbers.obstacle_speed_m_s > 0.0:
+        view_distance = _nearest_view(danger, x, y, 0.0, 0.0)
+    return Danger(
+        corners, count, space.cell_m, distance, space.arcs, ages, view_distance
+    )
+
+
+@njit(cache=True)
+def chosen(
+    pose: Any,
+    speeds: Any,
+    wish: Any,
+    commanded: Any,
+    danger: Danger,
+    numbers: BrakingNumbers,
+) -> tuple[int, tuple[float, float]]:  # pragma: no cover  (compiled)
+    """What to command: a wish, as far as it can be braked, or the brake.
+
+    Tried are the wish, less of it along the same curve, its turn while the way ahead is
+    braked, and at last braking as it was found possible before.
+
+    Args:
+        pose: (x, y, theta) now, m and rad.
+        speeds: Of the left and the right wheel now, rad/s.
+        wish: Left and right wheel, rad/s.
+        commanded: The last command, rad/s.
+        danger: What to keep off.
+        numbers: The robot.
+
+    Returns:
+        What is done, ``PASSED`` to ``BRAKED``, and left and right wheel, rad/s.
+    """
+    for number in range(len(_SHARES)):
+        share = _SHARES[number]
+        part = share * wish[0], share * wish[1]
+        if can_be_braked(pose, speeds, part, danger, numbers):
+            return PASSED if number == 0 else SLOWED, part
+    slower = braked(commanded, numbers)
+    ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
+    part = ahead - turn, ahead + turn
+    if can_be_braked(pose, speeds, part, danger, numbers):
+        return TURNED, part
+    return BRAKED, slower

@@ -1,0 +1,445 @@
+"""What range sensors have seen free of the floor around a robot, in square cells."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = [
+    "FreeSpace",
+    "Sectors",
+    "cell_is_free",
+    "clear_disc",
+    "edge_cells",
+    "end_view",
+    "lasting",
+    "make_free_space",
+    "move_window",
+    "nearest_cell",
+    "see",
+]
+
+#: Places in ``FreeSpace.facts``.
+FIRST_I, FIRST_J, ROLLED, TICK = range(4)
+#: A cell that was never seen free.
+NEVER = -1.0
+#: How far the window's middle may lie behind the robot, cells.
+_SLACK = 20
+#: At a tick every so many-th row of cells is entered: the rest can wait.
+_ROWS = 4
+#: Hits of a cell at this distance count full, farther ones less: arcs are longer, m.
+_FULL_HIT_M = 0.6
+
+
+class FreeSpace(NamedTuple):
+    """A square window of n x n cells of the floor, which moves along with a robot.
+
+    Cell (i, j) of the floor covers x from i to i + 1 and y from j to j + 1 cells, in
+    the frame of the odometry, and is kept at [i % n, j % n].
+    """
+
+    free_until: NDArray[np.float64]
+    """(n, n) m of the rolled way up to which a cell counts as seen free: from then on
+    its place is not known well enough. ``NEVER``: it was not seen free."""
+    seen_s: NDArray[np.float64]
+    """(n, n) time at which it was last seen free, s; ``NEVER``."""
+    hits: NDArray[np.float64]
+    """(n, n) how often an echo came from about there since it was last seen free."""
+    facts: NDArray[np.float64]
+    """(1, 4): i and j of the window's first cell, rolled way, m, tick of the last
+    change."""
+    arcs: NDArray[np.float64]
+    """(sensors, points, 2) where each sensor's view ends, at what it has last read:
+    points of an arc from its right to its left, m."""
+    arcs_s: NDArray[np.float64]
+    """(sensors, 1) when it has read that, s; ``NEVER``."""
+    cell_m: float
+    """Side of a cell, m."""
+
+    def copy(self) -> FreeSpace:
+        """The same in arrays of its own."""
+        return FreeSpace(
+            np.copy(self.free_until),
+            np.copy(self.seen_s),
+            np.copy(self.hits),
+            np.copy(self.facts),
+            np.copy(self.arcs),
+            np.copy(self.arcs_s),
+            self.cell_m,
+        )
+
+
+class Sectors(NamedTuple):
+    """Apertures of range sensors, cut where they overlap: directions from one place.
+
+    A group is all sensors at one place. Its sectors are next to one another, counter-
+    clockwise; where no sensor looks in between, one has none.
+    """
+
+    places: NDArray[np.float64]
+    """(groups, 2) from the axle in B, m."""
+    first: NDArray[np.int64]
+    """(groups + 1,) first sector of each group, and the number of all."""
+    right: NDArray[np.float64]
+    """(sectors, 1) directions in B at which they begin, rad."""
+    left: NDArray[np.float64]
+    """(sectors, 1) where they end, rad."""
+    seen_by: NDArray[np.bool_]
+    """(sectors, sensors) which sensors see a sector."""
+
+
+def make_free_space(
+    cells: int, cell_m: float, sensors: int, arc_points: int
+) -> FreeSpace:
+    """A window in which nothing was seen.
+
+    Args:
+        cells: Along each side.
+        cell_m: Side of a cell, m.
+        sensors: Number of sensors.
+        arc_points: Points of each sensor's arc.
+
+    Returns:
+        The window, with the floor's origin in its middle.
+    """
+    facts = np.array([[-(cells // 2), -(cells // 2), 0.0, NEVER]])
+    return FreeSpace(
+        np.full((cells, cells), NEVER),
+        np.full((cells, cells), NEVER),
+        np.zeros((cells, cells)),
+        facts,
+        np.zeros((sensors, arc_points, 2)),
+        np.full((sensors, 1), NEVER),
+        cell_m,
+    )
+
+
+@njit(cache=True)
+def cell_is_free(
+    space: FreeSpace, i: int, j: int, until: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a cell counts as free.
+
+    Args:
+        space: The window.
+        i: Of the cell on the floor.
+        j: See i.
+        until: Rolled way up to which it has to be free, m.
+
+    Returns:
+        Whether it does; what is not in the window does not.
+    """
+    cells = space.free_until.shape[0]
+    di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
+    if di < 0 or dj < 0 or di >= cells or dj >= cells:
+        return False
+    return space.free_until[i % cells, j % cells] >= until
+
+
+@njit(cache=True)
+def move_window(
+    space: FreeSpace, x: float, y: float
+) -> None:  # pragma: no cover  (compiled)
+    """Moves the window along with the robot; what leaves it is forgotten.
+
+    Args:
+        space: Changed.
+        x: Where the robot is, m.
+        y: See x.
+    """
+    cells = space.free_until.shape[0]
+    for axis in range(2):
+        place = x if axis == 0 else y
+        first = int(space.facts[0, axis])
+        wanted = math.floor(place / space.cell_m) - cells // 2
+        if abs(wanted - first) <= _SLACK:
+            continue
+        for k in range(min(first, wanted), max(first, wanted)):
+            # Cells k leave on one side, and k + cells enter on the other, or vice
+            # versa: both are kept at the same place.
+            for other in range(cells):
+                i, j = (k % cells, other) if axis == 0 else (other, k % cells)
+                space.free_until[i, j] = NEVER
+                space.seen_s[i, j] = NEVER
+                space.hits[i, j] = 0.0
+        space.facts[0, axis] = wanted
+
+
+@njit(cache=True)
+def clear_disc(
+    space: FreeSpace, x: float, y: float, radius: float, until: float
+) -> None:  # pragma: no cover  (compiled)
+    """Counts the cells that lie wholly within a disc as free.
+
+    Args:
+        space: Changed.
+        x: Centre, m.
+        y: See x.
+        radius: m.
+        until: Rolled way up to which they are free, m.
+    """
+    cell, cells = space.cell_m, space.free_until.shape[0]
+    low_i, low_j = math.floor((x - radius) / cell), math.floor((y - radius) / cell)
+    high_i, high_j = math.floor((x + radius) / cell), math.floor((y + radius) / cell)
+    low_i = max(low_i, int(space.facts[0, FIRST_I]))
+    low_j = max(low_j, int(space.facts[0, FIRST_J]))
+    high_i = min(high_i, int(space.facts[0, FIRST_I]) + cells - 1)
+    high_j = min(high_j, int(space.facts[0, FIRST_J]) + cells - 1)
+    for i in range(low_i, high_i + 1):
+        dx = max(x - i * cell, (i + 1) * cell - x)
+        for j in range(low_j, high_j + 1):
+            dy = max(y - j * cell, (j + 1) * cell - y)
+            if dx * dx + dy * dy <= radius * radius:
+                at = i % cells, j % cells
+                space.free_until[at] = max(space.free_until[at], until)
+
+
+@njit(cache=True)
+def edge_cells(
+    space: FreeSpace, x: float, y: float, reach: float, until: float, out: Any
+) -> int:  # pragma: no cover  (compiled)
+    """Cells that are not free, next to one that is, within a square around a place.
+
+    What is not free begins with these: no other is nearer to a place that is free.
+
+    Args:
+        space: The window.
+        x: Middle of the square, m.
+        y: See x.
+        reach: Half of its side, m.
+        until: Rolled way up to which cells have to be free, m.
+        out: (m, 2) filled with the corners of least x and y of the cells, m.
+
+    Returns:
+        How many they are; more than m: only m of them are there.
+    """
+    cell, count = space.cell_m, 0
+    low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
+    high_i, high_j = math.floor((x + reach) / cell), math.floor((y + reach) / cell)
+    for i in range(low_i, high_i + 1):
+        for j in range(low_j, high_j + 1):
+            if cell_is_free(space, i, j, until):
+                continue
+            if (
+                cell_is_free(space, i - 1, j, until)
+                or cell_is_free(space, i + 1, j, until)
+                or cell_is_free(space, i, j - 1, until)
+                or cell_is_free(space, i, j + 1, until)
+            ):
+                if count < out.shape[0]:
+                    out[count, 0], out[count, 1] = i * cell, j * cell
+                count += 1
+    return count
+
+
+@njit(cache=True)
+def nearest_cell(
+    corners: Any, count: int, cell: float, x: float, y: float
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a place from the nearest of some cells.
+
+    Args:
+        corners: (m, 2) of least x and y of the cells, m.
+        count: How many of them there are.
+        cell: Side of a cell, m.
+        x: The place, m.
+        y: See x.
+
+    Returns:
+        m; infinite without cells.
+    """
+    best = np.inf
+    for k in range(count):
+        dx = max(corners[k, 0] - x, 0.0, x - corners[k, 0] - cell)
+        dy = max(corners[k, 1] - y, 0.0, y - corners[k, 1] - cell)
+        best = min(best, dx * dx + dy * dy)
+    return math.sqrt(best)
+
+
+@njit(cache=True)
+def see(
+    space: FreeSpace,
+    time: float,
+    tick: int,
+    pose: Any,
+    sectors: Sectors,
+    readings: Any,
+    drift: Any,
+) -> None:  # pragma: no cover  (compiled)
+    """Enters what the sensors have just read.
+
+    Args:
+        space: Changed.
+        time: s.
+        tick: Every fourth row of cells is entered, by turns.
+        pose: (x, y, theta) of the robot by its odometry, m and rad.
+        sectors: Directions that the sensors see.
+        readings: (sensors, 2) of each sensor up to where it has seen free, m, 0: not
+            at all, and where its echo came from, m, infinite: from nowhere.
+        drift: What ``lasting`` takes besides the distance.
+    """
+    cell, cells = space.cell_m, space.free_until.shape[0]
+    half = cell * math.sqrt(0.5)
+    seen = _of_sectors(sectors, readings)
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for group in range(len(sectors.places)):
+        begin, end = sectors.first[group], sectors.first[group + 1]
+        ahead, aside = sectors.places[group]
+        sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
+        right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
+        farthest = np.max(seen[begin:end, 2])
+        box = _sector_box(sx, sy, pose[2] + right, pose[2] + left, farthest + cell)
+        low_i = max(math.floor(box[0] / cell), int(space.facts[0, FIRST_I]))
+        low_j = max(math.floor(box[1] / cell), int(space.facts[0, FIRST_J]))
+        high_i = min(
+            math.floor(box[2] / cell), int(space.facts[0, FIRST_I]) + cells - 1
+        )
+        high_j = min(
+            math.floor(box[3] / cell), int(space.facts[0, FIRST_J]) + cells - 1
+        )
+        for i in range(low_i + (tick - low_i) % _ROWS, high_i + 1, _ROWS):
+            dx = (i + 0.5) * cell - sx
+            for j in range(low_j, high_j + 1):
+                dy = (j + 0.5) * cell - sy
+                squared = dx * dx + dy * dy
+                if squared > (farthest + half) ** 2 or squared < 4.0 * half * half:
+                    continue
+                distance = math.sqrt(squared)
+                # From the right edge of the group.
+                bearing = (math.atan2(dy, dx) - pose[2] - right) % math.tau
+                free, echo = _in_direction(
+                    bearing, math.asin(half / distance), sectors, seen, begin, end
+                )
+                at = i % cells, j % cells
+                if free >= distance + half:
+                    until = space.facts[0, ROLLED] + lasting(distance, drift)
+                    space.free_until[at] = max(space.free_until[at], until)
+                    space.seen_s[at] = time
+                    space.hits[at] = 0.0
+                elif abs(distance - echo) <= half:
+                    space.hits[at] += min(1.0, _FULL_HIT_M / distance)
+
+
+@njit(cache=True)
+def _of_sectors(
+    sectors: Sectors, readings: Any
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Of each sector up to where it was seen free, whence an echo, the farther, m."""
+    seen = np.empty((len(sectors.right), 3))
+    for k in range(len(seen)):
+        free, echo = 0.0, np.inf
+        for sensor in range(len(readings)):
+            if sectors.seen_by[k, sensor]:
+                free = max(free, readings[sensor, 0])
+                echo = min(echo, readings[sensor, 1])
+        seen[k, 0], seen[k, 1] = free, echo
+        seen[k, 2] = max(free, echo) if echo < np.inf else free
+    return seen
+
+
+@njit(cache=True)
+def _in_direction(
+    bearing: float, hides: float, sectors: Sectors, seen: Any, begin: int, end: int
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Up to where a group has seen free what a cell hides, and the echo there, m.
+
+    Args:
+        bearing: Of the cell, from the right edge of the group, rad, 0 to a turn.
+        hides: Half of the angle that the cell hides, rad.
+        sectors: Of all groups.
+        seen: From ``_of_sectors``.
+        begin: First sector of the group.
+        end: The one after its last.
+    """
+    right = sectors.right[begin, 0]
+    span = sectors.left[end - 1, 0] - right
+    around = span > math.tau - 1e-9
+    low, high = bearing - hides, bearing + hides
+    if not around and (low < 0.0 or high > span):
+        return 0.0, np.inf
+    free, echo = np.inf, np.inf
+    for k in range(begin, end):
+        a, b = sectors.right[k, 0] - right, sectors.left[k, 0] - right
+        beyond = around and (a < high - math.tau or b > low + math.tau)
+        if beyond or (a < high and b > low):
+            free = min(free, seen[k, 0])
+            if a <= bearing < b:
+                echo = seen[k, 1]
+    return free, echo
+
+
+@njit(cache=True)
+def end_view(
+    space: FreeSpace,
+    sensor: int,
+    time: float,
+    pose: Any,
+    place: Any,
+    direction: Any,
+    reach: float,
+) -> None:  # pragma: no cover  (compiled)
+    """Enters where a sensor's view ends.
+
+    Args:
+        space: Changed.
+        sensor: Its number.
+        time: s.
+        pose: (x, y, theta) of the robot by its odometry, m and rad.
+        place: (x, y) of the sensor from the axle in B, m.
+        direction: Its axis in B and half of its aperture, rad.
+        reach: Up to where it has seen free, m.
+    """
+    axis, half_angle = direction
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    x, y = pose[0] + c * place[0] - s * place[1], pose[1] + s * place[0] + c * place[1]
+    points = space.arcs.shape[1]
+    for k in range(points):
+        angle = pose[2] + axis + half_angle * (2.0 * k / (points - 1) - 1.0)
+        space.arcs[sensor, k, 0] = x + reach * math.cos(angle)
+        space.arcs[sensor, k, 1] = y + reach * math.sin(angle)
+    space.arcs_s[sensor, 0] = time
+
+
+@njit(cache=True)
+def lasting(distance: float, drift: Any) -> float:  # pragma: no cover  (compiled)
+    """Way for which a cell's place stays known well enough, m.
+
+    If each wheel's way is known to a share e, then after a way s the place of a cell
+    that was d away is off by e s + 2 e s/L (d + s) at most, L between the wheels: the
+    error of the way, and that of the heading times the distance.
+
+    Args:
+        distance: Of the cell when it was seen, m.
+        drift: (wheel error e, allowed error of the place, m, wheel separation L, m).
+
+    Returns:
+        m; infinite without wheel errors.
+    """
+    error, allowed, separation = drift
+    if error == 0.0:
+        return np.inf
+    a = 2.0 * error / separation
+    b = error + a * distance
+    return (math.sqrt(b * b + 4.0 * a * allowed) - b) / (2.0 * a)
+
+
+@njit(cache=True)
+def _sector_box(
+    x: float, y: float, right: float, left: float, reach: float
+) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
+    """Least and greatest x and y of a sector of a disc, m."""
+    low_x, low_y, high_x, high_y = x, y, x, y
+    quarter = math.ceil(right / (math.pi / 2.0))
+    angle = right
+    while True:
+        px, py = x + reach * math.cos(angle), y + reach * math.sin(angle)
+        low_x, high_x = min(low_x, px), max(high_x, px)
+        low_y, high_y = min(low_y, py), max(high_y, py)
+        if angle >= left:
+            return low_x, low_y, high_x, high_y
+        angle = min(left, quarter * math.pi / 2.0)
+        quarter += 1

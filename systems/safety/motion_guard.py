@@ -1,0 +1,286 @@
+"""A block between any law and the wheels that keeps the robot in free space."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydantic import Field, model_validator
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from systems.base.diff_drive_plant import PlantParameters
+from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import (
+    COMMANDS,
+    hand_position_twist,
+    hand_position_velocity,
+    limited_wheel_speeds,
+)
+from systems.framework.block_facts import BlockFacts
+from systems.framework.finite import read_lists
+from systems.framework.input_error import InputError
+from systems.framework.parameters import (
+    Acceleration,
+    NonNegativeLength,
+    NonNegativeSpeed,
+    Parameters,
+)
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step
+from systems.safety.braking import (
+    PASSED,
+    BrakingNumbers,
+    chosen,
+    danger_of,
+    drive_a_tick,
+)
+from systems.safety.free_space import FreeSpace, make_free_space
+from systems.safety.free_space_map import FreeSpaceParameters, body_radius
+
+__all__ = ["GuardParameters", "MotionGuard"]
+
+# Groups of the discrete state.
+_V_WP, _WHEEL_SPEEDS, _REPORT, _MODEL = range(4)
+_SIZES = 2, 2, 4, 2
+
+
+class GuardParameters(Parameters):
+    """How the guard keeps a robot in free space."""
+
+    obstacle_speed_m_s: NonNegativeSpeed = 0.0
+    """Largest speed of bodies in view that it reckons with, m/s; 0: all rest."""
+    braking_m_s2: Acceleration = 1.5
+    """Braking of the faster wheel's rim, m/s^2."""
+    margin_m: NonNegativeLength = 0.012
+    """It keeps the disc that holds the body off what is not free, m."""
+    least_margin_m: NonNegativeLength = 0.009
+    """The same where models were wrong and the robot has come nearer, m."""
+    slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
+    """Turning in its place no faster, the robot counts as at rest, rad/s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> GuardParameters:
+        if self.least_margin_m > self.margin_m:
+            raise InputError(
+                "least_margin_m",
+                f"{self.least_margin_m:g} is above margin_m {self.margin_m:g}; "
+                "lower it",
+            )
+        return self
+
+
+class GuardNumbers(NamedTuple):
+    """What the step of ``MotionGuard`` depends on."""
+
+    velocity: Callable[..., Any]
+    """As of ``CommandNumbers``."""
+    robot: RobotParameters
+    braking: BrakingNumbers
+    reach: tuple[float, float]
+    """How far from the axle cells are looked at, m, and for what rolled way they have
+    to stay free, m."""
+    space: FreeSpace
+
+
+def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
+    """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; what
+            was done; modelled wheel speeds, rad/s.
+        inputs: What the law commands, and the pose by the odometry.
+        outputs: Left as they are: they are state.
+        numbers: ``GuardNumbers``.
+    """
+    command, pose = inputs[0], inputs[1]
+    robot, braking, space = numbers.robot, numbers.braking, numbers.space
+    theta, tick_s = pose[2], braking.tick_s
+    before = state[0], state[1]
+    v_WP = numbers.velocity(before, command, theta, robot, tick_s)
+    v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
+    wish = limited_wheel_speeds(v, omega, robot)
+    here = pose[0], pose[1], pose[2]
+    speeds = state[8], state[9]
+    danger = danger_of(space, tick * tick_s, here, numbers.reach, braking)
+    done, wheels = chosen(here, speeds, wish, (state[2], state[3]), danger, braking)
+    if done != PASSED:
+        radius, separation = robot.wheel_radius_m, robot.wheel_separation_m
+        v = 0.5 * radius * (wheels[0] + wheels[1])
+        omega = radius * (wheels[1] - wheels[0]) / separation
+        v_WP = hand_position_velocity((v, omega), theta, robot.control_point_m)
+    _, after = drive_a_tick(here, speeds, wheels, braking)
+    fastest = max(abs(wheels[0]), abs(wheels[1])) * robot.wheel_radius_m
+    state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
+    # Nothing near is as far as was looked.
+    seen = min(danger.distance_m, numbers.reach[0])
+    viewed = min(danger.view_distance_m, numbers.reach[0])
+    state[4], state[5] = done, seen - braking.keep_m
+    state[6] = fastest * fastest / (2.0 * braking.braking_m_s2)
+    state[6] += fastest * (braking.motor_lag_s + tick_s)
+    state[7] = viewed - braking.keep_m
+    state[8], state[9] = after[0], after[1]
+
+
+def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
+    """The outputs of ``guard_step``'s state."""
+    wheel_speeds, v_WP, report = outputs
+    for k in range(2):
+        v_WP[k], wheel_speeds[k] = state[k], state[2 + k]
+    for k in range(4):
+        report[k] = state[4 + k]
+
+
+class MotionGuard(LeafSystem):
+    """Obeys a law as far as the robot can be braked to rest in free space.
+
+    .. pydrake_system::
+
+        name: MotionGuard
+        input_ports:
+        - acceleration_W [m/s^2]
+        - pose_WB_estimated [m, m, rad]
+        - free_space [FreeSpace]
+        output_ports:
+        - wheel_speeds [rad/s, left and right]
+        - v_WP [m/s, of the virtual mass]
+        - guard_report [number of what was done, m, m, m]
+
+    It stands in the place of ``WheelSpeedCommand``, ``VelocityWheelCommand`` or
+    ``TwistWheelCommand``, whose input it has, and does their work. Then it passes what
+    comes of it if the robot, after a tick of it, can brake to rest so that the disc
+    about the axle that holds the body stays ``margin_m`` off what was never seen free;
+    else less of it along the same curve, or the turn alone, or it brakes. What it
+    changed, the virtual mass moves by.
+
+    With ``obstacle_speed_m_s`` the same holds of what is in the sensors' view now and
+    may come nearer at that speed, unless the robot withdraws from it.
+
+    ``guard_report``: what was done, 0 passed, 1 slowed, 2 turned, 3 braked; by how
+    much the disc is farther from what is not free than it has to be; the way in which
+    the robot can stop; and the first of these for what is in view.
+
+    Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
+    speeds that follow by the motors' lag, a group each. Rate and latency are those of
+    ``WheelSpeedCommand``.
+
+    Args:
+        parameters: ``GuardParameters``.
+        known: Grid of the map, and how far off a cell's place may be.
+        robot: Dimensions and top speed.
+        plant: Lag of the motors.
+        command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
+            ``twist_B``.
+        tick_s: Period of the command, s.
+
+    Reference: ours; docs/safety.md has theorem and proof. Passive safety is that of
+    Bouraine, Fraichard and Salhi (2012), passive orientation safety that of Mitsch,
+    Ghorbal, Vogelbacher and Platzer (2017).
+    """
+
+    FACTS = BlockFacts(
+        "command",
+        "control",
+        columns={
+            "wheel_speeds": ("wheel_speed_left", "wheel_speed_right"),
+            "v_WP": ("v_WP_x", "v_WP_y"),
+            "guard_report": (
+                "guard_action",
+                "guard_distance",
+                "guard_stopping_distance",
+                "guard_view_distance",
+            ),
+        },
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: GuardParameters | None = None,
+        known: FreeSpaceParameters | None = None,
+        robot: RobotParameters | None = None,
+        plant: PlantParameters | None = None,
+        command: str = "acceleration_W",
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self._tick_s = tick_s
+        self.set_name("motion_guard")
+        self.step = Step(
+            guard_step,
+            _numbers(
+                parameters or GuardParameters(),
+                known or FreeSpaceParameters(),
+                robot or RobotParameters(),
+                plant or PlantParameters(),
+                COMMANDS[command],
+                tick_s,
+            ),
+            [0.0] * sum(_SIZES),
+            _publish_guard,
+        )
+        self._inputs = [
+            self.DeclareVectorInputPort(name=name, size=size)
+            for name, size in ((command, 2), ("pose_WB_estimated", 3))
+        ]
+        self._free_space = self.DeclareAbstractInputPort(
+            name="free_space", model_value=Value(object())
+        )
+        groups = [self.DeclareDiscreteState(size) for size in _SIZES]
+        self.DeclareStateOutputPort("wheel_speeds", groups[_WHEEL_SPEEDS])
+        self.DeclareStateOutputPort("v_WP", groups[_V_WP])
+        self.DeclareStateOutputPort("guard_report", groups[_REPORT])
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=tick_s, offset_sec=0.0, update=self._update
+        )
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        space = run.carried["free_space"](0)
+        return self.step._replace(numbers=self.step.numbers._replace(space=space))
+
+    def _update(self, context: Any, discrete_state: Any) -> None:
+        inputs, state = read_lists(context, self._inputs), []
+        space: Any = self._free_space.Eval(context)
+        for group in range(len(_SIZES)):
+            state += context.get_discrete_state(group).CopyToVector().tolist()
+        tick = round(context.get_time() / self._tick_s)
+        numbers = self.step.numbers._replace(space=space)
+        guard_step(tick, state, inputs, (), numbers)
+        begin = 0
+        for group, size in enumerate(_SIZES):
+            values = np.array(state[begin : begin + size])
+            discrete_state.set_value(group, values)
+            begin += size
+
+
+def _numbers(
+    own: GuardParameters,
+    known: FreeSpaceParameters,
+    robot: RobotParameters,
+    plant: PlantParameters,
+    velocity: Callable[..., Any],
+    tick_s: float,
+) -> GuardNumbers:
+    radius = body_radius(robot) + known.place_error_m
+    keep = radius + own.margin_m
+    braking = BrakingNumbers(
+        robot.wheel_radius_m,
+        robot.wheel_separation_m,
+        plant.motor_lag_s,
+        own.braking_m_s2,
+        tick_s,
+        keep,
+        radius + own.least_margin_m,
+        own.obstacle_speed_m_s,
+        own.slow_turn_rad_s,
+    )
+    top = robot.top_speed_m_s
+    stopping = top * top / (2.0 * own.braking_m_s2) + top * (
+        plant.motor_lag_s + 2.0 * tick_s
+    )
+    reach = keep + stopping + 2.0 * known.cell_m, 2.0 * stopping
+    blank = make_free_space(1, known.cell_m, 1, 2)
+    return GuardNumbers(velocity, robot, braking, reach, blank)
