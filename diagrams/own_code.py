@@ -218,7 +218,7 @@ def why(error: BaseException) -> str:
     """Kind and text of an error in a user's code, with its line."""
     frames = traceback.extract_tb(error.__traceback__)
     ours = Path(__file__).resolve().parent
-    own = [f for f in frames if Path(f.filename).resolve().parent != ours]
+    own = [f for f in frames if ours not in Path(f.filename).resolve().parents]
     own = [f for f in own if "importlib" not in f.filename]
     at = f" in line {own[-1].lineno} of {Path(own[-1].filename).name}" if own else ""
     text = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__

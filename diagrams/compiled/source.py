@@ -238,10 +238,8 @@ def _origins(names: Mapping[str, Any]) -> Iterator[str]:
 def _digest() -> str:
     """Of the package's own source and of what compiles it."""
     digest = hashlib.sha256()
-    for package in (
-        Path(__file__).parents[1],
-        Path(sys.modules["systems"].__path__[0]),
-    ):
+    for name in ("diagrams", "systems"):
+        package = Path(sys.modules[name].__path__[0])
         for file in sorted(package.rglob("*.py")):
             digest.update(file.read_bytes())
     return f"{digest.hexdigest()} numba {numba.__version__} numpy {np.__version__}"
