@@ -68,6 +68,8 @@ def make_controller(scenario: Scenario) -> Any:
     }
     name = scenario.law
     if name in LAWS:
+        if LAWS[name].plans:
+            parts["known"] = scenario.free_space
         return _block(LAWS[name], parts)
     if ":" not in name:
         raise InputError(

@@ -177,7 +177,7 @@ def robot_blocks(
         _tracker(scenario),
         *_obstacle_sensing(scenario, name, bodies),
         controller,
-        *_driving(scenario, controller),
+        _driving(scenario, controller),
     ]
     return with_own_blocks(
         {block_facts(block).part: block for block in ours},
@@ -399,7 +399,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
                 **seen,
             )
         ]
-    return [
+    sensing = [
         UltrasonicArray(
             parameters=scenario.ultrasonic,
             acoustics=scenario.acoustics,
@@ -415,28 +415,29 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             tick_s=scenario.tick_s,
         ),
     ]
-
-
-def _driving(scenario: Scenario, controller: Any) -> list[Any]:
-    """What obeys the law; guarded, what it may obey as well."""
-    if scenario.guard is None:
-        return [make_command(controller, scenario.robot, scenario.tick_s)]
-    return [
-        FreeSpaceMap(
+    if scenario.guard is not None:
+        known = FreeSpaceMap(
             parameters=scenario.free_space,
             sensors=scenario.ultrasonic,
             robot=scenario.robot,
             tick_s=scenario.tick_s,
-        ),
-        MotionGuard(
-            parameters=scenario.guard,
-            known=scenario.free_space,
-            robot=scenario.robot,
-            plant=scenario.plant,
-            command=commanded(controller),
-            tick_s=scenario.tick_s,
-        ),
-    ]
+        )
+        sensing.append(known)
+    return sensing
+
+
+def _driving(scenario: Scenario, controller: Any) -> Any:
+    """What drives the wheels as the law commands, as far as a guard lets it."""
+    if scenario.guard is None:
+        return make_command(controller, scenario.robot, scenario.tick_s)
+    return MotionGuard(
+        parameters=scenario.guard,
+        known=scenario.free_space,
+        robot=scenario.robot,
+        plant=scenario.plant,
+        command=commanded(controller),
+        tick_s=scenario.tick_s,
+    )
 
 
 def connect_by_name(

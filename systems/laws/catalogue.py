@@ -8,6 +8,7 @@ from systems.laws.active_impedance_2017_controller import ACTIVE_2017
 from systems.laws.active_impedance_controller import ACTIVE
 from systems.laws.conventional_impedance_2017_controller import CONVENTIONAL_2017
 from systems.laws.conventional_impedance_controller import CONVENTIONAL
+from systems.laws.guarded_controller import GUARDED
 from systems.laws.law import Law
 from systems.laws.no_avoidance import NONE
 
@@ -22,6 +23,7 @@ LAWS: Mapping[str, Law] = {
         ACTIVE,
         CONVENTIONAL_2017,
         ACTIVE_2017,
+        GUARDED,
     )
 }
 

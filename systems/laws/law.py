@@ -72,6 +72,9 @@ class Law:
     """Gains of the distance term and of the velocity term, for root loci."""
     tuning: Tuning | None = None
     """None for a law without gains to choose."""
+    plans: bool = False
+    """Whether its block plans with a map, so that it takes ``known``, too, and its robot
+    is always guarded."""
     colour: str | None = None
     """In pictures; none: the next one of the palette."""
 

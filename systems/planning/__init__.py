@@ -1,0 +1,5 @@
+"""Ways through what a robot knows of the floor."""
+
+from systems.planning.way import Way, find_way, make_way
+
+__all__ = ["Way", "find_way", "make_way"]

@@ -1,0 +1,227 @@
+"""The cheapest way through seen and unknown space, on cells twice as wide."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
+
+__all__ = ["PRICES", "Way", "find_way", "make_way"]
+
+#: Price of a cell: seen free, unknown, near what echoed now and then, and often.
+PRICES = FREE, UNKNOWN, DOUBTFUL, OCCUPIED = 2, 3, 14, 82
+#: Hits of a cell that make it doubtful, and occupied.
+_DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
+#: Of a step to a cell beside and to one across the corner, times its price.
+_STRAIGHT, _ACROSS = 10, 14
+#: More than any step costs.
+_BUCKETS = 2048
+_FAR = 2**31 - 1
+
+
+class Way(NamedTuple):
+    """Cells twice as wide as those of a ``FreeSpace``, and the way through them.
+
+    All arrays are changed by ``find_way``.
+    """
+
+    price: NDArray[np.int32]
+    """(m, m) of each cell, one of ``PRICES``."""
+    cost: NDArray[np.int32]
+    """(m, m) of the way from each cell to the goal, as far as it was looked for."""
+    towards: NDArray[np.int32]
+    """(m, m) number of the next cell of that way."""
+    queue: NDArray[np.int32]
+    """(k, 2) number of a cell, and the next entry of its bucket."""
+    heads: NDArray[np.int32]
+    """(buckets, 1) first entry of each bucket."""
+    path: NDArray[np.float64]
+    """(p, 2) middles of the cells of the way, from the robot to the goal, m."""
+    facts: NDArray[np.float64]
+    """(1, 3): points of ``path``, its length, m, and the highest price on it."""
+    marks: NDArray[np.float64]
+    """(q, 3) places that were found blocked, m, and until when that counts, s."""
+
+
+def make_way(cells: int) -> Way:
+    """Room for a way.
+
+    Args:
+        cells: Of the window along a side.
+
+    Returns:
+        The way, of no points.
+    """
+    size = cells // 2
+    grid = size, size
+    return Way(
+        np.full(grid, UNKNOWN, dtype=np.int32),
+        np.full(grid, _FAR, dtype=np.int32),
+        np.full(grid, -1, dtype=np.int32),
+        np.zeros((8 * size * size + 1, 2), dtype=np.int32),
+        np.full((_BUCKETS, 1), -1, dtype=np.int32),
+        np.zeros((4 * size, 2)),
+        np.zeros((1, 3)),
+        np.zeros((16, 3)),
+    )
+
+
+@njit(cache=True)
+def find_way(
+    way: Way,
+    space: FreeSpace,
+    start: Any,
+    goal: Any,
+    time: float,
+    radius: float,
+    clear_m: float,
+) -> None:  # pragma: no cover  (compiled)
+    """Finds the way from a robot to a goal.
+
+    Args:
+        way: Changed.
+        space: What is known.
+        start: (x, y) of the axle, m.
+        goal: (x, y); beyond the window the nearest of its cells counts, m.
+        time: s.
+        radius: Of the disc that must pass, m.
+        clear_m: Echoes that are this near to the goal come from what is followed, m.
+    """
+    size, cell = way.price.shape[0], 2.0 * space.cell_m
+    low = _first_cells(space)
+    _set_prices(way, space, low, goal, time, radius, clear_m)
+    si, sj = _cell_at(start, low, cell, size)
+    gi, gj = _cell_at(goal, low, cell, size)
+    _search(way, si * size + sj, gi * size + gj)
+    points, length, dearest, at = 0, 0.0, 0, si * size + sj
+    while points < len(way.path):
+        i, j = at // size, at % size
+        way.path[points, 0] = (low[0] + i + 0.5) * cell
+        way.path[points, 1] = (low[1] + j + 0.5) * cell
+        if points > 0:
+            length += math.hypot(
+                way.path[points, 0] - way.path[points - 1, 0],
+                way.path[points, 1] - way.path[points - 1, 1],
+            )
+            dearest = max(dearest, way.price[i, j])
+        points += 1
+        if at == gi * size + gj or way.towards[i, j] < 0:
+            break
+        at = way.towards[i, j]
+    way.facts[0, 0], way.facts[0, 1], way.facts[0, 2] = points, length, dearest
+
+
+@njit(cache=True)
+def _first_cells(space: FreeSpace) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """Wide cell with which the window begins, as a number on the floor."""
+    first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    return (first_i + 1) // 2, (first_j + 1) // 2
+
+
+@njit(cache=True)
+def _cell_at(
+    place: Any, low: Any, cell: float, size: int
+) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    i = math.floor(place[0] / cell) - low[0]
+    j = math.floor(place[1] / cell) - low[1]
+    return min(max(i, 0), size - 1), min(max(j, 0), size - 1)
+
+
+@njit(cache=True)
+def _set_prices(
+    way: Way,
+    space: FreeSpace,
+    low: Any,
+    goal: Any,
+    time: float,
+    radius: float,
+    clear_m: float,
+) -> None:  # pragma: no cover  (compiled)
+    size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
+    reach = math.ceil(radius / cell)
+    for i in range(size):
+        for j in range(size):
+            way.price[i, j] = FREE
+    for i in range(size):
+        for j in range(size):
+            hits, seen = 0.0, True
+            for di in range(2):
+                for dj in range(2):
+                    a = (2 * (low[0] + i) + di) % cells
+                    b = (2 * (low[1] + j) + dj) % cells
+                    hits = max(hits, space.hits[a, b])
+                    seen = seen and space.free_until[a, b] != NEVER
+            if not seen:
+                way.price[i, j] = max(way.price[i, j], UNKNOWN)
+            if hits < _DOUBTFUL_HITS:
+                continue
+            x, y = (low[0] + i + 0.5) * cell, (low[1] + j + 0.5) * cell
+            if math.hypot(x - goal[0], y - goal[1]) < clear_m:
+                continue
+            price = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
+            _widen(way, i, j, reach, radius / cell, price)
+    for k in range(len(way.marks)):
+        if way.marks[k, 2] > time:
+            i = math.floor(way.marks[k, 0] / cell) - low[0]
+            j = math.floor(way.marks[k, 1] / cell) - low[1]
+            _widen(way, i, j, reach, radius / cell, OCCUPIED)
+
+
+@njit(cache=True)
+def _widen(
+    way: Way, i: int, j: int, reach: int, radius: float, price: int
+) -> None:  # pragma: no cover  (compiled)
+    """Gives all cells within a radius of cells at least a price."""
+    size = way.price.shape[0]
+    for a in range(max(i - reach, 0), min(i + reach, size - 1) + 1):
+        for b in range(max(j - reach, 0), min(j + reach, size - 1) + 1):
+            if (a - i) ** 2 + (b - j) ** 2 <= radius * radius:
+                way.price[a, b] = max(way.price[a, b], price)
+
+
+@njit(cache=True)
+def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (compiled)
+    """Dijkstra from the goal up to the start, with buckets for whole costs (Dial)."""
+    size = way.price.shape[0]
+    way.cost[:, :] = _FAR
+    way.towards[:, :] = -1
+    way.heads[:, 0] = -1
+    way.cost[goal // size, goal % size] = 0
+    way.queue[0, 0], way.queue[0, 1] = goal, -1
+    way.heads[0, 0] = 0
+    entries, waiting, cost = 1, 1, 0
+    while waiting > 0:
+        entry = way.heads[cost % _BUCKETS, 0]
+        if entry < 0:
+            cost += 1
+            continue
+        way.heads[cost % _BUCKETS, 0] = way.queue[entry, 1]
+        waiting -= 1
+        at = way.queue[entry, 0]
+        i, j = at // size, at % size
+        if way.cost[i, j] != cost:
+            continue
+        if at == start:
+            return
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                a, b = i + di, j + dj
+                if (di == 0 and dj == 0) or a < 0 or b < 0 or a >= size or b >= size:
+                    continue
+                step = _STRAIGHT if di == 0 or dj == 0 else _ACROSS
+                # From there the way leads here: what it costs to enter this cell.
+                new = cost + step * way.price[i, j]
+                if new < way.cost[a, b] and entries < len(way.queue):
+                    way.cost[a, b] = new
+                    way.towards[a, b] = at
+                    bucket = new % _BUCKETS
+                    way.queue[entries, 0] = a * size + b
+                    way.queue[entries, 1] = way.heads[bucket, 0]
+                    way.heads[bucket, 0] = entries
+                    entries += 1
+                    waiting += 1
