@@ -18,6 +18,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, Strict, ValidationError, model_validator
 
+from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
 from diagrams.explain import explain
@@ -75,6 +76,8 @@ class SweepPlan(Parameters):
     """Fields with several values, crossed: each combination is a cell."""
     draw: dict[str, Distribution] = Field(default_factory=dict)
     """Fields that are drawn for every run, after set and grid, in this order."""
+    require: Conditions = Conditions()
+    """What every layout must have; draws that lack it count as not valid."""
     runs: Count = 1
     """Runs in each cell."""
     seed: int = Field(default=1, ge=0, lt=2**63)
@@ -104,6 +107,13 @@ class SweepPlan(Parameters):
                     raise InputError(
                         f"grid.{key}", f"{text} stands there twice; drop one"
                     )
+        for key, distribution in self.draw.items():
+            each, count = distribution.each, len(_paths(key))
+            if each is not None and len(each) != count:
+                raise InputError(
+                    f"draw.{key}.each",
+                    f"has {len(each)} pairs for {count} paths; give one each",
+                )
         total = self.runs * self.cell_count
         if total > MOST_RUNS:
             raise InputError(
@@ -237,7 +247,7 @@ class SweepPlan(Parameters):
         """What is wrong with the first point that makes no valid scenario."""
         for point in points:
             try:
-                self.scenario_of(point)
+                self.require.check(self.scenario_of(point))
             except InputError as error:
                 where = f"cell {point.cell} of the grid"
                 if self._valid_undrawn(point):
@@ -260,9 +270,8 @@ class SweepPlan(Parameters):
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]
             generator = np.random.Generator(np.random.Philox(seed=words))
-            value = distribution.draw(generator)
-            for path in _paths(key):
-                yield path, value
+            paths = _paths(key)
+            yield from zip(paths, distribution.draw(generator, len(paths)), strict=True)
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
@@ -279,7 +288,7 @@ def load_sweep(path: str | Path) -> SweepPlan:
     if not path.is_file():
         raise InputError("sweep", f"there is no file {path}; check the path")
     data = read_mapping(path)
-    for part in ("set", "grid", "draw"):  # a heading with nothing below it
+    for part in ("set", "grid", "draw", "require"):  # a heading with nothing below it
         if part in data and data[part] is None:
             del data[part]
     data.setdefault("name", path.stem)
