@@ -8,7 +8,7 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from diagrams.explain import explain
+from diagrams.explain import did_you_mean, explain
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
@@ -78,18 +78,17 @@ def _find(source: str | Path) -> Path:
     if str(source) in library:
         return library[str(source)]
     path = Path(source)
+    known = "a name that 'phonotaxis scenarios' lists"
     if path.suffix in (".yaml", ".yml"):
         if path.is_file():
             return path
         raise InputError(
-            "scenario",
-            f"there is no file {source}; check the path, or use one of "
-            f"the library: {', '.join(library)}",
+            "scenario", f"there is no file {source}; check the path, or use {known}"
         )
     raise InputError(
         "scenario",
-        f"{str(source)!r} is not known; use one of {', '.join(library)}, or the path "
-        "of a .yaml file",
+        f"{str(source)!r} is not known; use {known}, or the path of a .yaml file"
+        f"{did_you_mean(str(source), library)}",
     )
 
 

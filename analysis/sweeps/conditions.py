@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from itertools import product
 
 import numpy as np
 
+from analysis.runs.proximity import least_clearances
 from analysis.runs.shortest_path import shortest_path_length
 from diagrams import Scenario
 from diagrams.bodies import Body, Surroundings
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
-from systems.world.geometry import beyond_rectangle, rectangle_clearance
+from systems.world.geometry import beyond_rectangle
 
 __all__ = ["Conditions"]
+
+#: Distances of what moves are looked at so often, s.
+STEP_S = 0.1
 
 
 class Conditions(Parameters):
@@ -25,7 +28,7 @@ class Conditions(Parameters):
     start_distance_m: NonNegativeLength = 0.0
     """No body is nearer to a robot's origin of B at time zero, m."""
     source_distance_m: NonNegativeLength = 0.0
-    """No resting obstacle is nearer to a resting source, outline to outline, m."""
+    """No obstacle is ever nearer to a source, outline to outline, m."""
     way_radius_m: Length | None = None
     """A disc of this radius about the origin of B gets past what rests from each
     robot's start to where P is at the follow distance, m."""
@@ -41,10 +44,10 @@ class Conditions(Parameters):
         """
         if self == Conditions():
             return
+        self._check_source(scenario)
         for robot in scenario.all_robots:
             around = scenario.surroundings(robot)
             self._check_start(scenario, robot, around)
-            self._check_source(scenario, around)
             self._check_way(scenario, robot, around)
 
     def _check_start(
@@ -62,20 +65,26 @@ class Conditions(Parameters):
                     f"{self.start_distance_m:g} m; move it",
                 )
 
-    def _check_source(self, scenario: Scenario, around: Surroundings) -> None:
-        if not self.source_distance_m:
+    def _check_source(self, scenario: Scenario) -> None:
+        obstacles = [Body(each.path(), each.size_m) for each in scenario.obstacles]
+        if not self.source_distance_m or not obstacles:
             return
-        still = dict(_resting(around.bodies))
-        sources = [name for name in scenario.all_sources if name in still]
-        obstacles = [each.name for each in scenario.obstacles if each.name in still]
-        for source, obstacle in product(sources, obstacles):
-            bodies = (still[name].rectangle(0.0) for name in (source, obstacle))
-            away = rectangle_clearance(*bodies)
-            if away < self.source_distance_m:
+        for name, source in scenario.all_sources.items():
+            # Where it is to be: it drives there within centimetres.
+            plan = Body(source.plan(), (source.length_m, source.width_m))
+            moves = any(body.path.moves for body in (plan, *obstacles))
+            times = np.arange(0.0, scenario.duration_s if moves else STEP_S, STEP_S)
+            least = least_clearances(
+                plan.rectangles(times - source.start_time_s),
+                np.stack([body.rectangles(times) for body in obstacles]),
+            )[1]
+            nearest = int(np.argmin(least))
+            if least[nearest] < self.source_distance_m:
                 raise InputError(
                     "require.source_distance_m",
-                    f"{obstacle!r} is {max(away, 0.0):.3g} m from {source!r}, less "
-                    f"than {self.source_distance_m:g} m; move one",
+                    f"{scenario.obstacles[nearest].name!r} comes within "
+                    f"{max(least[nearest], 0.0):.3g} m of {name!r}, less than "
+                    f"{self.source_distance_m:g} m; move one",
                 )
 
     def _check_way(self, scenario: Scenario, robot: str, around: Surroundings) -> None:

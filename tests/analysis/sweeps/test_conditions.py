@@ -174,10 +174,19 @@ def test_distance_from_a_source_is_between_outlines():
     assert lacks(layout([box]), source_distance_m=between - 0.001) == ""
     field = lacks(layout([box]), source_distance_m=between + 0.001)
     assert field == "require.source_distance_m"
-    moving = {"waypoints_m": [[4.4, 0.0], [4.4, 3.0]]}
-    assert lacks(layout([moving]), source_distance_m=3.0) == ""
-    follows = layout([box], source={"waypoints_m": [[6.0, 0.0], [8.0, 0.0]]})
-    assert lacks(follows, source_distance_m=3.0) == ""
+
+
+def test_distance_from_a_source_is_kept_all_the_time():
+    """A box that passes behind the source, 1 m from centre to centre."""
+    box = {"waypoints_m": [[7.0, -2.0], [7.0, 2.0]], "size_m": [0.2, 0.2]}
+    between = 1.0 - 0.163 - 0.1
+    assert lacks(layout([box]), source_distance_m=between - 0.001) == ""
+    field = lacks(layout([box]), source_distance_m=between + 0.001)
+    assert field == "require.source_distance_m"
+    assert lacks(layout([box], duration_s=3.0), source_distance_m=between + 0.2) == ""
+    # The source drives off at the same speed.
+    ahead = layout([box], source={"waypoints_m": [[6.0, 0.0], [6.0, 4.0]]})
+    assert lacks(ahead, source_distance_m=1.0) == ""
 
 
 def test_draws_that_lack_something_are_drawn_again():

@@ -210,7 +210,7 @@ def test_plan_survives_its_file(tmp_path):
         ({"runs": 0}, "runs", "greater"),
         ({"run": 5}, "run", "did you mean 'runs'"),
         ({"seed": -1}, "seed", "greater"),
-        ({"scenario": "nowhere"}, "scenario", "default"),
+        ({"scenario": "nowhere"}, "scenario", "phonotaxis scenarios"),
         ({"scenario": "nowhere.yaml"}, "scenario", "check the path"),
         ({"set": {"sourc.speed_m_s": 1}}, "sourc", "did you mean 'source'"),
         ({"grid": {"obstacles.7.speed_m_s": [1]}}, "obstacles.7", "count from 0"),
