@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -26,7 +26,7 @@ from diagrams.loading import (
     read_mapping,
     resolve_sound,
     scenario_from_mapping,
-    set_field,
+    set_fields,
 )
 from diagrams.own_code import own_files
 from diagrams.yaml_text import dump_yaml
@@ -100,6 +100,8 @@ class SweepPlan(Parameters):
                 for path in _paths(key):
                     _check_path(f"{part}.{path}", path, earlier)
                     earlier.append(path)
+            if part != "set":
+                _check_presets(part, getattr(self, part), [*self.set])
         for key, values in self.grid.items():
             texts = [json.dumps(value, default=str) for value in values]
             for text in texts:
@@ -130,8 +132,7 @@ class SweepPlan(Parameters):
     def base(self) -> dict[str, Any]:
         """Every field of the scenario, with ``set`` applied; not to be changed."""
         data = load_scenario(self.source).model_dump(mode="json")
-        for key, value in self.set.items():
-            set_field(data, key, copy.deepcopy(value))
+        set_fields(data, copy.deepcopy(self.set).items())
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data).model_dump(mode="json")
 
@@ -188,8 +189,7 @@ class SweepPlan(Parameters):
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """The scenario of a run."""
         data = pickle.loads(self._base_copy)
-        for path, value in point.fields.items():
-            set_field(data, path, copy.deepcopy(value))
+        set_fields(data, copy.deepcopy(point.fields).items())
         data["seed"] = point.seed
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data)
@@ -336,6 +336,19 @@ def _check_path(field: str, path: str, earlier: list[str]) -> None:
             raise InputError(
                 field, f"would overwrite {other}, which comes before it; drop one"
             )
+
+
+def _check_presets(part: str, keys: Iterable[str], fixed: list[str]) -> None:
+    """Refuses a preset that would make the scenario forget what ``set`` says."""
+    for path in (path for key in keys for path in _paths(key)):
+        group, _, last = path.rpartition(".")
+        for other in fixed if last == "preset" else ():
+            if f"{other}.".startswith(f"{group}."):
+                raise InputError(
+                    f"{part}.{path}",
+                    f"begins {group} anew, without {other} of set; give that in grid, "
+                    "too",
+                )
 
 
 def _check_plain(part: str, value: Any) -> None:
