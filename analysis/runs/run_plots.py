@@ -40,7 +40,7 @@ def plot_trajectory(result: RunResult) -> Figure:
     """
     figure, axes = _map(result)
     draw_grid(axes)
-    axes.set_title(_title(result), fontsize=11)
+    axes.set_title(_title(result), fontsize=11, wrap=True)
     for own in result.robots.values():
         draw_cones(axes, own, times_apart(own))
     draw_obstacles(axes, result)
