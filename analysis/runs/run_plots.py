@@ -32,7 +32,7 @@ LONGEST_LINE = 80
 #: The width at which the pictures are meant to be read, inch.
 WIDTH_IN = 8.0
 #: Room round the map for labels, title and legend, inch.
-LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.4
+LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
 
 
 def plot_trajectory(result: RunResult) -> Figure:
