@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from typing import Any
 
 from pydantic import BaseModel, ValidationError
 
 from systems.framework.input_error import InputError, shortened
 
-__all__ = ["explain"]
+__all__ = ["did_you_mean", "explain"]
 
 
 def explain(error: ValidationError, model: type[BaseModel], what: str) -> InputError:
@@ -42,13 +43,26 @@ def explain(error: ValidationError, model: type[BaseModel], what: str) -> InputE
     return InputError(field, f"is {value}; {message[0].lower()}{message[1:]}")
 
 
-def _near(field: str, model: Any) -> str:
-    """A field of a similar name at the same place, if there is one."""
+def did_you_mean(name: str, known: Iterable[str]) -> str:
+    """The end of a message that names what is most like a name.
+
+    Args:
+        name: What was given.
+        known: What could be.
+
+    Returns:
+        Empty where nothing is like it.
+    """
     from difflib import get_close_matches
 
+    names = get_close_matches(name, list(known), n=1)
+    return f" (did you mean {names[0]!r}?)" if names else ""
+
+
+def _near(field: str, model: Any) -> str:
+    """A field of a similar name at the same place, if there is one."""
     *parents, last = field.split(".")
     for part in parents:
         info = getattr(model, "model_fields", {}).get(part)
         model = info.annotation if info else None
-    names = get_close_matches(last, getattr(model, "model_fields", {}), n=1)
-    return f" (did you mean {names[0]!r}?)" if names else ""
+    return did_you_mean(last, getattr(model, "model_fields", {}))

@@ -8,7 +8,8 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from diagrams.explain import explain
+from diagrams.explain import did_you_mean, explain
+from diagrams.participants import begins_anew
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
@@ -21,7 +22,7 @@ __all__ = [
     "read_mapping",
     "resolve_sound",
     "scenario_from_mapping",
-    "set_field",
+    "set_fields",
 ]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
@@ -54,8 +55,7 @@ def load_scenario(
     data = read_mapping(path)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    for override in overrides:
-        set_field(data, *parse_setting(override))
+    set_fields(data, map(parse_setting, overrides))
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
 
@@ -78,18 +78,17 @@ def _find(source: str | Path) -> Path:
     if str(source) in library:
         return library[str(source)]
     path = Path(source)
+    known = "a name that 'phonotaxis scenarios' lists"
     if path.suffix in (".yaml", ".yml"):
         if path.is_file():
             return path
         raise InputError(
-            "scenario",
-            f"there is no file {source}; check the path, or use one of "
-            f"the library: {', '.join(library)}",
+            "scenario", f"there is no file {source}; check the path, or use {known}"
         )
     raise InputError(
         "scenario",
-        f"{str(source)!r} is not known; use one of {', '.join(library)}, or the path "
-        "of a .yaml file",
+        f"{str(source)!r} is not known; use {known}, or the path of a .yaml file"
+        f"{did_you_mean(str(source), library)}",
     )
 
 
@@ -154,17 +153,29 @@ def parse_setting(text: str) -> tuple[str, Any]:
     return key, parse_yaml(value_text, key)
 
 
-def set_field(data: dict[str, Any], key: str, value: Any) -> None:
-    """Sets one field of a mapping; groups on the way to it are made.
+def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
+    """Sets fields of a mapping, presets first: what is set beside one wins.
+
+    A group that has a preset begins anew with another one. Groups on the way to a
+    field are made.
 
     Args:
         data: Fields of a scenario, changed in place.
-        key: Dotted path, with indices of lists: ``obstacles.0.size_m``.
-        value: Plain value.
+        fields: Dotted paths, with indices of lists (``obstacles.0.size_m``), and
+            plain values; of two of one path the later one wins.
 
     Raises:
-        InputError: The path leads into a plain value, or past a list's end.
+        InputError: A path leads into a plain value, or past a list's end.
     """
+    for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
+        _set_field(data, key, value)
+
+
+def _is_preset(key: str, value: Any) -> bool:
+    return begins_anew({key.rpartition(".")[2]: value})
+
+
+def _set_field(data: dict[str, Any], key: str, value: Any) -> None:
     *parents, last = key.split(".")
     node: Any = data
     for depth, part in enumerate(parents):
@@ -172,6 +183,8 @@ def set_field(data: dict[str, Any], key: str, value: Any) -> None:
     if isinstance(node, list):
         node[_index(node, last, key)] = value
     elif isinstance(node, dict):
+        if begins_anew(node) and _is_preset(key, value):
+            node.clear()
         node[last] = value
     else:
         raise InputError(key, "leads into a plain value; shorten the key")

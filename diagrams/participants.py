@@ -25,7 +25,13 @@ from systems.safety.motion_guard import GuardParameters
 from systems.sound.adc import MicArrayParameters, channel_skew
 from systems.sound.waveforms import SoundParameters
 
-__all__ = ["FollowerParameters", "SourceParameters", "StartParameters", "joined"]
+__all__ = [
+    "FollowerParameters",
+    "SourceParameters",
+    "StartParameters",
+    "begins_anew",
+    "joined",
+]
 
 
 class StartParameters(Parameters):
@@ -95,17 +101,30 @@ class SourceParameters(SourceRobotParameters):
     """Whether it can be hit and seen; off: a loudspeaker in the air."""
 
 
+def begins_anew(changes: Mapping[str, Any]) -> bool:
+    """Whether changes to a group choose its preset, so that the rest is forgotten.
+
+    Args:
+        changes: Plain values by field.
+
+    Returns:
+        False of a group of robots or sources one of which bears that name.
+    """
+    return isinstance(changes.get("preset"), str)
+
+
 def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
     """A tree of plain values, with some of its leaves changed.
 
     Args:
         base: The tree.
-        changes: A tree of the leaves to change, or to add.
+        changes: A tree of the leaves to change, or to add; a group that chooses a
+            preset is that of the changes alone.
 
     Returns:
         A new tree; neither argument is changed.
     """
-    result = dict(base)
+    result = {} if begins_anew(changes) else dict(base)
     for key, value in changes.items():
         before = result.get(key)
         if isinstance(value, Mapping) and isinstance(before, Mapping):

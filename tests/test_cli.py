@@ -66,6 +66,10 @@ def test_scenarios_lists_the_papers_experiments(capsys):
         "corridor",
         "u_trap",
         "wall",
+        "clutter",
+        "crowd",
+        "rooms",
+        "two_moving_obstacles_resting_source",
     } <= set(listed)
 
 
@@ -82,7 +86,7 @@ def test_laws_lists_names_and_titles(capsys):
 @pytest.mark.parametrize(
     ("words", "field", "hint"),
     [
-        (["no_such"], "scenario", "obstacle_free"),
+        (["no_such"], "scenario", "phonotaxis scenarios"),
         (["missing.yaml"], "scenario", "check the path"),
         (["--law", "magic"], "law", "conventional"),
         (["--law", "no_such_module:law"], "law", "cannot be imported"),

@@ -46,7 +46,7 @@ def test_compare_prints_one_document(capsys, tmp_path):
 @pytest.mark.parametrize(
     ("words", "field", "hint"),
     [
-        (["no_such"], "scenario", "obstacle_free"),
+        (["no_such"], "scenario", "phonotaxis scenarios"),
         (["--laws", "magic"], "law", "conventional"),
         (["--velocity-term", "half"], "repulsion.velocity_term", "closing"),
         (["--set", "sourc.speed_m_s=1"], "sourc", "did you mean 'source'"),

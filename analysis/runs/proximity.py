@@ -14,7 +14,7 @@ from diagrams.bodies import rectangles_at
 from diagrams.simulation import RunResult
 from systems.world.geometry import contact_time, rectangle_clearance
 
-__all__ = ["Proximity"]
+__all__ = ["Proximity", "least_clearances"]
 
 #: Below this clearance the time between two ticks is searched, m: more than robot
 #: and obstacle cover in a tick.
@@ -72,7 +72,7 @@ class Proximity:
         robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.size)
         paths = self.result.surroundings.bodies.values()
         bodies = np.stack([body.rectangles(times) for body in paths])
-        return np.minimum(least, _least_clearances(robot, bodies)[1])
+        return np.minimum(least, least_clearances(robot, bodies)[1])
 
     @cached_property
     def least_time_to_contact(self) -> float:
@@ -88,17 +88,24 @@ class Proximity:
 
     @cached_property
     def _clearances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        return _least_clearances(self.robot, self.bodies)
+        return least_clearances(self.robot, self.bodies)
 
 
 @njit(cache=True)
-def _least_clearances(
+def least_clearances(
     robot: NDArray[np.float64], bodies: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
-    """Clearances of (n, 5) and (m, n, 5) rectangles: (n,) and (m,) least ones, m.
+    """Least clearances of a rectangle from others, at times and of others.
 
     A body is passed over where the circles round both are so far apart that it
     is neither the nearest one nor as near as before.
+
+    Args:
+        robot: (n, 5) at n times.
+        bodies: (m, n, 5) the others.
+
+    Returns:
+        (n,) and (m,) m; negative where they overlap.
     """
     count, ticks = bodies.shape[:2]
     nearest, least = np.full(ticks, np.inf), np.full(count, np.inf)

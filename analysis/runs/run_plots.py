@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -24,10 +26,13 @@ from systems.framework.input_error import InputError
 
 __all__ = ["plot_time_series", "plot_trajectory"]
 
+#: Letters of a title that a picture has room for beside one another.
+LONGEST_LINE = 80
+
 #: The width at which the pictures are meant to be read, inch.
 WIDTH_IN = 8.0
 #: Room round the map for labels, title and legend, inch.
-LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.4
+LEFT_IN, RIGHT_IN, BELOW_IN, ABOVE_IN = 0.75, 0.15, 1.3, 0.5
 
 
 def plot_trajectory(result: RunResult) -> Figure:
@@ -141,7 +146,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
 
 def _title(result: RunResult) -> str:
     fault = f" ({result.collision.fault}'s fault)" if result.collision else ""
-    return f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
+    title = f"{run_title(result)}{fault} after {result.simulated_s:.1f} s"
+    return textwrap.fill(title, LONGEST_LINE)
 
 
 def _heard(axes: Axes, result: RunResult, values: NDArray[np.float64]) -> None:

@@ -186,8 +186,9 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
             f"marginal{k}",
             f"Every figure over `{key}`, in bins of as many runs each.",
         )
-        for k, key in enumerate(plan.draw)
-        if not ended(results).empty
+        for k, (key, drawn) in enumerate(plan.draw.items())
+        # No two lists of boxes are the same: there is nothing to plot over.
+        if drawn.boxes is None and not ended(results).empty
     ]
 
 

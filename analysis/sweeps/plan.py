@@ -7,7 +7,7 @@ import hashlib
 import json
 import math
 import pickle
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -18,6 +18,7 @@ from zlib import crc32
 import numpy as np
 from pydantic import Field, Strict, ValidationError, model_validator
 
+from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
 from diagrams.explain import explain
@@ -25,7 +26,7 @@ from diagrams.loading import (
     read_mapping,
     resolve_sound,
     scenario_from_mapping,
-    set_field,
+    set_fields,
 )
 from diagrams.own_code import own_files
 from diagrams.yaml_text import dump_yaml
@@ -75,6 +76,8 @@ class SweepPlan(Parameters):
     """Fields with several values, crossed: each combination is a cell."""
     draw: dict[str, Distribution] = Field(default_factory=dict)
     """Fields that are drawn for every run, after set and grid, in this order."""
+    require: Conditions = Conditions()
+    """What every layout must have; draws that lack it count as not valid."""
     runs: Count = 1
     """Runs in each cell."""
     seed: int = Field(default=1, ge=0, lt=2**63)
@@ -97,6 +100,8 @@ class SweepPlan(Parameters):
                 for path in _paths(key):
                     _check_path(f"{part}.{path}", path, earlier)
                     earlier.append(path)
+            if part != "set":
+                _check_presets(part, getattr(self, part), [*self.set])
         for key, values in self.grid.items():
             texts = [json.dumps(value, default=str) for value in values]
             for text in texts:
@@ -104,6 +109,13 @@ class SweepPlan(Parameters):
                     raise InputError(
                         f"grid.{key}", f"{text} stands there twice; drop one"
                     )
+        for key, distribution in self.draw.items():
+            each, count = distribution.each, len(_paths(key))
+            if each is not None and len(each) != count:
+                raise InputError(
+                    f"draw.{key}.each",
+                    f"has {len(each)} pairs for {count} paths; give one each",
+                )
         total = self.runs * self.cell_count
         if total > MOST_RUNS:
             raise InputError(
@@ -120,8 +132,7 @@ class SweepPlan(Parameters):
     def base(self) -> dict[str, Any]:
         """Every field of the scenario, with ``set`` applied; not to be changed."""
         data = load_scenario(self.source).model_dump(mode="json")
-        for key, value in self.set.items():
-            set_field(data, key, copy.deepcopy(value))
+        set_fields(data, copy.deepcopy(self.set).items())
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data).model_dump(mode="json")
 
@@ -178,8 +189,7 @@ class SweepPlan(Parameters):
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """The scenario of a run."""
         data = pickle.loads(self._base_copy)
-        for path, value in point.fields.items():
-            set_field(data, path, copy.deepcopy(value))
+        set_fields(data, copy.deepcopy(point.fields).items())
         data["seed"] = point.seed
         resolve_sound(data, Path(self.folder))
         return scenario_from_mapping(data)
@@ -237,7 +247,7 @@ class SweepPlan(Parameters):
         """What is wrong with the first point that makes no valid scenario."""
         for point in points:
             try:
-                self.scenario_of(point)
+                self.require.check(self.scenario_of(point))
             except InputError as error:
                 where = f"cell {point.cell} of the grid"
                 if self._valid_undrawn(point):
@@ -260,9 +270,8 @@ class SweepPlan(Parameters):
         for key, distribution in self.draw.items():
             words = [*entropy, crc32(key.encode())]
             generator = np.random.Generator(np.random.Philox(seed=words))
-            value = distribution.draw(generator)
-            for path in _paths(key):
-                yield path, value
+            paths = _paths(key)
+            yield from zip(paths, distribution.draw(generator, len(paths)), strict=True)
 
 
 def load_sweep(path: str | Path) -> SweepPlan:
@@ -279,7 +288,7 @@ def load_sweep(path: str | Path) -> SweepPlan:
     if not path.is_file():
         raise InputError("sweep", f"there is no file {path}; check the path")
     data = read_mapping(path)
-    for part in ("set", "grid", "draw"):  # a heading with nothing below it
+    for part in ("set", "grid", "draw", "require"):  # a heading with nothing below it
         if part in data and data[part] is None:
             del data[part]
     data.setdefault("name", path.stem)
@@ -327,6 +336,19 @@ def _check_path(field: str, path: str, earlier: list[str]) -> None:
             raise InputError(
                 field, f"would overwrite {other}, which comes before it; drop one"
             )
+
+
+def _check_presets(part: str, keys: Iterable[str], fixed: list[str]) -> None:
+    """Refuses a preset that would make the scenario forget what ``set`` says."""
+    for path in (path for key in keys for path in _paths(key)):
+        group, _, last = path.rpartition(".")
+        for other in fixed if last == "preset" else ():
+            if f"{other}.".startswith(f"{group}."):
+                raise InputError(
+                    f"{part}.{path}",
+                    f"begins {group} anew, without {other} of set; give that in grid, "
+                    "too",
+                )
 
 
 def _check_plain(part: str, value: Any) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -34,6 +35,7 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import TICK_S, whole
 from systems.framework.step_block import RunFacts, Step
+from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
@@ -56,11 +58,13 @@ _Places = Annotated[tuple[Point, ...], Strict(False), Field(max_length=360)]
 class UltrasonicParameters(Parameters):
     """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
 
+    preset: SensorPreset = "three"
+    """A named set: defaults of the other fields, of which those that are given win."""
     axes_deg: _Axes = (30.0, 0.0, -30.0)
     """Directions of the cones in B, left to right, deg CCW from x; or a whole number,
     of as many all around."""
     positions_m: _Places = ()
-    """Places of the sensors from P, in B axes, m; none: all at P."""
+    """Places of the sensors from P, in B axes, m; one: that of all; none: all at P."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
     """Half of each cone's opening angle, deg."""
     minimum_range_m: Length = 0.03
@@ -77,6 +81,14 @@ class UltrasonicParameters(Parameters):
     """All sensors at once, or one after the other, a period each."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed by which the sensors turn time into range, m/s; none: the true one."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill(cls, data: Any) -> Any:
+        name = data.get("preset") if isinstance(data, Mapping) else None
+        if isinstance(name, str):  # of any other type it is refused below
+            return {**SENSOR_PRESETS.get(name, {}), **data}
+        return data
 
     @model_validator(mode="after")
     def _check(self) -> UltrasonicParameters:
@@ -98,11 +110,11 @@ class UltrasonicParameters(Parameters):
                 f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or more; "
                 "end before the first direction comes again",
             )
-        if self.positions_m and len(self.positions_m) != self.count:
+        if len(self.positions_m) not in (0, 1, self.count):
             raise InputError(
                 "positions_m",
                 f"has {len(self.positions_m)} places for {self.count} sensors of "
-                "axes_deg; give one each, or none",
+                "axes_deg; give one each, one for all, or none",
             )
         return self
 
@@ -124,7 +136,9 @@ class UltrasonicParameters(Parameters):
     @property
     def places(self) -> tuple[tuple[float, float], ...]:
         """Of the sensors from P, in B axes, m."""
-        return self.positions_m or ((0.0, 0.0),) * self.count
+        if len(self.positions_m) == self.count:
+            return self.positions_m
+        return (self.positions_m or ((0.0, 0.0),)) * self.count
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, int], ...]:

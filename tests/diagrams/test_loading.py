@@ -179,10 +179,18 @@ def test_a_file_that_is_no_text(tmp_path):
     assert field_of(error) == str(path)
 
 
-@pytest.mark.parametrize("source", ["obstacle_fre", "no/such/file.yaml", ""])
-def test_unknown_scenarios_name_the_known(source):
-    with pytest.raises(InputError, match="obstacle_free") as error:
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("obstacle_fre", "did you mean 'obstacle_free'"),
+        ("no/such/file.yaml", "no file no/such/file.yaml; check the path"),
+        ("", "is not known"),
+    ],
+)
+def test_unknown_scenarios_say_where_the_known_are(source, message):
+    with pytest.raises(InputError, match=message) as error:
         load_scenario(source)
+    assert "phonotaxis scenarios" in error.value.message
     assert field_of(error) == "scenario"
 
 

@@ -20,6 +20,7 @@ from analysis.sweeps.summary import sweep_summary, sweep_text
 SUCCESS, COLLISION, CLEARANCE, _ = QUANTITIES
 SPEED, X = "source.speed_m_s", "obstacles.0.waypoints_m"
 PLACES = [[[2.0, 1.0]], [[3.0, 1.0]]]
+BOXES = {"count": [1, 2], "x_m": [2.0, 3.0], "y_m": [1.0, 2.0], "side_m": [0.1, 0.2]}
 
 
 def made_up(**changes):
@@ -42,7 +43,7 @@ def made_up(**changes):
             "redraws": 0,
             "law": [point.fields.get("law", "none") for point in points],
             SPEED: [point.fields[SPEED] for point in points],
-            X: [str(point.fields[X]) for point in points],
+            X: [str(point.fields.get(X)) for point in points],
             "cause": "completed",
             "collision_object": None,
             "collision_fault": None,
@@ -140,6 +141,8 @@ def test_summary_counts_and_names_failures(tmp_path):
         ({"grid": {}}, 2),
         ({"grid": {"law": ["none", "active"], "duration_s": [1, 2],
                    "attraction.stiffness_n_m": [1, 2, 3]}}, 4),
+        # Lists of boxes are all different: there is nothing to plot over.
+        ({"draw": {SPEED: {"uniform": [0.1, 0.5]}, "obstacles": {"boxes": BOXES}}}, 2),
     ],
 )  # fmt: skip
 def test_page_has_a_figure_for_each_field(tmp_path, changes, figures):

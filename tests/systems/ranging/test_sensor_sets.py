@@ -18,11 +18,7 @@ from systems.ranging.collision_vector import (
 )
 from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
 
-#: Han 2019, 6: three more sensors, behind.
-SIX: dict[str, Any] = {
-    "axes_deg": (30.0, 0.0, -30.0, -150.0, -180.0, -210.0),
-    "positions_m": ((0, 0), (0, 0), (0, 0), (-0.35, 0), (-0.35, 0), (-0.35, 0)),
-}
+SIX = UltrasonicParameters.model_validate({"preset": "six"})
 
 
 def sensors(**fields: Any) -> UltrasonicParameters:
@@ -46,7 +42,7 @@ def test_a_ring_of_even_number_has_one_ahead():
     ("axes", "neighbours"),
     [
         ((30.0, 0.0, -30.0), {(0, 1), (1, 2)}),
-        (SIX["axes_deg"], {(0, 1), (1, 2), (3, 4), (4, 5)}),
+        (SIX.axes_deg, {(0, 1), (1, 2), (3, 4), (4, 5)}),
         (4, {(0, 1), (1, 2), (2, 3), (3, 0)}),
         (3, set()),
         ((0.0,), set()),
@@ -101,7 +97,7 @@ def test_of_many_vectors_the_nearest_three_are_kept():
 
 
 def test_the_block_has_ports_for_its_sensors():
-    block = CollisionVector(sensors=sensors(**SIX))
+    block = CollisionVector(sensors=SIX)
     assert block.GetInputPort("ranges").size() == 6
     assert block.GetOutputPort("collision_vectors_B").size() == 6
 
@@ -118,11 +114,7 @@ def test_the_back_is_defended_by_sensors_that_look_back():
     ]
     three = simulate(load_scenario("default", scenario))
     assert three.cause == "collision"
-    back = [
-        f"ultrasonic.axes_deg={list(SIX['axes_deg'])}",
-        f"ultrasonic.positions_m={[list(p) for p in SIX['positions_m']]}",
-    ]
-    six = simulate(load_scenario("default", [*scenario, *back]))
+    six = simulate(load_scenario("default", [*scenario, "ultrasonic.preset=six"]))
     assert six.collision is None
     assert six.columns["range_5"][0] == pytest.approx(0.5, abs=0.01)
     assert {"range_6", "echo_6"} <= set(six.columns)
@@ -144,6 +136,9 @@ def test_a_ring_runs(firing):
         ({"axes_deg": (30.0, 30.0)}, "must fall from left to right"),
         ({"axes_deg": (180.0, 0.0, -180.0)}, "is a turn or more"),
         ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 places for 2"),
+        ({"preset": "five"}, "'three', 'six', 'ring_8', 'ring_12' or 'lidar'"),
+        ({"preset": ["six"]}, "'three', 'six'"),
+        ({"preset": "six", "axes_deg": 8}, "6 places for 8 sensors"),
     ],
 )
 def test_bad_sets(fields, message):

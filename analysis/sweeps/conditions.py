@@ -1,0 +1,128 @@
+"""What a sweep asks of a layout beside that it is a valid scenario."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+
+import numpy as np
+
+from analysis.runs.proximity import least_clearances
+from analysis.runs.shortest_path import shortest_path_length
+from diagrams import Scenario
+from diagrams.bodies import Body, Surroundings
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Length, NonNegativeLength, Parameters
+from systems.world.geometry import beyond_rectangle
+
+__all__ = ["Conditions"]
+
+#: Distances of what moves are looked at so often, s.
+STEP_S = 0.1
+
+
+class Conditions(Parameters):
+    """Distances that a layout keeps, and a way that it leaves open."""
+
+    start_distance_m: NonNegativeLength = 0.0
+    """No body is nearer to a robot's origin of B at time zero, m."""
+    source_distance_m: NonNegativeLength = 0.0
+    """No obstacle is ever nearer to a source, outline to outline, m."""
+    way_radius_m: Length | None = None
+    """A disc of this radius about the origin of B gets past what rests from each
+    robot's start to where P is at the follow distance, m."""
+
+    def check(self, scenario: Scenario) -> None:
+        """Looks whether a layout has what is asked.
+
+        Args:
+            scenario: The layout.
+
+        Raises:
+            InputError: It has not; names the condition.
+        """
+        if self == Conditions():
+            return
+        self._check_source(scenario)
+        for robot in scenario.all_robots:
+            around = scenario.surroundings(robot)
+            self._check_start(scenario, robot, around)
+            self._check_way(scenario, robot, around)
+
+    def _check_start(
+        self, scenario: Scenario, robot: str, around: Surroundings
+    ) -> None:
+        if not self.start_distance_m:
+            return
+        start = scenario.all_robots[robot].start.position_m
+        for name, body in around.bodies.items():
+            away = math.hypot(*beyond_rectangle(start, body.rectangle(0.0)))
+            if away < self.start_distance_m:
+                raise InputError(
+                    "require.start_distance_m",
+                    f"{name!r} is {away:.3g} m from the start of {robot!r}, less than "
+                    f"{self.start_distance_m:g} m; move it",
+                )
+
+    def _check_source(self, scenario: Scenario) -> None:
+        obstacles = [Body(each.path(), each.size_m) for each in scenario.obstacles]
+        if not self.source_distance_m or not obstacles:
+            return
+        for name, source in scenario.all_sources.items():
+            # Where it is to be: it drives there within centimetres.
+            plan = Body(source.plan(), (source.length_m, source.width_m))
+            moves = any(body.path.moves for body in (plan, *obstacles))
+            times = np.arange(0.0, scenario.duration_s if moves else STEP_S, STEP_S)
+            least = least_clearances(
+                plan.rectangles(times - source.start_time_s),
+                np.stack([body.rectangles(times) for body in obstacles]),
+            )[1]
+            nearest = int(np.argmin(least))
+            if least[nearest] < self.source_distance_m:
+                raise InputError(
+                    "require.source_distance_m",
+                    f"{scenario.obstacles[nearest].name!r} comes within "
+                    f"{max(least[nearest], 0.0):.3g} m of {name!r}, less than "
+                    f"{self.source_distance_m:g} m; move one",
+                )
+
+    def _check_way(self, scenario: Scenario, robot: str, around: Surroundings) -> None:
+        if self.way_radius_m is None:
+            return
+        own = scenario.all_robots[robot]
+        goal = around.followed.path.pose(scenario.duration_s)[:2]
+        reach = own.attraction.follow_distance_m + own.robot.control_point_m
+        boxes = tuple(
+            tuple(body.rectangle(0.0).tolist())
+            for _, body in _resting(around.obstacles)
+        )
+        start = own.start.position_m
+        if not _has_way(start, goal, reach, boxes, self.way_radius_m):
+            raise InputError(
+                "require.way_radius_m",
+                f"what rests leaves a disc of {self.way_radius_m:g} m no way from the "
+                f"start of {robot!r} to {around.target!r}; move some of it, or lower "
+                "the radius",
+            )
+
+
+def _resting(bodies: Mapping[str, Body]) -> Iterator[tuple[str, Body]]:
+    return ((name, body) for name, body in bodies.items() if not body.path.moves)
+
+
+# Cells of a grid that share their draws ask the same again.
+@lru_cache(maxsize=16)
+def _has_way(
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    reach: float,
+    boxes: tuple[tuple[float, ...], ...],
+    radius: float,
+) -> bool:
+    rectangles = np.array(boxes).reshape(-1, 5)
+    # The shortest way begins with less room where the start has no more.
+    away = (math.hypot(*beyond_rectangle(start, box)) for box in rectangles)
+    return min(away, default=math.inf) >= radius and math.isfinite(
+        shortest_path_length(start, goal, reach, rectangles, radius)
+    )

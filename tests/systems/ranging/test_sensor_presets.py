@@ -1,0 +1,170 @@
+"""Named sets of sensors: what they see, and how they are chosen and changed."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from analysis.sweeps.plan import SweepPlan
+from analysis.sweeps.sweep import reproducing_command
+from diagrams import Scenario, dump_scenario, load_scenario, simulate
+from systems.ranging.sensor_presets import SENSOR_PRESETS
+from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+
+RINGS = ("ring_8", "ring_12", "lidar")
+MAST, CONTROL_POINT_M = (-0.175, 0.0), 0.175
+POSE = (0.7, -0.4, 0.3)
+
+
+def sensors(preset: str, **fields: object) -> UltrasonicParameters:
+    return UltrasonicParameters.model_validate({"preset": preset, **fields})
+
+
+def chosen(tmp_path: Path, text: str, *overrides: str) -> UltrasonicParameters:
+    path = tmp_path / "scene.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_scenario(path, overrides).ultrasonic
+
+
+def saved(tmp_path: Path, scenario: Scenario) -> Path:
+    path = tmp_path / "saved.yaml"
+    path.write_text(dump_scenario(scenario), encoding="utf-8")
+    return path
+
+
+def test_three_is_what_there_is_by_default():
+    assert sensors("three") == UltrasonicParameters()
+
+
+@pytest.mark.parametrize("name", RINGS)
+def test_a_ring_sees_a_body_at_every_bearing(name):
+    """A post of 2 cm, 1.5 m from the axle: each echo is its near side, to a cm."""
+    ring = sensors(name)
+    for degrees in np.arange(0.0, 360.0, 1.0):
+        angle = math.radians(degrees)
+        x, y = POSE[0] + 1.5 * math.cos(angle), POSE[1] + 1.5 * math.sin(angle)
+        post = np.array([[x, y, angle, 0.02, 0.02]])
+        found = cone_ranges(POSE, post, ring, CONTROL_POINT_M)
+        assert found.min() == pytest.approx(1.49, abs=1e-9), degrees
+        heading = ring.axes[int(np.argmin(found))] + POSE[2]
+        off = abs(math.remainder(heading - angle, 2.0 * math.pi))
+        half = math.radians(ring.beam_half_angle_deg) + 0.01 / 1.49
+        assert off <= half, "one that looks there"
+
+
+def test_the_papers_three_do_not():
+    behind = np.array([[POSE[0] - 1.5, POSE[1], 0.0, 0.02, 0.02]])
+    found = cone_ranges((*POSE[:2], 0.0), behind, sensors("three"), CONTROL_POINT_M)
+    assert np.all(np.isinf(found))
+
+
+@pytest.mark.parametrize("name", RINGS)
+def test_a_ring_has_no_gaps_and_stands_over_the_axle(name):
+    ring = sensors(name)
+    assert 2.0 * ring.beam_half_angle_deg == pytest.approx(360.0 / ring.count)
+    assert set(ring.places) == {MAST}
+    assert len(ring.neighbours) == ring.count
+
+
+def test_three_of_six_look_back_from_the_rear_edge():
+    six = sensors("six")
+    turned = [math.remainder(axis, 360.0) for axis in six.axes_deg[3:]]
+    assert turned == [-150.0, -180.0, 150.0]
+    assert six.places[3:] == ((-0.35, 0.0),) * 3
+    assert (six.axes_deg[:3], six.places[:3]) == ((30.0, 0.0, -30.0), ((0.0, 0.0),) * 3)
+
+
+def test_a_lidar_is_farther_and_noisier():
+    lidar = sensors("lidar")
+    assert (lidar.maximum_range_m, lidar.noise_m) == (5.0, 0.01)
+
+
+def test_what_is_given_beside_a_preset_wins(tmp_path):
+    text = "ultrasonic: {noise_m: 0.002, preset: lidar, maximum_range_m: 4}"
+    found = chosen(tmp_path, text)
+    assert found == sensors("lidar", noise_m=0.002, maximum_range_m=4.0)
+    assert (found.noise_m, found.maximum_range_m, found.count) == (0.002, 4.0, 72)
+
+
+@pytest.mark.parametrize("first", ["noise", "preset"])
+def test_the_order_on_the_command_line_does_not_matter(tmp_path, first):
+    words = ["ultrasonic.noise_m=0.002", "ultrasonic.preset=lidar"]
+    if first == "preset":
+        words.reverse()
+    expected = sensors("lidar", noise_m=0.002)
+    assert load_scenario("default", words).ultrasonic == expected
+    path = saved(tmp_path, load_scenario("default", ["ultrasonic.preset=ring_8"]))
+    assert load_scenario(path, words).ultrasonic == expected
+
+
+def test_fields_of_a_file_win_over_a_preset_of_the_command_line(tmp_path):
+    found = chosen(tmp_path, "ultrasonic: {noise_m: 0.002}", "ultrasonic.preset=lidar")
+    assert found == sensors("lidar", noise_m=0.002)
+
+
+@pytest.mark.parametrize("name", SENSOR_PRESETS)
+def test_a_saved_scenario_has_the_effective_values(tmp_path, name):
+    scenario = load_scenario("default", [f"ultrasonic.preset={name}"])
+    path = saved(tmp_path, scenario)
+    assert load_scenario(path) == scenario
+    text = path.read_text("utf-8")
+    assert f"preset: {name}" in text
+    assert f"beam_half_angle_deg: {sensors(name).beam_half_angle_deg}" in text
+    # Another preset takes the place of all of them.
+    other = load_scenario(path, ["ultrasonic.preset=ring_12"])
+    assert other.ultrasonic == sensors("ring_12")
+
+
+def test_a_ring_of_any_number_on_the_mast():
+    assert set(sensors("ring_12", axes_deg=16).places) == {MAST}
+    assert sensors("ring_12", axes_deg=16).count == 16
+
+
+def test_each_robot_may_have_another():
+    robots = "robots={robot: {}, second: {ultrasonic: {preset: ring_8}, start: "
+    robots += "{position_m: [-2, -1]}}}"
+    words = [robots, "ultrasonic.noise_m=0.003"]
+    scenario = load_scenario("default", words)
+    assert scenario.all_robots["second"].ultrasonic == sensors("ring_8")
+    assert scenario.all_robots["robot"].ultrasonic == sensors("three", noise_m=0.003)
+
+
+def test_a_robot_may_be_named_preset():
+    words = ["robots={robot: {}}", "robots.preset={start: {position_m: [-2, -1]}}"]
+    assert set(load_scenario("default", words).all_robots) == {"robot", "preset"}
+
+
+def test_a_sweep_goes_through_presets(tmp_path):
+    names = list(SENSOR_PRESETS)
+    plan = SweepPlan.model_validate(
+        {
+            "set": {"hearing": "ideal"},
+            "grid": {"ultrasonic.preset": names, "ultrasonic.period_s": [0.05]},
+        }
+    )
+    points = plan.points()
+    expected = [sensors(name, period_s=0.05) for name in names]
+    assert [plan.scenario_of(point).ultrasonic for point in points] == expected
+    assert "ultrasonic.preset" in reproducing_command(tmp_path, points[0], "drake")
+
+
+@pytest.mark.parametrize(
+    "fixed", [{"ultrasonic.noise_m": 0.002}, {"ultrasonic": {"noise_m": 0.002}}]
+)
+def test_a_sweep_whose_preset_would_drop_what_is_set_is_refused(fixed):
+    plan = {"set": fixed, "grid": {"ultrasonic.preset": ["three", "six"]}}
+    what = r"grid\.ultrasonic\.preset: begins ultrasonic anew"
+    with pytest.raises(ValidationError, match=what):
+        SweepPlan.model_validate(plan)
+
+
+@pytest.mark.parametrize("name", SENSOR_PRESETS)
+def test_every_preset_runs(name):
+    words = ["hearing=ideal", f"ultrasonic.preset={name}", "duration_s=2"]
+    result = simulate(load_scenario("two_static_obstacles", words))
+    assert result.simulated_s == pytest.approx(2.0)
+    assert f"range_{sensors(name).count}" in result.columns
