@@ -21,7 +21,7 @@ from systems.framework.step_block import RunFacts, Step
 from systems.laws.impedance import AttractionParameters
 from systems.laws.law import Equation, Law
 from systems.planning.way import OCCUPIED, UNKNOWN, Way, find_way, make_way
-from systems.safety.free_space import FreeSpace, make_free_space
+from systems.safety.free_space import FreeSpace, edge_cells, make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
 
 __all__ = ["GUARDED", "GuardedController", "GuardedParameters"]
@@ -47,7 +47,8 @@ class GuardedParameters(Parameters):
 (
     TICK, V, OMEGA, MODE, SINCE, BLOCKED, PLANNED, CARROT_X, CARROT_Y,
     LEFT, LOOK, AHEAD, STARTED, MOVED_X, MOVED_Y, MOVED_S, MARK, BACK,
-) = range(18)
+    BLOCK_X, BLOCK_Y,
+) = range(20)
 #: What it does.
 WAITING, DRIVING, LOOKING, BACKING = range(4)
 
@@ -95,7 +96,7 @@ def carrot(
             if way.price[i, j] > highest:
                 clear = False
                 break
-        if clear:
+        if clear or distance < 0.4:
             best_x, best_y = px, py
         elif k > 30:
             break
@@ -114,6 +115,30 @@ def guarded_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-unty
     m = numbers.memory
     twist[0], twist[1] = m[0, V], m[0, OMEGA]
     plan[0], plan[1], plan[2], plan[3] = m[0, MODE], m[0, CARROT_X], m[0, CARROT_Y], m[0, LEFT]
+
+
+@njit(cache=True)
+def mark(way, m, time):
+    k = int(m[0, MARK]) % len(way.marks)
+    way.marks[k, 0], way.marks[k, 1] = m[0, BLOCK_X], m[0, BLOCK_Y]
+    way.marks[k, 2] = time + 20.0
+    m[0, MARK] += 1.0
+
+
+@njit(cache=True)
+def blocking(space, x, y, theta, radius):
+    """Middle of the cell that is not free and nearest to where the robot would go."""
+    corners = np.empty((1000, 2))
+    count = edge_cells(space, x, y, radius + 0.3, space.facts[0, 2], corners)
+    ax, ay = x + 0.1 * math.cos(theta), y + 0.1 * math.sin(theta)
+    best, bx, by = np.inf, ax, ay
+    half = 0.5 * space.cell_m
+    for k in range(min(count, 1000)):
+        cx, cy = corners[k, 0] + half, corners[k, 1] + half
+        d = math.hypot(cx - ax, cy - ay)
+        if d < best:
+            best, bx, by = d, cx, cy
+    return bx, by
 
 
 @njit
@@ -165,36 +190,39 @@ def guarded_twist(
         if first or time - m[0, BLOCKED] > own.blocked_s:
             mode = LOOKING
             m[0, SINCE], m[0, LOOK], m[0, AHEAD] = time, 0.0, bearing
+            m[0, BLOCK_X], m[0, BLOCK_Y] = np.inf, np.inf
             if first:
                 m[0, STARTED] = -1.0
-                m[0, LOOK] = 10.0
+            else:
+                bx, by = blocking(space, x, y, theta, radius)
+                m[0, BLOCK_X], m[0, BLOCK_Y] = bx, by
+                m[0, AHEAD] = math.atan2(by - py, bx - px)
     v, omega = 0.0, 0.0
     if mode == LOOKING:
-        # Looks to one side and to the other, farther if that was not enough.
-        look = int(m[0, LOOK])
-        wide = 0.4 if look >= 10 else (0.6 if look < 2 else (1.2 if look < 4 else 2.2))
-        side = 1.0 if look % 2 == 0 else -1.0
+        # Looks past both sides of what blocks the way.
+        wide = 0.4 if m[0, BLOCK_X] == np.inf else 0.6
+        side = 1.0 if m[0, LOOK] == 0.0 else -1.0
         to = _wrap(m[0, AHEAD] + side * wide - theta)
+        if m[0, LOOK] == 0.0 and abs(to) > abs(_wrap(m[0, AHEAD] - wide - theta)):
+            # The nearer side first.
+            m[0, LOOK] = 2.0
+        if m[0, LOOK] >= 2.0:
+            side = -1.0 if m[0, LOOK] == 2.0 else 1.0
+            to = _wrap(m[0, AHEAD] + side * wide - theta)
         omega = min(max(4.0 * to, -own.top_turn_rad_s), own.top_turn_rad_s)
-        if abs(to) < 0.08:
+        if abs(to) < 0.1:
             m[0, LOOK] += 1.0
-            if look in (1, 3, 11):
-                mode, m[0, BLOCKED] = DRIVING, time
-                m[0, PLANNED] = -9.0
-            if look >= 5 and look < 10:
-                mode, m[0, BLOCKED] = DRIVING, time
-                m[0, PLANNED] = -9.0
-        if mode == DRIVING and look in (1, 3):
-            # Not looked wider unless it is blocked again soon.
-            m[0, LOOK] = look + 1.0
+            if m[0, LOOK] == 2.0 or m[0, LOOK] == 4.0:
+                mode, m[0, BLOCKED], m[0, PLANNED] = DRIVING, time, -9.0
+                if m[0, BLOCK_X] < np.inf:
+                    mark(way, m, time)
+        if m[0, BLOCK_X] < np.inf and report[1] > 0.03:
+            mode, m[0, BLOCKED], m[0, PLANNED] = DRIVING, time, -9.0
     if mode == DRIVING:
         if time - m[0, MOVED_S] > own.give_up_s:
-            k = int(m[0, MARK]) % len(way.marks)
-            heading = bearing
-            way.marks[k, 0] = x + (radius + 0.1) * math.cos(heading)
-            way.marks[k, 1] = y + (radius + 0.1) * math.sin(heading)
-            way.marks[k, 2] = time + 20.0
-            m[0, MARK] += 1.0
+            m[0, BLOCK_X] = x + (radius + 0.1) * math.cos(bearing)
+            m[0, BLOCK_Y] = y + (radius + 0.1) * math.sin(bearing)
+            mark(way, m, time)
             m[0, PLANNED], m[0, MOVED_S] = -9.0, time
             mode, m[0, BACK] = BACKING, time
         weave = 0.0
@@ -253,7 +281,7 @@ class GuardedController(LeafSystem):
         own = repulsion.guarded if repulsion is not None else GuardedParameters()
         self._tick_s = tick_s
         self.set_name("guarded_controller")
-        memory = np.zeros((1, 18))
+        memory = np.zeros((1, 20))
         memory[0, TICK] = -1.0
         self._numbers = GuardedNumbers(
             memory, make_way(known.cells), make_free_space(1, known.cell_m, 1, 2), own,

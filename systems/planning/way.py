@@ -14,7 +14,7 @@ from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
 __all__ = ["PRICES", "Way", "find_way", "make_way"]
 
 #: Price of a cell: seen free, unknown, near what echoed now and then, and often.
-PRICES = FREE, UNKNOWN, DOUBTFUL, OCCUPIED = 2, 3, 14, 82
+PRICES = FREE, UNKNOWN, NEAR, DOUBTFUL, OCCUPIED = 2, 3, 7, 14, 82
 #: Hits of a cell that make it doubtful, and occupied.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
 #: Of a step to a cell beside and to one across the corner, times its price.
@@ -143,7 +143,7 @@ def _set_prices(
     clear_m: float,
 ) -> None:  # pragma: no cover  (compiled)
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
-    reach = math.ceil(radius / cell)
+    reach, wide = math.ceil(radius / cell), radius + 0.15
     for i in range(size):
         for j in range(size):
             way.price[i, j] = FREE
@@ -164,6 +164,7 @@ def _set_prices(
             if math.hypot(x - goal[0], y - goal[1]) < clear_m:
                 continue
             price = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
+            _widen(way, i, j, math.ceil(wide / cell), wide / cell, NEAR)
             _widen(way, i, j, reach, radius / cell, price)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
