@@ -121,7 +121,7 @@ def guarded_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-unty
 def mark(way, m, time):
     k = int(m[0, MARK]) % len(way.marks)
     way.marks[k, 0], way.marks[k, 1] = m[0, BLOCK_X], m[0, BLOCK_Y]
-    way.marks[k, 2] = time + 20.0
+    way.marks[k, 2] = time + 10.0
     m[0, MARK] += 1.0
 
 
@@ -286,7 +286,7 @@ class GuardedController(LeafSystem):
         self._numbers = GuardedNumbers(
             memory, make_way(known.cells), make_free_space(1, known.cell_m, 1, 2), own,
             (attraction or AttractionParameters()).follow_distance_m,
-            robot.control_point_m, body_radius(robot) + 0.06, tick_s,
+            robot.control_point_m, body_radius(robot) + 0.02, tick_s,
         )
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)

@@ -14,9 +14,11 @@ from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
 __all__ = ["PRICES", "Way", "find_way", "make_way"]
 
 #: Price of a cell: seen free, unknown, near what echoed now and then, and often.
-PRICES = FREE, UNKNOWN, NEAR, DOUBTFUL, OCCUPIED = 2, 3, 7, 14, 82
+PRICES = FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 #: Hits of a cell that make it doubtful, and occupied.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
+#: So much farther off than it has to be, the disc is tight, or near, m.
+_TIGHT_M, _NEAR_M = 0.07, 0.19
 #: Of a step to a cell beside and to one across the corner, times its price.
 _STRAIGHT, _ACROSS = 10, 14
 #: More than any step costs.
@@ -143,46 +145,47 @@ def _set_prices(
     clear_m: float,
 ) -> None:  # pragma: no cover  (compiled)
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
-    reach, wide = math.ceil(radius / cell), radius + 0.15
     for i in range(size):
         for j in range(size):
             way.price[i, j] = FREE
-    for i in range(size):
-        for j in range(size):
-            hits, seen = 0.0, True
-            for di in range(2):
-                for dj in range(2):
-                    a = (2 * (low[0] + i) + di) % cells
-                    b = (2 * (low[1] + j) + dj) % cells
-                    hits = max(hits, space.hits[a, b])
-                    seen = seen and space.free_until[a, b] != NEVER
-            if not seen:
-                way.price[i, j] = max(way.price[i, j], UNKNOWN)
+    for i in range(2 * size):
+        for j in range(2 * size):
+            at = (2 * low[0] + i) % cells, (2 * low[1] + j) % cells
+            if space.free_until[at] == NEVER:
+                way.price[i // 2, j // 2] = max(way.price[i // 2, j // 2], UNKNOWN)
+            hits = space.hits[at]
             if hits < _DOUBTFUL_HITS:
                 continue
-            x, y = (low[0] + i + 0.5) * cell, (low[1] + j + 0.5) * cell
-            if math.hypot(x - goal[0], y - goal[1]) < clear_m:
-                continue
-            price = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
-            _widen(way, i, j, math.ceil(wide / cell), wide / cell, NEAR)
-            _widen(way, i, j, reach, radius / cell, price)
+            x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
+            if math.hypot(x - goal[0], y - goal[1]) >= clear_m:
+                highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
+                _keep_off(way, (x, y), low, cell, radius, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
-            i = math.floor(way.marks[k, 0] / cell) - low[0]
-            j = math.floor(way.marks[k, 1] / cell) - low[1]
-            _widen(way, i, j, reach, radius / cell, OCCUPIED)
+            place = way.marks[k, 0], way.marks[k, 1]
+            _keep_off(way, place, low, cell, radius, OCCUPIED)
 
 
 @njit(cache=True)
-def _widen(
-    way: Way, i: int, j: int, reach: int, radius: float, price: int
+def _keep_off(
+    way: Way, place: Any, low: Any, cell: float, radius: float, highest: int
 ) -> None:  # pragma: no cover  (compiled)
-    """Gives all cells within a radius of cells at least a price."""
-    size = way.price.shape[0]
-    for a in range(max(i - reach, 0), min(i + reach, size - 1) + 1):
-        for b in range(max(j - reach, 0), min(j + reach, size - 1) + 1):
-            if (a - i) ** 2 + (b - j) ** 2 <= radius * radius:
-                way.price[a, b] = max(way.price[a, b], price)
+    """Gives the cells around a narrow cell at least the prices of their distances."""
+    size, x, y = way.price.shape[0], place[0] / cell - low[0], place[1] / cell - low[1]
+    reach = (radius + _NEAR_M) / cell
+    half = 0.25
+    for i in range(max(math.floor(x - reach), 0), min(math.ceil(x + reach), size)):
+        for j in range(max(math.floor(y - reach), 0), min(math.ceil(y + reach), size)):
+            dx, dy = max(abs(i + 0.5 - x) - half, 0), max(abs(j + 0.5 - y) - half, 0)
+            distance = math.sqrt(dx * dx + dy * dy) * cell
+            price = FREE
+            if distance < radius:
+                price = highest
+            elif distance < radius + _TIGHT_M:
+                price = TIGHT
+            elif distance < radius + _NEAR_M:
+                price = NEAR
+            way.price[i, j] = max(way.price[i, j], price)
 
 
 @njit(cache=True)
