@@ -77,29 +77,27 @@ def carrot(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Farthest point of the way that can be driven to straight."""
     points, size, cell = int(way.facts[0, 0]), way.price.shape[0], 2.0 * space.cell_m
-    first_i = (int(space.facts[0, 0]) + 1) // 2
-    first_j = (int(space.facts[0, 1]) + 1) // 2
-    best_x, best_y, highest = x, y, UNKNOWN
+    low_i, low_j = int(way.facts[0, 3]), int(way.facts[0, 4])
+    best_x, best_y, begin = x, y, -1.0
     for k in range(points):
         px, py = way.path[k, 0], way.path[k, 1]
-        i, j = math.floor(px / cell) - first_i, math.floor(py / cell) - first_j
-        highest = max(highest, way.price[i, j])
+        i, j = math.floor(px / cell) - low_i, math.floor(py / cell) - low_j
         distance = math.hypot(px - x, py - y)
+        if k == 0:
+            begin = way.cost[i, j]
         if distance > farthest and k > 1:
             break
-        steps, clear = max(1, math.ceil(2.0 * distance / cell)), True
-        for step in range(steps + 1):
-            a = x + (px - x) * step / steps
-            b = y + (py - y) * step / steps
-            i, j = math.floor(a / cell) - first_i, math.floor(b / cell) - first_j
-            i, j = min(max(i, 0), size - 1), min(max(j, 0), size - 1)
-            if way.price[i, j] > highest:
-                clear = False
-                break
-        if clear or distance < 0.4:
+        steps = max(1, math.ceil(2.0 * distance / cell))
+        price = 0.0
+        for step in range(1, steps + 1):
+            a = x + (px - x) * (step - 0.5) / steps
+            b = y + (py - y) * (step - 0.5) / steps
+            i2, j2 = math.floor(a / cell) - low_i, math.floor(b / cell) - low_j
+            i2, j2 = min(max(i2, 0), size - 1), min(max(j2, 0), size - 1)
+            price += way.price[i2, j2] / steps
+        straight = 10.0 * price * distance / cell
+        if straight <= 1.1 * (begin - way.cost[i, j]) or distance < 0.4:
             best_x, best_y = px, py
-        elif k > 30:
-            break
     return best_x, best_y
 
 

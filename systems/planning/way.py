@@ -45,7 +45,8 @@ class Way(NamedTuple):
     path: NDArray[np.float64]
     """(p, 2) middles of the cells of the way, from the robot to the goal, m."""
     facts: NDArray[np.float64]
-    """(1, 3): points of ``path``, its length, m, and the highest price on it."""
+    """(1, 5): points of ``path``, its length, m, the highest price on it, and the
+    numbers of the first of these cells on the floor."""
     marks: NDArray[np.float64]
     """(q, 3) places that were found blocked, m, and until when that counts, s."""
 
@@ -68,7 +69,7 @@ def make_way(cells: int) -> Way:
         np.zeros((8 * size * size + 1, 2), dtype=np.int32),
         np.full((_BUCKETS, 1), -1, dtype=np.int32),
         np.zeros((4 * size, 2)),
-        np.zeros((1, 3)),
+        np.zeros((1, 5)),
         np.zeros((16, 3)),
     )
 
@@ -116,6 +117,7 @@ def find_way(
             break
         at = way.towards[i, j]
     way.facts[0, 0], way.facts[0, 1], way.facts[0, 2] = points, length, dearest
+    way.facts[0, 3], way.facts[0, 4] = low
 
 
 @njit(cache=True)
