@@ -33,7 +33,7 @@ def check_guard(
         InputError: Its sensors do not serve, its grid does not, or something stands
             in its bubble.
     """
-    if robot.guard is None:
+    if robot.own_guard is None:
         return
     if robot.obstacle_sensing != "ultrasonic":
         raise InputError(
@@ -85,10 +85,11 @@ def guard_note(
     Returns:
         A line where one of them moves faster than the guard reckons with; else empty.
     """
-    if robot.guard is None or not bodies:
+    guard = robot.own_guard
+    if guard is None or not bodies:
         return ""
     speeds = {each: _top_speed(body, duration_s) for each, body in bodies.items()}
-    bound, fastest = robot.guard.obstacle_speed_m_s, max(speeds, key=speeds.__getitem__)
+    bound, fastest = guard.obstacle_speed_m_s, max(speeds, key=speeds.__getitem__)
     if speeds[fastest] <= bound:
         return ""
     return (

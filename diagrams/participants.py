@@ -16,6 +16,7 @@ from systems.framework.parameters import Angle, Parameters, Point
 from systems.hearing.ideal_source_sensor import IdealHearingParameters
 from systems.hearing.tdoa_estimator import TDOAParameters
 from systems.hearing.tracker_model import TrackerParameters
+from systems.laws.catalogue import LAWS
 from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
@@ -78,13 +79,21 @@ class FollowerParameters(Parameters):
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
     guard: GuardParameters | None = None
-    """Keeps the robot in space that its sensors have seen free, whatever the law."""
+    """Keeps the robot in space that its sensors have seen free, whatever the law; null:
+    nothing does, unless the law is ``guarded``."""
     free_space: FreeSpaceParameters = FreeSpaceParameters()
 
     @model_validator(mode="after")
     def _check_channels(self) -> FollowerParameters:
         channel_skew(self.microphones, len(self.robot.microphones_m))
         return self
+
+    @property
+    def own_guard(self) -> GuardParameters | None:
+        """``guard``, which a law that plans always has; none: nothing guards it."""
+        if self.guard is None and self.law in LAWS and LAWS[self.law].plans:
+            return GuardParameters()
+        return self.guard
 
     @property
     def size(self) -> tuple[float, float]:

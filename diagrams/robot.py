@@ -415,7 +415,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             tick_s=scenario.tick_s,
         ),
     ]
-    if scenario.guard is not None:
+    if scenario.own_guard is not None:
         known = FreeSpaceMap(
             parameters=scenario.free_space,
             sensors=scenario.ultrasonic,
@@ -428,10 +428,10 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
 
 def _driving(scenario: Scenario, controller: Any) -> Any:
     """What drives the wheels as the law commands, as far as a guard lets it."""
-    if scenario.guard is None:
+    if scenario.own_guard is None:
         return make_command(controller, scenario.robot, scenario.tick_s)
     return MotionGuard(
-        parameters=scenario.guard,
+        parameters=scenario.own_guard,
         known=scenario.free_space,
         robot=scenario.robot,
         plant=scenario.plant,

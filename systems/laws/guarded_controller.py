@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
-from numba import njit
-from numpy.typing import NDArray
+from numba.extending import register_jitable
+from pydantic import Field
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
@@ -15,231 +14,87 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
-from systems.framework.parameters import Parameters
+from systems.framework.parameters import (
+    Duration,
+    Length,
+    NonNegativeLength,
+    NonNegativeSpeed,
+    Parameters,
+    Positive,
+    Speed,
+)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.laws.impedance import AttractionParameters
 from systems.laws.law import Equation, Law
-from systems.planning.way import OCCUPIED, UNKNOWN, Way, find_way, make_way
-from systems.safety.free_space import FreeSpace, edge_cells, make_free_space
+from systems.planning.guarded_drive import (
+    AT_TICK,
+    CARROT_X,
+    CARROT_Y,
+    MEMORY,
+    MODE,
+    SPEED,
+    TURN,
+    WAY_LEFT,
+    DriveNumbers,
+    drive_guarded,
+)
+from systems.planning.way import Way, make_way
+from systems.safety.free_space import make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
 
 __all__ = ["GUARDED", "GuardedController", "GuardedParameters"]
 
 
 class GuardedParameters(Parameters):
-    """How the guarded law drives and looks."""
+    """How the guarded law drives, looks and plans."""
 
-    top_speed_m_s: float = 0.62
-    back_speed_m_s: float = 0.15
-    approach_gain: float = 1.2
-    turn_gain: float = 3.0
-    top_turn_rad_s: float = 2.0
-    carrot_m: float = 1.5
-    weave_rad: float = 0.3
-    weave_period_s: float = 2.4
-    replan_s: float = 0.5
-    blocked_s: float = 0.3
-    give_up_s: float = 5.5
-
-
-#: Places in the memory.
-(
-    TICK, V, OMEGA, MODE, SINCE, BLOCKED, PLANNED, CARROT_X, CARROT_Y,
-    LEFT, LOOK, AHEAD, STARTED, MOVED_X, MOVED_Y, MOVED_S, MARK, BACK,
-    BLOCK_X, BLOCK_Y,
-) = range(20)
-#: What it does.
-WAITING, DRIVING, LOOKING, BACKING = range(4)
-
-
-class GuardedNumbers(NamedTuple):
-    """What the step of ``GuardedController`` depends on."""
-
-    memory: NDArray[np.float64]
-    way: Way
-    space: FreeSpace
-    own: GuardedParameters
-    follow_distance_m: float
-    control_point_m: float
-    radius: float
-    tick_s: float
+    cruise_speed_m_s: Speed = 0.62
+    """Largest wanted speed, m/s."""
+    back_speed_m_s: NonNegativeSpeed = 0.15
+    """Speed of backing off, m/s."""
+    approach_gain: Positive = 1.2
+    """Wanted speed for a distance to go, 1/s."""
+    source_share: float = Field(default=0.8, ge=0.0, le=1.0)
+    """Part of the target's own speed that is added."""
+    turn_gain: Positive = 3.0
+    """Yaw rate for an error of the heading, 1/s."""
+    turn_rate_rad_s: float = Field(default=2.0, gt=0.0, le=20.0)
+    """Largest wanted yaw rate, rad/s."""
+    look_ahead_m: Length = 1.5
+    """It heads for points of its way no farther away, m."""
+    weave_rad: float = Field(default=0.3, ge=0.0, le=1.5)
+    """It weaves by so much to both sides, so that its sensors sweep, rad."""
+    weave_period_s: Duration = 2.4
+    """Period of that, s."""
+    replan_s: Duration = 0.5
+    """Time from one plan to the next, s."""
+    patience_s: Duration = 0.3
+    """Blocked by the guard for so long, it looks at what blocks it, s."""
+    give_up_s: Duration = 5.5
+    """It stays for so long at most, then it marks what is ahead and backs off, s."""
+    mark_s: Duration = 10.0
+    """For so long it seeks ways that keep off what has blocked it, s."""
+    clearance_m: NonNegativeLength = 0.02
+    """By so much ways keep the disc that holds the body off echoes, m."""
+    source_clearance_m: NonNegativeLength = 0.85
+    """Echoes from so near to the target are the target's, m."""
 
 
-@njit(cache=True)
-def _wrap(angle: float) -> float:  # pragma: no cover  (compiled)
-    return (angle + math.pi) % math.tau - math.pi
+def guarded_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: DriveNumbers
+) -> None:
+    """The twist of one tick; see ``systems.framework.step_block.Step``.
 
-
-@njit(cache=True)
-def carrot(
-    way: Way, space: FreeSpace, x: float, y: float, farthest: float
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
-    """Farthest point of the way that can be driven to straight."""
-    points, size, cell = int(way.facts[0, 0]), way.price.shape[0], 2.0 * space.cell_m
-    low_i, low_j = int(way.facts[0, 3]), int(way.facts[0, 4])
-    best_x, best_y, begin = x, y, -1.0
-    for k in range(points):
-        px, py = way.path[k, 0], way.path[k, 1]
-        i, j = math.floor(px / cell) - low_i, math.floor(py / cell) - low_j
-        distance = math.hypot(px - x, py - y)
-        if k == 0:
-            begin = way.cost[i, j]
-        if distance > farthest and k > 1:
-            break
-        steps = max(1, math.ceil(2.0 * distance / cell))
-        price = 0.0
-        for step in range(1, steps + 1):
-            a = x + (px - x) * (step - 0.5) / steps
-            b = y + (py - y) * (step - 0.5) / steps
-            i2, j2 = math.floor(a / cell) - low_i, math.floor(b / cell) - low_j
-            i2, j2 = min(max(i2, 0), size - 1), min(max(j2, 0), size - 1)
-            price += way.price[i2, j2] / steps
-        straight = 10.0 * price * distance / cell
-        if straight <= 1.1 * (begin - way.cost[i, j]) or distance < 0.4:
-            best_x, best_y = px, py
-    return best_x, best_y
-
-
-def guarded_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
-    """The twist of one tick; see ``systems.framework.step_block.Step``."""
-    target, velocity, valid, pose, report, _ = inputs
-    twist, plan = outputs
-    guarded_twist(
-        tick, target, velocity, valid[0], pose, report, numbers.memory, numbers.way,
-        numbers.space, numbers.own, numbers.follow_distance_m, numbers.control_point_m,
-        numbers.radius, numbers.tick_s,
-    )
-    m = numbers.memory
-    twist[0], twist[1] = m[0, V], m[0, OMEGA]
-    plan[0], plan[1], plan[2], plan[3] = m[0, MODE], m[0, CARROT_X], m[0, CARROT_Y], m[0, LEFT]
-
-
-@njit(cache=True)
-def mark(way, m, time):
-    k = int(m[0, MARK]) % len(way.marks)
-    way.marks[k, 0], way.marks[k, 1] = m[0, BLOCK_X], m[0, BLOCK_Y]
-    way.marks[k, 2] = time + 10.0
-    m[0, MARK] += 1.0
-
-
-@njit(cache=True)
-def blocking(space, x, y, theta, radius):
-    """Middle of the cell that is not free and nearest to where the robot would go."""
-    corners = np.empty((1000, 2))
-    count = edge_cells(space, x, y, radius + 0.3, space.facts[0, 2], corners)
-    ax, ay = x + 0.1 * math.cos(theta), y + 0.1 * math.sin(theta)
-    best, bx, by = np.inf, ax, ay
-    half = 0.5 * space.cell_m
-    for k in range(min(count, 1000)):
-        cx, cy = corners[k, 0] + half, corners[k, 1] + half
-        d = math.hypot(cx - ax, cy - ay)
-        if d < best:
-            best, bx, by = d, cx, cy
-    return bx, by
-
-
-@njit
-def guarded_twist(
-    tick, target, velocity, valid, pose, report, m, way, space, own, follow, offset,
-    radius, tick_s,
-):
-    time = tick * tick_s
-    x, y, theta = pose[0], pose[1], pose[2]
-    if m[0, TICK] < 0.0:
-        m[0, SINCE], m[0, BLOCKED], m[0, PLANNED], m[0, STARTED] = time, time, -9.0, time
-        m[0, MOVED_X], m[0, MOVED_Y], m[0, MOVED_S] = x, y, time
-        m[0, CARROT_X], m[0, CARROT_Y] = x + math.cos(theta), y + math.sin(theta)
-    m[0, TICK] = tick
-    if valid < 0.5:
-        m[0, V], m[0, OMEGA], m[0, MODE] = 0.0, 0.0, WAITING
-        m[0, STARTED] = time if m[0, STARTED] >= 0.0 else m[0, STARTED]
-        m[0, BLOCKED] = time
-        return
-    px, py = x + offset * math.cos(theta), y + offset * math.sin(theta)
-    distance = math.hypot(target[0] - px, target[1] - py)
-    if time - m[0, PLANNED] >= own.replan_s - 1e-9:
-        goal = target[0], target[1]
-        find_way(way, space, (x, y), goal, time, radius, 0.85)
-        m[0, PLANNED], m[0, LEFT] = time, way.facts[0, 1]
-    cx, cy = carrot(way, space, x, y, own.carrot_m)
-    left = max(distance, m[0, LEFT] - offset)
-    if way.facts[0, 2] < 14.0 and m[0, LEFT] < 1.15 * math.hypot(target[0] - x, target[1] - y):
-        left = distance
-        if distance < follow + 0.6:
-            cx, cy = target[0], target[1]
-    m[0, CARROT_X], m[0, CARROT_Y] = cx, cy
-    bearing = math.atan2(cy - y, cx - x)
-    error = _wrap(bearing - theta)
-    source_speed = math.hypot(velocity[0], velocity[1])
-    along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    wanted = own.approach_gain * (left - follow) + 0.8 * along
-    wanted = min(max(wanted, -own.back_speed_m_s), own.top_speed_m_s)
-    near = abs(left - follow) < 0.2 and source_speed < 0.1
-    # Progress.
-    if math.hypot(x - m[0, MOVED_X], y - m[0, MOVED_Y]) > 0.15 or near:
-        m[0, MOVED_X], m[0, MOVED_Y], m[0, MOVED_S] = x, y, time
-    if report[0] < 1.5 or near or wanted < 0.05:
-        m[0, BLOCKED] = time
-    mode = m[0, MODE]
-    if mode == WAITING or mode == DRIVING:
-        mode = DRIVING
-        first = m[0, STARTED] >= 0.0
-        if first or time - m[0, BLOCKED] > own.blocked_s:
-            mode = LOOKING
-            m[0, SINCE], m[0, LOOK], m[0, AHEAD] = time, 0.0, bearing
-            m[0, BLOCK_X], m[0, BLOCK_Y] = np.inf, np.inf
-            if first:
-                m[0, STARTED] = -1.0
-            else:
-                bx, by = blocking(space, x, y, theta, radius)
-                m[0, BLOCK_X], m[0, BLOCK_Y] = bx, by
-                m[0, AHEAD] = math.atan2(by - py, bx - px)
-    v, omega = 0.0, 0.0
-    if mode == LOOKING:
-        # Looks past both sides of what blocks the way.
-        wide = 0.4 if m[0, BLOCK_X] == np.inf else 0.6
-        side = 1.0 if m[0, LOOK] == 0.0 else -1.0
-        to = _wrap(m[0, AHEAD] + side * wide - theta)
-        if m[0, LOOK] == 0.0 and abs(to) > abs(_wrap(m[0, AHEAD] - wide - theta)):
-            # The nearer side first.
-            m[0, LOOK] = 2.0
-        if m[0, LOOK] >= 2.0:
-            side = -1.0 if m[0, LOOK] == 2.0 else 1.0
-            to = _wrap(m[0, AHEAD] + side * wide - theta)
-        omega = min(max(4.0 * to, -own.top_turn_rad_s), own.top_turn_rad_s)
-        if abs(to) < 0.1:
-            m[0, LOOK] += 1.0
-            if m[0, LOOK] == 2.0 or m[0, LOOK] == 4.0:
-                mode, m[0, BLOCKED], m[0, PLANNED] = DRIVING, time, -9.0
-                if m[0, BLOCK_X] < np.inf:
-                    mark(way, m, time)
-        if m[0, BLOCK_X] < np.inf and report[1] > 0.03:
-            mode, m[0, BLOCKED], m[0, PLANNED] = DRIVING, time, -9.0
-    if mode == DRIVING:
-        if time - m[0, MOVED_S] > own.give_up_s:
-            m[0, BLOCK_X] = x + (radius + 0.1) * math.cos(bearing)
-            m[0, BLOCK_Y] = y + (radius + 0.1) * math.sin(bearing)
-            mark(way, m, time)
-            m[0, PLANNED], m[0, MOVED_S] = -9.0, time
-            mode, m[0, BACK] = BACKING, time
-        weave = 0.0
-        if not near:
-            weave = own.weave_rad * math.sin(math.tau * time / own.weave_period_s)
-        omega = own.turn_gain * _wrap(error + weave)
-        omega = min(max(omega, -own.top_turn_rad_s), own.top_turn_rad_s)
-        if wanted > 0.0:
-            v = wanted * max(0.0, math.cos(error)) if abs(error) < 1.0 else 0.0
-        else:
-            v = wanted
-            omega = own.turn_gain * error
-        if near and abs(error) < 0.1:
-            omega = own.turn_gain * error * 0.5
-    if mode == BACKING:
-        v = -own.back_speed_m_s
-        if time - m[0, BACK] > 2.0:
-            mode, m[0, MOVED_S], m[0, BLOCKED] = DRIVING, time, time
-    m[0, V], m[0, OMEGA], m[0, MODE] = v, omega, mode
+    Args:
+        tick: Number of the tick.
+        state: None: all is in ``numbers``.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``DriveNumbers``.
+    """
+    drive_guarded(tick, inputs, numbers)
+    _tell(numbers.memory, outputs)
 
 
 class GuardedController(LeafSystem):
@@ -258,6 +113,30 @@ class GuardedController(LeafSystem):
         output_ports:
         - twist_B [m/s, rad/s]
         - plan [number of what it does, m, m, m]
+
+    Every ``replan_s`` it seeks the cheapest way for the disc that holds the body:
+    unknown cells cost a little more than those seen free, what echoed much more. It
+    drives towards the farthest point of the way that is worth driving to straight, at a
+    speed for the way to go, and weaves, so that narrow cones sweep what lies beside it.
+    Before it first moves it looks to both sides. Where the guard lets it not go on, it
+    looks past both sides of the cell that blocks; if that stays unseen, ways keep off
+    it for a time. What stays all the same backs off.
+
+    ``plan``: 0 no target, 1 driving, 2 looking, 3 backing off; the point it heads for,
+    and the way to go. It needs the guard: by itself it keeps off nothing.
+
+    Abstract state: the memory of ``systems.planning.guarded_drive`` and the way. Rate
+    and latency: a function of state and present inputs, at every tick; no latency.
+
+    Args:
+        robot: Its body, and place of P.
+        attraction: The follow distance.
+        repulsion: ``RepulsionParameters``; uses ``guarded``.
+        sensors: Not used: what they see is in the map.
+        known: Grid of the map.
+        tick_s: Period of the controller, s.
+
+    Reference: ours; docs/safety.md.
     """
 
     FACTS = BlockFacts(
@@ -270,50 +149,120 @@ class GuardedController(LeafSystem):
     )
 
     def __init__(
-        self, *, robot=None, attraction=None, repulsion=None, sensors=None,
-        known=None, tick_s: float = TICK_S,
+        self,
+        *,
+        robot: RobotParameters | None = None,
+        attraction: AttractionParameters | None = None,
+        repulsion: Any = None,
+        sensors: Any = None,
+        known: FreeSpaceParameters | None = None,
+        tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        robot = robot or RobotParameters()
-        known = known or FreeSpaceParameters()
-        own = repulsion.guarded if repulsion is not None else GuardedParameters()
+        robot, known = robot or RobotParameters(), known or FreeSpaceParameters()
+        own = GuardedParameters() if repulsion is None else repulsion.guarded
         self._tick_s = tick_s
         self.set_name("guarded_controller")
-        memory = np.zeros((1, 20))
-        memory[0, TICK] = -1.0
-        self._numbers = GuardedNumbers(
-            memory, make_way(known.cells), make_free_space(1, known.cell_m, 1, 2), own,
+        memory = np.zeros((1, MEMORY))
+        memory[0, AT_TICK] = -1.0
+        self._numbers = DriveNumbers(
+            memory,
+            make_way(known.cells),
+            make_free_space(1, known.cell_m, 1, 2),
+            own,
             (attraction or AttractionParameters()).follow_distance_m,
-            robot.control_point_m, body_radius(robot) + 0.02, tick_s,
+            robot.control_point_m,
+            body_radius(robot) + known.place_error_m + own.clearance_m,
+            tick_s,
         )
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)
             for name, size in (
-                ("p_WS_estimated", 2), ("v_WS_estimated", 2), ("target_valid", 1),
-                ("pose_WB_estimated", 3), ("guard_report", 4),
+                ("p_WS_estimated", 2),
+                ("v_WS_estimated", 2),
+                ("target_valid", 1),
+                ("pose_WB_estimated", 3),
+                ("guard_report", 4),
             )
         ]
         self._free_space = self.DeclareAbstractInputPort(
             name="free_space", model_value=Value(object())
         )
-        for name, size in (("twist_B", 2), ("plan", 4)):
-            self.DeclareVectorOutputPort(name=name, size=size, calc=lambda c, o: None)
+        self.DeclareAbstractState(Value(_copied(self._numbers)))
+        self.DeclarePeriodicUnrestrictedUpdateEvent(
+            period_sec=tick_s, offset_sec=0.0, update=self._remember
+        )
+        ports = *self._inputs, self._free_space
+        sources = {port.ticket() for port in ports}
+        sources |= {self.time_ticket(), self.xa_ticket()}
+        self._decided: Any = declare_cache(self, "decided", self._decide, sources)
+        for place, (name, size) in enumerate((("twist_B", 2), ("plan", 4))):
+
+            def calc(context: Any, output: Any, place: int = place) -> None:
+                output.SetFromVector(self._decided.Eval(context)[1][place])
+
+            self.DeclareVectorOutputPort(
+                name=name,
+                size=size,
+                calc=calc,
+                prerequisites_of_calc={self._decided.ticket()},
+            )
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        n = self._numbers
-        way = Way(*(np.copy(each) for each in n.way))
+        memory, way = _copied(self._numbers)
         space = run.carried["free_space"](0)
-        return Step(
-            guarded_step, n._replace(memory=np.copy(n.memory), way=way, space=space)
-        )
+        numbers = self._numbers._replace(memory=memory, way=way, space=space)
+        return Step(guarded_step, numbers)
+
+    def _decide(self, context: Any) -> tuple[Any, Any]:
+        """Memory and way, and the outputs."""
+        state: Any = context.get_abstract_state(0).get_value()
+        tick = round(context.get_time() / self._tick_s)
+        numbers = self._numbers._replace(memory=state[0], way=state[1])
+        outputs = np.zeros(2), np.zeros(4)
+        # What was decided at this tick is not decided twice.
+        if state[0][0, AT_TICK] != tick:
+            memory, way = _copied(numbers)
+            numbers = numbers._replace(memory=memory, way=way)
+            inputs = read_arrays(context, self._inputs)
+            space: Any = self._free_space.Eval(context)
+            guarded_step(tick, (), inputs, outputs, numbers._replace(space=space))
+        else:
+            _tell(numbers.memory, outputs)
+        return (numbers.memory, numbers.way), outputs
+
+    def _remember(self, context: Any, state: Any) -> None:
+        known = self._decided.Eval(context)[0]
+        state.get_mutable_abstract_state(0).set_value(known)
+
+
+@register_jitable
+def _tell(memory, outputs):  # type: ignore[no-untyped-def]
+    """Outputs from the memory."""
+    twist, plan = outputs
+    twist[0], twist[1] = memory[0, SPEED], memory[0, TURN]
+    plan[0], plan[1] = memory[0, MODE], memory[0, CARROT_X]
+    plan[2], plan[3] = memory[0, CARROT_Y], memory[0, WAY_LEFT]
+
+
+def _copied(numbers: DriveNumbers) -> tuple[Any, Way]:
+    arrays: list[Any] = [np.copy(values) for values in numbers.way]
+    return np.copy(numbers.memory), Way(*arrays)
 
 
 GUARDED = Law(
     name="guarded",
     title="Guarded law",
     label="guarded",
-    equations=(Equation("Guarded law", r"v", "v"),),
+    equations=(
+        Equation(
+            "Guarded law: wanted speed and yaw rate",
+            r"v=k_v\,(\ell-d_f)+k_s\,\dot{\ell}_S,"
+            r"\quad\omega=k_\omega\,(\varphi_c-\theta+A\sin\frac{2\pi t}{T_w})",
+            "v = k_v (l - d_f) + k_s v_S, w = k_w (phi_c - theta + A sin(2 pi t/T_w))",
+        ),
+    ),
     gains=GuardedParameters,
     controller=GuardedController,
     plans=True,

@@ -73,8 +73,8 @@ class Law:
     tuning: Tuning | None = None
     """None for a law without gains to choose."""
     plans: bool = False
-    """Whether its block plans with a map, so that it takes ``known``, too, and its robot
-    is always guarded."""
+    """Whether its block plans with a map: it takes ``known``, too, and its robot is
+    always guarded."""
     colour: str | None = None
     """In pictures; none: the next one of the palette."""
 

@@ -11,16 +11,29 @@ from numpy.typing import NDArray
 
 from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
 
-__all__ = ["PRICES", "Way", "find_way", "make_way"]
+__all__ = [
+    "DOUBTFUL",
+    "FREE",
+    "NEAR",
+    "OCCUPIED",
+    "STRAIGHT",
+    "TIGHT",
+    "UNKNOWN",
+    "Way",
+    "find_way",
+    "make_way",
+    "mark_blocked",
+]
 
-#: Price of a cell: seen free, unknown, near what echoed now and then, and often.
-PRICES = FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
+#: Price of a cell: seen free; unknown; so that the disc is near, or tight to, what
+#: echoed; so that it would lie on what echoed now and then, or often.
+FREE, UNKNOWN, NEAR, TIGHT, DOUBTFUL, OCCUPIED = 2, 3, 6, 10, 14, 82
 #: Hits of a cell that make it doubtful, and occupied.
 _DOUBTFUL_HITS, _OCCUPIED_HITS = 1.5, 6.0
 #: So much farther off than it has to be, the disc is tight, or near, m.
 _TIGHT_M, _NEAR_M = 0.07, 0.19
 #: Of a step to a cell beside and to one across the corner, times its price.
-_STRAIGHT, _ACROSS = 10, 14
+STRAIGHT, ACROSS = 10, 14
 #: More than any step costs.
 _BUCKETS = 2048
 _FAR = 2**31 - 1
@@ -33,7 +46,7 @@ class Way(NamedTuple):
     """
 
     price: NDArray[np.int32]
-    """(m, m) of each cell, one of ``PRICES``."""
+    """(m, m) of each cell, from ``FREE`` to ``OCCUPIED``."""
     cost: NDArray[np.int32]
     """(m, m) of the way from each cell to the goal, as far as it was looked for."""
     towards: NDArray[np.int32]
@@ -45,10 +58,12 @@ class Way(NamedTuple):
     path: NDArray[np.float64]
     """(p, 2) middles of the cells of the way, from the robot to the goal, m."""
     facts: NDArray[np.float64]
-    """(1, 5): points of ``path``, its length, m, the highest price on it, and the
-    numbers of the first of these cells on the floor."""
+    """(1, 6): points of ``path``, its length, m, the highest price on it, the numbers
+    of the first of these cells on the floor, and their side, m."""
     marks: NDArray[np.float64]
     """(q, 3) places that were found blocked, m, and until when that counts, s."""
+    marked: NDArray[np.float64]
+    """(1, 1) how many places were marked: the oldest is replaced."""
 
 
 def make_way(cells: int) -> Way:
@@ -69,8 +84,9 @@ def make_way(cells: int) -> Way:
         np.zeros((8 * size * size + 1, 2), dtype=np.int32),
         np.full((_BUCKETS, 1), -1, dtype=np.int32),
         np.zeros((4 * size, 2)),
-        np.zeros((1, 5)),
+        np.zeros((1, 6)),
         np.zeros((16, 3)),
+        np.zeros((1, 1)),
     )
 
 
@@ -117,7 +133,23 @@ def find_way(
             break
         at = way.towards[i, j]
     way.facts[0, 0], way.facts[0, 1], way.facts[0, 2] = points, length, dearest
-    way.facts[0, 3], way.facts[0, 4] = low
+    way.facts[0, 3], way.facts[0, 4], way.facts[0, 5] = low[0], low[1], cell
+
+
+@njit(cache=True)
+def mark_blocked(
+    way: Way, place: Any, until: float
+) -> None:  # pragma: no cover  (compiled)
+    """Keeps ways off a place for a time.
+
+    Args:
+        way: Changed.
+        place: (x, y), m.
+        until: When that ends, s.
+    """
+    k = int(way.marked[0, 0]) % len(way.marks)
+    way.marks[k, 0], way.marks[k, 1], way.marks[k, 2] = place[0], place[1], until
+    way.marked[0, 0] += 1.0
 
 
 @njit(cache=True)
@@ -219,7 +251,7 @@ def _search(way: Way, start: int, goal: int) -> None:  # pragma: no cover  (comp
                 a, b = i + di, j + dj
                 if (di == 0 and dj == 0) or a < 0 or b < 0 or a >= size or b >= size:
                     continue
-                step = _STRAIGHT if di == 0 or dj == 0 else _ACROSS
+                step = STRAIGHT if di == 0 or dj == 0 else ACROSS
                 # From there the way leads here: what it costs to enter this cell.
                 new = cost + step * way.price[i, j]
                 if new < way.cost[a, b] and entries < len(way.queue):

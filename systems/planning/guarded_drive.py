@@ -1,0 +1,249 @@
+"""How the guarded law drives and looks: one tick of its four modes."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from systems.planning.carrot import find_carrot
+from systems.planning.way import TIGHT, Way, find_way, mark_blocked
+from systems.safety.braking import TURNED
+from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
+
+__all__ = ["BACKING", "DRIVING", "LOOKING", "WAITING", "DriveNumbers", "drive_guarded"]
+
+#: What the robot does.
+WAITING, DRIVING, LOOKING, BACKING = range(4)
+#: Places in ``DriveNumbers.memory``; times in s, places in m, headings in rad.
+(
+    AT_TICK,
+    SPEED,
+    TURN,
+    MODE,
+    CARROT_X,
+    CARROT_Y,
+    WAY_LEFT,
+    PLANNED_S,
+    BLOCKED_S,
+    STAYS_X,
+    STAYS_Y,
+    STAYS_S,
+    HAS_LOOKED,
+    FIRST_LOOK,
+    SECOND_LOOK,
+    LOOKS_DONE,
+    BLOCK_X,
+    BLOCK_Y,
+    BACKED_S,
+    MEMORY,
+) = range(20)
+
+#: Half of the first look around, before the robot has moved, and of one at what blocks
+#: it, rad.
+_FIRST_LOOK_RAD, _LOOK_RAD = 0.4, 0.6
+#: A look is done within this, rad, and turns by this much of what is left each second.
+_LOOKED_RAD, _LOOK_GAIN = 0.1, 4.0
+#: The disc has room again, m: what blocked the way is seen free.
+_ROOM_M = 0.03
+#: Farther off its heading than this, the robot turns before it drives, rad.
+_TURN_FIRST_RAD = 1.0
+#: A robot that has come so far has not stayed, m.
+_STAYS_M = 0.15
+#: Within this of the follow distance of what rests it is there, m; slower rests, m/s.
+_THERE_M, _RESTS_M_S = 0.2, 0.1
+#: A way that is no longer than so many times the straight line is straight.
+_DETOUR = 1.15
+#: It backs off for so long, s.
+_BACKING_S = 2.0
+#: Cells around the robot that may block it.
+_MOST_CELLS = 1_000
+
+
+class DriveNumbers(NamedTuple):
+    """What a tick depends on."""
+
+    memory: NDArray[np.float64]
+    """(1, MEMORY) of the last tick; changed."""
+    way: Way
+    """Changed."""
+    space: FreeSpace
+    own: Any
+    """``GuardedParameters``."""
+    follow_distance_m: float
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    radius_m: float
+    """Of the disc for which ways are sought, m."""
+    tick_s: float
+
+
+@njit(cache=True)
+def _wrapped(angle: float) -> float:  # pragma: no cover  (compiled)
+    return (angle + math.pi) % math.tau - math.pi
+
+
+@njit(cache=True)
+def _within(value: float, limit: float) -> float:  # pragma: no cover  (compiled)
+    return min(max(value, -limit), limit)
+
+
+@register_jitable
+def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
+    """Decides what the robot wants in a tick: ``SPEED`` and ``TURN`` of the memory.
+
+    Args:
+        tick: Its number.
+        inputs: Place and velocity of the target, m and m/s, whether there is one, pose
+            of the robot, m and rad, and the guard's report; more are not read.
+        numbers: ``DriveNumbers``; its memory and way are changed.
+    """
+    target, velocity, valid = inputs[0], inputs[1], inputs[2][0]
+    pose, report = inputs[3], inputs[4]
+    m, own, time = numbers.memory, numbers.own, tick * numbers.tick_s
+    if m[0, AT_TICK] < 0.0:
+        m[0, PLANNED_S], m[0, BLOCKED_S] = -np.inf, time
+        _stays(m, pose, time)
+    m[0, AT_TICK] = tick
+    m[0, SPEED], m[0, TURN] = 0.0, 0.0
+    if valid < 0.5:
+        m[0, MODE], m[0, BLOCKED_S] = WAITING, time
+        _stays(m, pose, time)
+        return
+    wanted, error, there = _find_heading(time, target, velocity, pose, numbers)
+    if math.hypot(pose[0] - m[0, STAYS_X], pose[1] - m[0, STAYS_Y]) > _STAYS_M or there:
+        _stays(m, pose, time)
+    if report[0] < TURNED or there or wanted <= 0.0:
+        m[0, BLOCKED_S] = time
+    if m[0, MODE] == WAITING:
+        m[0, MODE] = DRIVING
+    if m[0, MODE] == DRIVING:
+        _begin_look(time, pose, pose[2] + error, numbers)
+    if m[0, MODE] == LOOKING:
+        _look(time, pose, report, numbers)
+    if m[0, MODE] == DRIVING and time - m[0, STAYS_S] > own.give_up_s:
+        ahead, at = pose[2] + error, numbers.radius_m + 0.1
+        place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
+        mark_blocked(numbers.way, place, time + own.mark_s)
+        m[0, MODE], m[0, BACKED_S], m[0, PLANNED_S] = BACKING, time, -np.inf
+    if m[0, MODE] == BACKING:
+        m[0, SPEED] = -own.back_speed_m_s
+        if time - m[0, BACKED_S] > _BACKING_S:
+            m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
+            _stays(m, pose, time)
+    if m[0, MODE] == DRIVING:
+        _drive(time, wanted, error, there, numbers)
+
+
+@njit(cache=True)
+def _stays(m: Any, pose: Any, time: float) -> None:  # pragma: no cover  (compiled)
+    """Remembers from where and since when the robot stays."""
+    m[0, STAYS_X], m[0, STAYS_Y], m[0, STAYS_S] = pose[0], pose[1], time
+
+
+@register_jitable
+def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-untyped-def]
+    """Wanted speed, m/s, error of the heading, rad, and whether the robot is there."""
+    m, own, way = numbers.memory, numbers.own, numbers.way
+    x, y, theta = pose[0], pose[1], pose[2]
+    if time - m[0, PLANNED_S] >= own.replan_s - 0.5 * numbers.tick_s:
+        goal = target[0], target[1]
+        clear_m, radius = own.source_clearance_m, numbers.radius_m
+        find_way(way, numbers.space, (x, y), goal, time, radius, clear_m)
+        m[0, PLANNED_S] = time
+    follow, offset = numbers.follow_distance_m, numbers.control_point_m
+    dx = target[0] - x - offset * math.cos(theta)
+    dy = target[1] - y - offset * math.sin(theta)
+    distance, length = math.hypot(dx, dy), way.facts[0, 1]
+    carrot = find_carrot(way, x, y, own.look_ahead_m)
+    left = max(distance, length - offset)
+    direct = math.hypot(target[0] - x, target[1] - y)
+    # Around nothing: the way on its cells is longer than it is.
+    if way.facts[0, 2] <= TIGHT and length < _DETOUR * direct:
+        left = distance
+        if distance < follow + 3.0 * _THERE_M:
+            carrot = target[0], target[1]
+    bearing = math.atan2(carrot[1] - y, carrot[0] - x)
+    along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
+    wanted = own.approach_gain * (left - follow) + own.source_share * along
+    wanted = min(max(wanted, -own.back_speed_m_s), own.cruise_speed_m_s)
+    rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
+    m[0, CARROT_X], m[0, CARROT_Y], m[0, WAY_LEFT] = carrot[0], carrot[1], left
+    return wanted, _wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
+
+
+@register_jitable
+def _begin_look(time, pose, ahead, numbers):  # type: ignore[no-untyped-def]
+    """Before it first moves, and where the guard lets it not go on, the robot looks."""
+    m, x, y = numbers.memory, pose[0], pose[1]
+    half = _FIRST_LOOK_RAD
+    if m[0, HAS_LOOKED] > 0.5:
+        if time - m[0, BLOCKED_S] <= numbers.own.patience_s:
+            return
+        offset, half = numbers.control_point_m, _LOOK_RAD
+        block = _blocking(numbers.space, x, y, pose[2], numbers.radius_m)
+        m[0, BLOCK_X], m[0, BLOCK_Y] = block
+        px, py = x + offset * math.cos(pose[2]), y + offset * math.sin(pose[2])
+        ahead = math.atan2(block[1] - py, block[0] - px)
+    left, right = ahead + half, ahead - half
+    if abs(_wrapped(left - pose[2])) > abs(_wrapped(right - pose[2])):
+        left, right = right, left
+    m[0, FIRST_LOOK], m[0, SECOND_LOOK] = left, right
+    m[0, LOOKS_DONE], m[0, MODE] = 0.0, LOOKING
+
+
+@register_jitable
+def _look(time, pose, report, numbers):  # type: ignore[no-untyped-def]
+    """Turns to one side and to the other of what blocks, until that is seen free."""
+    m, own = numbers.memory, numbers.own
+    first = m[0, HAS_LOOKED] < 0.5
+    heading = m[0, FIRST_LOOK] if m[0, LOOKS_DONE] < 0.5 else m[0, SECOND_LOOK]
+    to = _wrapped(heading - pose[2])
+    m[0, TURN] = _within(_LOOK_GAIN * to, own.turn_rate_rad_s)
+    if abs(to) < _LOOKED_RAD:
+        m[0, LOOKS_DONE] += 1.0
+    seen = not first and report[1] > _ROOM_M
+    if m[0, LOOKS_DONE] > 1.5 or seen:
+        if not first and not seen:
+            place = m[0, BLOCK_X], m[0, BLOCK_Y]
+            mark_blocked(numbers.way, place, time + own.mark_s)
+        m[0, MODE], m[0, BLOCKED_S], m[0, PLANNED_S] = DRIVING, time, -np.inf
+        m[0, HAS_LOOKED] = 1.0
+
+
+@njit(cache=True)
+def _blocking(
+    space: FreeSpace, x: float, y: float, theta: float, radius: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Middle of the cell that is not free and nearest to where the robot would go."""
+    corners = np.empty((_MOST_CELLS, 2))
+    count = edge_cells(space, x, y, radius + 0.3, space.facts[0, ROLLED], corners)
+    ahead = x + 0.1 * math.cos(theta), y + 0.1 * math.sin(theta)
+    best, found, half = np.inf, ahead, 0.5 * space.cell_m
+    for k in range(min(count, _MOST_CELLS)):
+        middle = corners[k, 0] + half, corners[k, 1] + half
+        distance = math.hypot(middle[0] - ahead[0], middle[1] - ahead[1])
+        if distance < best:
+            best, found = distance, middle
+    return found
+
+
+@register_jitable
+def _drive(time, wanted, error, there, numbers):  # type: ignore[no-untyped-def]
+    """Towards the carrot, weaving, so that the sensors sweep what lies beside."""
+    m, own = numbers.memory, numbers.own
+    if there:
+        m[0, SPEED], m[0, TURN] = wanted, 0.5 * own.turn_gain * error
+        return
+    weave = 0.0
+    if wanted > 0.0:
+        weave = own.weave_rad * math.sin(math.tau * time / own.weave_period_s)
+    turn = own.turn_gain * _wrapped(error + weave)
+    m[0, TURN] = _within(turn, own.turn_rate_rad_s)
+    m[0, SPEED] = wanted
+    if wanted > 0.0:
+        m[0, SPEED] *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0
