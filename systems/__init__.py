@@ -35,6 +35,7 @@ from systems.laws.conventional_impedance_controller import (
     ConventionalImpedanceController,
     ConventionalImpedanceController_,
 )
+from systems.laws.guarded_controller import GuardedController
 from systems.laws.radial_law_controller import RadialLawController, RadialLawController_
 from systems.ranging.collision_vector import CollisionVector, CollisionVector_
 from systems.ranging.ideal_obstacle_sensor import (
@@ -62,6 +63,7 @@ __all__ = [
     "DiffDrivePlant",
     "DiffDrivePlant_",
     "FreeSpaceMap",
+    "GuardedController",
     "IdealObstacleSensor",
     "IdealObstacleSensor_",
     "IdealSourceSensor",

@@ -22,6 +22,7 @@ BLOCKS = {
     "ConventionalImpedanceController",
     "DiffDrivePlant",
     "FreeSpaceMap",
+    "GuardedController",
     "IdealObstacleSensor",
     "IdealSourceSensor",
     "MicArray",

@@ -24,7 +24,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--laws",
         metavar="LAW,...",
-        help="laws to compare (default: all that phonotaxis laws lists)",
+        help="laws to compare (default: the papers', and none)",
     )
     parser.add_argument(
         "--velocity-term",

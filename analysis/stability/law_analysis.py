@@ -21,7 +21,7 @@ from diagrams import Scenario
 from diagrams.laws import make_controller
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import LAWS
+from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 __all__ = [
     "Finding",
@@ -138,8 +138,15 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     Raises:
         InputError: There is no such law.
     """
-    every = [law for law in LAWS if law != "none"]
+    every = [law for law in FORCE_LAWS if law != "none"]
     laws = [law for name in names for law in (every if name == "all" else [name])]
+    for law in laws or [scenario.law]:
+        if law in LAWS and LAWS[law].plans:
+            raise InputError(
+                "law",
+                f"{law!r} has no linear model, for it plans and decides; use "
+                f"{', '.join(every)}",
+            )
     scenarios = [
         scenario_from_mapping({**scenario.model_dump(), "law": law})
         for law in dict.fromkeys(laws or [scenario.law])

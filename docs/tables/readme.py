@@ -12,7 +12,7 @@ import numpy as np
 from analysis.reporting.markdown import markdown_head, markdown_row
 from analysis.runs.metrics import run_metrics
 from diagrams import RunResult, load_scenario, simulate
-from diagrams.laws import LAWS
+from systems.laws.catalogue import FORCE_LAWS
 
 __all__ = ["SCENARIOS", "ending_row", "following_rows", "laws_heading"]
 
@@ -60,13 +60,13 @@ def following_rows() -> list[str]:
 
 def laws_heading() -> str:
     """Heading of the table of endings, with its rule."""
-    names = ("no avoidance" if law == "none" else law for law in LAWS)
+    names = ("no avoidance" if law == "none" else law for law in FORCE_LAWS)
     return markdown_head(["scenario", *names])
 
 
 def ending_row(scenario: str) -> str:
     """How a scenario ends with each law."""
-    runs = (simulate(load_scenario(scenario, [f"law={law}"])) for law in LAWS)
+    runs = (simulate(load_scenario(scenario, [f"law={law}"])) for law in FORCE_LAWS)
     return markdown_row([scenario, *map(_ending, runs)])
 
 

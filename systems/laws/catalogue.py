@@ -12,7 +12,7 @@ from systems.laws.guarded_controller import GUARDED
 from systems.laws.law import Law
 from systems.laws.no_avoidance import NONE
 
-__all__ = ["LAWS", "law_title"]
+__all__ = ["FORCE_LAWS", "LAWS", "law_title"]
 
 #: By name.
 LAWS: Mapping[str, Law] = {
@@ -26,6 +26,9 @@ LAWS: Mapping[str, Law] = {
         GUARDED,
     )
 }
+
+#: Names of those that are compared and analysed together: forces on a virtual mass.
+FORCE_LAWS = tuple(name for name, law in LAWS.items() if not law.plans)
 
 
 def law_title(name: str) -> str:

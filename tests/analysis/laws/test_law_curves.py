@@ -8,9 +8,10 @@ import pytest
 from analysis.laws.law_curves import law_curves, radial_forces
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.reporting.plain_values import plain
-from diagrams.laws import LAWS, make_controller
+from diagrams.laws import make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import FORCE_LAWS
 
 SCENARIO = Scenario.model_validate(
     {
@@ -31,7 +32,7 @@ SCENARIO = Scenario.model_validate(
 def curves_by_law(**changes):
     repulsion = SCENARIO.repulsion.model_copy(update=changes)
     scenario = SCENARIO.model_copy(update={"repulsion": repulsion})
-    return {curve.law: curve for curve in law_curves(scenario, LAWS)}
+    return {curve.law: curve for curve in law_curves(scenario, FORCE_LAWS)}
 
 
 def test_laws_meet_where_the_paper_matches_them():
@@ -91,8 +92,8 @@ def test_picture_draws_every_curve():
     curves = list(curves_by_law().values())
     curves += list(curves_by_law(velocity_term="closing").values())
     by_distance, by_speed = plot_law_curves(curves).axes
-    assert len(by_distance.lines) == len(LAWS)
-    assert len(by_speed.lines) == 2 * len(LAWS)
+    assert len(by_distance.lines) == len(FORCE_LAWS)
+    assert len(by_speed.lines) == 2 * len(FORCE_LAWS)
     drawn = np.asarray(by_speed.lines[2].get_ydata())
     np.testing.assert_array_equal(drawn, curves[2].force_n)
 

@@ -88,6 +88,15 @@ FIELDS = {
     "MicArrayParameters.frame_s": (1e-3, 1.0),
     "UltrasonicParameters.period_s": (1e-3, 1.0),
     "MicArrayParameters.sample_rate_hz": (1e3, 1e5),
+    # A robot that never backs off, does not weave, or follows by distance alone.
+    "GuardedParameters.back_speed_m_s": (0.0, 100.0),
+    "GuardedParameters.approach_gain": (1e-9, 1e6),
+    "GuardedParameters.turn_gain": (1e-9, 1e6),
+    "GuardedParameters.turn_rate_rad_s": (ABOVE_0, 20.0),
+    "GuardedParameters.source_share": (0.0, 1.0),
+    "GuardedParameters.weave_rad": (0.0, 1.5),
+    "GuardedParameters.clearance_m": (0.0, 1e3),
+    "GuardedParameters.source_clearance_m": (0.0, 1e3),
     # The room's response is worked out anew at most once a frame.
     "RoomParameters.update_period_s": (1e-3, 60.0),
     "RoomParameters.reverberation_time_s": (1e-3, 20.0),

@@ -124,9 +124,9 @@ OURS = ["conventional", "active", "conventional2017", "active2017"]
 
 
 def test_commands_name_it(answers):
-    names = ["none", *OURS, "gaussian"]
+    names = ["none", *OURS, "gaussian", "guarded"]
     assert [law["name"] for law in answers["listed"]] == names
-    assert answers["listed"][-1]["title"] == "Gaussian law"
+    assert answers["listed"][-2]["title"] == "Gaussian law"
     assert ", ".join(names) in answers["unknown"]
 
 

@@ -1,0 +1,69 @@
+"""The guarded law does its job among what rests: nothing is touched, the goal reached."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from analysis.comparison.compare import comparison_plan
+from diagrams import load_scenario, simulate
+from systems.framework.input_error import InputError
+
+#: Not the seed with which its parameters were chosen.
+SEED, LAYOUTS = 2026, 12
+
+
+def runs(name):
+    settings = {"hearing": "ideal"}
+    plan = comparison_plan(
+        name, laws=["guarded"], runs=LAYOUTS, seed=SEED, settings=settings
+    )
+    for point in plan.points():
+        yield simulate(plan.scenario_of(point), engine="compiled")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "name", ["two_static_obstacles", "u_trap", "clutter", "rooms", "corridor"]
+)
+def test_nothing_that_rests_is_touched(name):
+    """By the rectangles of the body and of what stands there, not by the map."""
+    causes = []
+    for run in runs(name):
+        causes.append(run.cause)
+        assert run.collision is None
+    if name == "corridor":
+        assert causes.count("completed") >= LAYOUTS - 1
+    elif name != "rooms":  # a door is found in most of the runs, not in all
+        assert causes.count("reached") >= LAYOUTS - 1
+
+
+@pytest.mark.slow
+def test_compiled_and_drake_agree():
+    scenario = load_scenario("u_trap", ["hearing=ideal", "law=guarded"])
+    drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
+    assert drake.cause == compiled.cause == "reached"
+    assert drake.columns.keys() == compiled.columns.keys()
+    for name, values in drake.columns.items():
+        atol = 1e-6 if "speed" in name else 1e-9
+        np.testing.assert_allclose(compiled.columns[name], values, rtol=0, atol=atol)
+
+
+def test_the_law_brings_its_guard():
+    scenario = load_scenario("default", ["law=guarded"])
+    assert scenario.guard is None
+    assert scenario.all_robots["robot"].own_guard is not None
+    assert load_scenario("default").all_robots["robot"].own_guard is None
+
+
+def test_it_needs_ranges():
+    with pytest.raises(InputError, match="the guard needs ranges"):
+        load_scenario("default", ["law=guarded", "obstacle_sensing=ideal"])
+
+
+def test_it_needs_its_bubble(tmp_path: Path):
+    near = "obstacles=[{waypoints_m: [[0.9, 0.0]]}]"
+    with pytest.raises(InputError, match=r"start_bubble_m, 1 m"):
+        load_scenario("default", ["law=guarded", near])
