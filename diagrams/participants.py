@@ -92,7 +92,7 @@ class FollowerParameters(Parameters):
     def own_guard(self) -> GuardParameters | None:
         """``guard``, which a law that plans always has; none: nothing guards it."""
         if self.guard is None and self.law in LAWS and LAWS[self.law].plans:
-            return GuardParameters()
+            return GuardParameters(obstacle_speed_m_s=0.6)
         return self.guard
 
     @property
