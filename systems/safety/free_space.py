@@ -27,8 +27,10 @@ __all__ = [
 FIRST_I, FIRST_J, ROLLED, TICK = range(4)
 #: A cell that was never seen free.
 NEVER = -1.0
-#: How far the window's middle may lie behind the robot, cells.
+#: How far the window's middle may lie behind the robot, cells, and of a small window
+#: which share.
 _SLACK = 20
+_SLACK_SHARE = 8
 #: At a tick every so many-th row of cells is entered: the rest can wait.
 _ROWS = 4
 #: Hits of a cell at this distance count full, farther ones less: arcs are longer, m.
@@ -152,11 +154,12 @@ def move_window(
         y: See x.
     """
     cells = space.free_until.shape[0]
+    slack = min(_SLACK, cells // _SLACK_SHARE)
     for axis in range(2):
         place = x if axis == 0 else y
         first = int(space.facts[0, axis])
         wanted = math.floor(place / space.cell_m) - cells // 2
-        if abs(wanted - first) <= _SLACK:
+        if abs(wanted - first) <= slack:
             continue
         for k in range(min(first, wanted), max(first, wanted)):
             # Cells k leave on one side, and k + cells enter on the other, or vice
@@ -291,6 +294,7 @@ def see(
         ahead, aside = sectors.places[group]
         sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
+        from_axle = math.hypot(ahead, aside)
         farthest = np.max(seen[begin:end, 2])
         box = _sector_box(sx, sy, pose[2] + right, pose[2] + left, farthest + cell)
         low_i = max(math.floor(box[0] / cell), int(space.facts[0, FIRST_I]))
@@ -316,7 +320,9 @@ def see(
                 )
                 at = i % cells, j % cells
                 if free >= distance + half:
-                    until = space.facts[0, ROLLED] + lasting(distance, drift)
+                    until = space.facts[0, ROLLED] + lasting(
+                        distance + from_axle, drift
+                    )
                     space.free_until[at] = max(space.free_until[at], until)
                     space.seen_s[at] = time
                     space.hits[at] = 0.0
@@ -413,7 +419,7 @@ def lasting(distance: float, drift: Any) -> float:  # pragma: no cover  (compile
     error of the way, and that of the heading times the distance.
 
     Args:
-        distance: Of the cell when it was seen, m.
+        distance: Of the cell from the axle when it was seen, m, or more.
         drift: (wheel error e, allowed error of the place, m, wheel separation L, m).
 
     Returns:

@@ -55,7 +55,7 @@ FIELDS = {
     "CollisionVectorParameters.pair_separation_m": (0.0, 1e3),
     "TrackerParameters.measurement_floor_m": (0.0, 1e3),
     "TrackerParameters.believed_outliers": (1, 1000),
-    # Below 5 mm a window holds too many cells, above 25 cm too few. Margins may be none.
+    # Cells below 5 mm are too many for a window, above 25 cm too few.
     "FreeSpaceParameters.cell_m": (0.005, 0.25),
     "FreeSpaceParameters.range_margin_m": (0.0, 1e3),
     "FreeSpaceParameters.wheel_error": (0.0, 1.0),
