@@ -223,20 +223,38 @@ def edge_cells(
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
     high_i, high_j = math.floor((x + reach) / cell), math.floor((y + reach) / cell)
-    for i in range(low_i, high_i + 1):
-        for j in range(low_j, high_j + 1):
-            if cell_is_free(space, i, j, until):
-                continue
-            if (
-                cell_is_free(space, i - 1, j, until)
-                or cell_is_free(space, i + 1, j, until)
-                or cell_is_free(space, i, j - 1, until)
-                or cell_is_free(space, i, j + 1, until)
+    # The square with a cell more around it.
+    free = _free_cells(space, low_i - 1, low_j - 1, high_i + 1, high_j + 1, until)
+    for a in range(1, free.shape[0] - 1):
+        for b in range(1, free.shape[1] - 1):
+            if not free[a, b] and (
+                free[a - 1, b] or free[a + 1, b] or free[a, b - 1] or free[a, b + 1]
             ):
                 if count < out.shape[0]:
-                    out[count, 0], out[count, 1] = i * cell, j * cell
+                    out[count, 0] = (low_i - 1 + a) * cell
+                    out[count, 1] = (low_j - 1 + b) * cell
                 count += 1
     return count
+
+
+@njit(cache=True)
+def _free_cells(
+    space: FreeSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
+) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
+    """``cell_is_free`` of the cells of a rectangle."""
+    cells = space.free_until.shape[0]
+    first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    free = np.zeros((high_i - low_i + 1, high_j - low_j + 1), dtype=np.bool_)
+    for i in range(max(low_i, first_i), min(high_i, first_i + cells - 1) + 1):
+        row = space.free_until[i % cells]
+        begin = max(low_j, first_j)
+        at = begin % cells
+        for j in range(begin, min(high_j, first_j + cells - 1) + 1):
+            free[i - low_i, j - low_j] = row[at] >= until
+            at += 1
+            if at == cells:
+                at = 0
+    return free
 
 
 @njit(cache=True)

@@ -40,7 +40,7 @@ from systems.safety.braking import (
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
 
-__all__ = ["GuardParameters", "MotionGuard"]
+__all__ = ["GuardParameters", "MotionGuard", "stopping_way"]
 
 # Groups of the discrete state.
 _V_WP, _WHEEL_SPEEDS, _REPORT, _MODEL = range(4)
@@ -260,6 +260,25 @@ class MotionGuard(LeafSystem):
             begin += size
 
 
+def stopping_way(
+    own: GuardParameters, robot: RobotParameters, plant: PlantParameters, tick_s: float
+) -> float:
+    """Way of the faster wheel from top speed to rest, after a tick of it, or more.
+
+    Args:
+        own: Braking.
+        robot: Top speed.
+        plant: Lag of the motors.
+        tick_s: Period of the command, s.
+
+    Returns:
+        m.
+    """
+    top = robot.top_speed_m_s
+    delayed = plant.motor_lag_s + 2.0 * tick_s
+    return top * top / (2.0 * own.braking_m_s2) + top * delayed
+
+
 def _numbers(
     own: GuardParameters,
     known: FreeSpaceParameters,
@@ -283,10 +302,7 @@ def _numbers(
         own.obstacle_speed_m_s,
         own.slow_turn_rad_s,
     )
-    top = robot.top_speed_m_s
-    stopping = top * top / (2.0 * own.braking_m_s2) + top * (
-        plant.motor_lag_s + 2.0 * tick_s
-    )
-    reach = keep + stopping + 2.0 * known.cell_m, 2.0 * stopping
+    stopping = stopping_way(own, robot, plant, tick_s)
+    reach = keep + stopping + 2.0 * known.cell_m, stopping
     blank = make_free_space(1, known.cell_m, 1, 2)
     return GuardNumbers(velocity, robot, braking, reach, blank)

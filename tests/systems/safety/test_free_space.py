@@ -78,7 +78,7 @@ def seen_space(
 def free_cells(space: FreeSpace) -> set[tuple[int, int]]:
     n = space.free_until.shape[0]
     first = space.facts[0, FIRST_I], space.facts[0, FIRST_J]
-    i, j = (int(f) + np.arange(n) for f in first)
+    i, j = (range(int(f), int(f) + n) for f in first)
     return {(a, b) for a in i for b in j if cell_is_free(space, a, b, 0.0)}
 
 
@@ -150,8 +150,8 @@ def test_a_cell_whose_whole_round_is_seen_from_one_place_is_free(name):
             if distance < 2.0 * half + 1e-6 or distance > 3.1:
                 continue
             hides = math.asin(half / distance) * (1.0 + 1e-6)
-            bearing = math.atan2(*(middle - sensor)[::-1])
-            bearing = bearing + np.linspace(-hides, hides, 15)
+            towards = middle - sensor
+            bearing = np.linspace(-hides, hides, 15) + math.atan2(*towards[::-1])
             round_ = sensor + (distance + half + 1e-5) * np.column_stack(
                 [np.cos(bearing), np.sin(bearing)]
             )
@@ -290,7 +290,8 @@ def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
     for _ in range(40):
         space = make_free_space(60, CELL_M, 1, 2)
         for _ in range(6):
-            clear_disc(space, *draw.uniform(-0.6, 0.6, 2), draw.uniform(0.2, 0.6), 1.0)
+            x, y, radius = draw.uniform([-0.6, -0.6, 0.2], 0.6)
+            clear_disc(space, x, y, radius, 1.0)
         known = free_cells(space)
         corners = np.array(
             [
