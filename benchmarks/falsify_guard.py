@@ -2,12 +2,14 @@
 
     python -m benchmarks.falsify_guard [--runs N] [--search N] [--seed S] [--workers N]
     python -m benchmarks.falsify_guard --seed S --only K
+    python -m benchmarks.falsify_guard --cost
 
 Runs of 10 s by compiled loops: layouts and drivers of ``guard_drivers``, then SciPy's
 differential evolution over places of posts and commands, which lessens the clearance
 of the disc that holds the body. Prints collisions and the least clearances of each
-layout, driver and setting, and the worst run; ``--only`` runs one again. Exit status 1
-where the robot has touched something.
+layout, driver and setting, and the worst run; ``--only`` runs one again, ``--cost``
+prints what the guard takes of a tick. Exit status 1 where the robot has touched
+something.
 """
 
 from __future__ import annotations
@@ -27,6 +29,7 @@ from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
 from benchmarks.guard_drivers import BUBBLE_M, Trial, draw_trial, make_trial, run_trial
+from diagrams import load_scenario, simulate
 
 __all__ = ["Found", "by_chance", "by_search", "largest_rate", "searched_trial"]
 
@@ -159,6 +162,17 @@ def _report(found: Sequence[Found], what: str) -> None:
     )
 
 
+def _cost() -> None:
+    """Prints the time of a tick with and without a guard, by both engines."""
+    for engine in ("compiled", "drake"):
+        for guard in ("{}", "null"):
+            fields = ["hearing=ideal", "duration_s=20", f"guard={guard}"]
+            scenario = load_scenario("corridor", fields)
+            runs = [simulate(scenario, engine=engine) for _ in range(3)]
+            tick_s = min(run.wall_s / len(run.time) for run in runs)
+            print(f"{engine}, guard {guard}: {1e6 * tick_s:.0f} us a tick")
+
+
 def main() -> int:
     """Prints what was found."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -167,7 +181,11 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--only", type=int, help="number of one trial to run again")
+    parser.add_argument("--cost", action="store_true")
     arguments = parser.parse_args()
+    if arguments.cost:
+        _cost()
+        return 0
     if arguments.only is not None:
         trial = draw_trial(arguments.seed, arguments.only)
         print(trial._replace(table=trial.table.reshape(-1, 6)))
