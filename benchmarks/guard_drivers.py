@@ -23,6 +23,8 @@ __all__ = [
     "VARIANTS",
     "Driver",
     "Trial",
+    "contact_speeds",
+    "draw_crossing",
     "draw_trial",
     "least_clearances",
     "run_trial",
@@ -368,6 +370,60 @@ def draw_trial(seed: int, number: int) -> Trial:
     heading = angle + draw.choice([0.0, draw.uniform(-math.pi, math.pi)])
     names = layout, driver, variant
     return make_trial(names, boxes, rows, heading, source, int(draw.integers(1 << 30)))
+
+
+def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
+    """A trial by chance with bodies that cross near the start.
+
+    Args:
+        seed: Of all trials.
+        number: Of this one.
+        bodies: How many move; six at most.
+        speed: Of theirs, m/s.
+
+    Returns:
+        The same trial for the same arguments.
+    """
+    draw = np.random.default_rng([seed, number])
+    angle = draw.uniform(-math.pi, math.pi, bodies)
+    far, goals = draw.uniform(1.5, 3.0, bodies), draw.normal(0.0, 0.7, (bodies, 2))
+    boxes = [
+        _box(r * math.cos(a), r * math.sin(a), 0.0, 0.3, 0.3)
+        for r, a in zip(far, angle, strict=True)
+    ]
+    driver = str(draw.choice([*DRIVERS]))
+    names, rows = ("crossing", driver, "ring of 12"), DRIVERS[driver](draw, boxes)
+    heading = draw.uniform(-math.pi, math.pi)
+    trial = make_trial(names, boxes, rows, heading, (8.0, 0.0), number)
+    # The others stand far away.
+    moving = trial.fields["obstacles"][:bodies]
+    for body, goal in zip(moving, goals, strict=True):
+        begin = np.array(body["waypoints_m"][0])
+        end = begin + 3.5 * (goal - begin) / math.dist(goal, begin)
+        body["waypoints_m"] = [tuple(begin.tolist()), tuple(end.tolist())]
+        body["speed_m_s"] = speed
+    return trial
+
+
+def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float] | None:
+    """How fast a robot is when it touches something.
+
+    Args:
+        trial: What to run.
+        changes: As of ``run_trial``.
+
+    Returns:
+        Speed of the axle, m/s, and of the turn, rad/s, the larger of the last two
+        ticks; none without a contact.
+    """
+    _NEXT[0] = trial.table
+    fields = _merged(trial.fields, changes)
+    result = simulate(Scenario.model_validate(fields), engine="compiled")
+    if result.collision is None:
+        return None
+    columns = {name: values[-2:] for name, values in result.columns.items()}
+    speeds = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
+    return float(speeds.max()), float(np.abs(columns["omega_WB"]).max())
 
 
 def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:

@@ -199,7 +199,7 @@ def can_be_braked(
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= numbers.slow_turn_rad_s
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
-    begin_x, begin_y = pose[0], pose[1]
+    begin_x, begin_y, begin_theta = pose[0], pose[1], pose[2]
     part_s = numbers.tick_s / numbers.parts
     parts = 0
     while True:
@@ -210,8 +210,10 @@ def can_be_braked(
         reached = nearest_cell(danger.corners, danger.corner_count, danger.cell_m, x, y)
         if reached < need and not in_place:
             return False
+        # Of the axle, or of the disc's rim by the turn.
+        moved = max(way, keep * abs(pose[2] - begin_theta))
         if moving and not _keeps_off_moving(
-            (x, y), parts * part_s, way, danger, numbers
+            (x, y), parts * part_s, moved, danger, numbers
         ):
             return False
         fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
@@ -229,7 +231,7 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 
 @njit(cache=True)
 def _keeps_off_moving(
-    place: Any, ahead_s: float, way: float, danger: Danger, numbers: BrakingNumbers
+    place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether nothing in view can come near by then, or the robot withdraws from it."""
     x, y = place
@@ -237,7 +239,7 @@ def _keeps_off_moving(
     if _nearest_view(danger, x, y, ahead_s, speed) >= numbers.keep_m:
         return True
     withdrawn = _nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
-    return way > 0.0 and withdrawn >= 0.5 * way
+    return moved > 0.0 and withdrawn >= 0.5 * moved
 
 
 @njit(cache=True)

@@ -14,7 +14,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.guard_drivers import draw_trial, make_trial, run_trial
+from benchmarks.guard_drivers import (
+    contact_speeds,
+    draw_crossing,
+    draw_trial,
+    make_trial,
+    run_trial,
+)
 from diagrams import InputError, Scenario, load_scenario, simulate
 from systems.base.diff_drive_plant import (
     DiffDrivePlant,
@@ -258,6 +264,23 @@ def test_a5_broken_by_a_floor_on_which_tyres_do_not_hold():
 @pytest.mark.slow
 def test_a5_broken_in_a_run_by_commands_that_tyres_cannot_obey():
     assert collides(4, {"plant": {"friction": 0.1}})
+
+
+@pytest.mark.slow
+def test_in_a_ring_of_sensors_what_moves_finds_the_robot_at_rest():
+    """One body at 0.3 m/s: passive safety with ``obstacle_speed_m_s``, none without."""
+    moving = {0.0: 0, 0.3: 0}
+    contacts = dict(moving)
+    for bound in moving:
+        for number in range(60):
+            trial = draw_crossing(SEED, number, 1, 0.3)
+            guard = {"guard": {"obstacle_speed_m_s": bound}}
+            if speeds := contact_speeds(trial, guard):
+                contacts[bound] += 1
+                moving[bound] += speeds[0] > 0.005 or speeds[1] > 0.31
+    assert contacts[0.3] > 20
+    assert moving[0.0] > 20
+    assert moving[0.3] == 0
 
 
 def test_the_disc_holds_the_body_at_any_heading():

@@ -391,3 +391,13 @@ def test_it_may_withdraw_from_what_comes():
     here: Any = (0.0, 0.0, 0.0)
     assert can_be_braked(here, rest, straight(-0.3), at_hand, moving(0.5))
     assert not can_be_braked(here, rest, straight(0.3), at_hand, moving(0.5))
+
+
+def test_a_fast_turn_is_no_withdrawal():
+    """Drifting back by 6 mm/s, it would swing the bar's end into what is near."""
+    at_hand, rest = view(NUMBERS.keep_m - 0.05), (0.0, 0.0)
+    here: Any = (0.0, 0.0, 0.0)
+    assert not can_be_braked(here, rest, (-12.0, 11.8), at_hand, moving(0.5))
+    assert can_be_braked(here, rest, (-0.1, -0.1), at_hand, moving(0.5))
+    # A curve that leads away by more than it turns is one.
+    assert can_be_braked(here, rest, (-6.0, -5.0), at_hand, moving(0.5))
