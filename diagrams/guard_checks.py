@@ -10,7 +10,9 @@ import numpy as np
 from diagrams.bodies import Body
 from diagrams.participants import FollowerParameters
 from systems.framework.input_error import InputError
-from systems.safety.free_space_map import sensor_sectors
+from systems.safety.free_space import lasting
+from systems.safety.free_space_map import body_radius, sensor_sectors
+from systems.safety.motion_guard import GuardParameters, stopping_way
 from systems.world.geometry import beyond_rectangle
 
 __all__ = ["check_guard", "guard_note"]
@@ -20,7 +22,7 @@ _STEP_S = 0.05
 
 
 def check_guard(
-    prefix: str, robot: FollowerParameters, bodies: Mapping[str, Body]
+    prefix: str, robot: FollowerParameters, bodies: Mapping[str, Body], tick_s: float
 ) -> None:
     """Refuses a guarded robot that could never start, or not drive ahead.
 
@@ -28,6 +30,7 @@ def check_guard(
         prefix: What the robot's fields begin with in a message.
         robot: The robot; without a guard nothing is asked.
         bodies: All that it could touch, by name.
+        tick_s: Period of control, s.
 
     Raises:
         InputError: Its sensors do not serve, its grid does not, or something stands
@@ -47,6 +50,7 @@ def check_guard(
         field = f"{prefix}free_space.{error.field}"
         raise InputError(field, error.message) from None
     _check_view(prefix, robot)
+    _check_memory(prefix, robot, robot.own_guard, tick_s)
     bubble, (x, y) = robot.free_space.start_bubble_m, robot.start.position_m
     for name, body in bodies.items():
         distance = math.hypot(*beyond_rectangle((x, y), body.rectangle(0.0)))
@@ -68,6 +72,24 @@ def _check_view(prefix: str, robot: FollowerParameters) -> None:
             f"{prefix}ultrasonic.axes_deg",
             "no sensor looks straight ahead, so that the guard would never let the "
             "robot drive there; add the direction 0, or leave guard out",
+        )
+
+
+def _check_memory(
+    prefix: str, robot: FollowerParameters, guard: GuardParameters, tick_s: float
+) -> None:
+    """What is a braking ahead has to stay known until the robot has stopped."""
+    known, body = robot.free_space, robot.robot
+    stopping = stopping_way(guard, body, robot.plant, tick_s)
+    drift = known.wheel_error, known.place_error_m, body.wheel_separation_m
+    distance = body_radius(body) + stopping
+    lasts = lasting(distance, drift)
+    if lasts < stopping:
+        raise InputError(
+            f"{prefix}free_space.place_error_m",
+            f"{known.place_error_m:g} m: with wheel_error {known.wheel_error:g} what "
+            f"is {distance:.3g} m away stays known for {lasts:.2g} m, less than the "
+            f"{stopping:.2g} m in which the robot stops; raise it",
         )
 
 

@@ -367,7 +367,7 @@ class Scenario(FollowerParameters, RunParameters):
     def _check_guards(self) -> Scenario:
         robots = zip(self.all_robots, self._robot_fields(), strict=True)
         for name, (prefix, robot) in robots:
-            check_guard(prefix, robot, self.surroundings(name).bodies)
+            check_guard(prefix, robot, self.surroundings(name).bodies, self.tick_s)
         return self
 
     def _robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:

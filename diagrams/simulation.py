@@ -193,6 +193,7 @@ def _kind(scenario: Scenario) -> tuple[object, ...]:
             robot.tdoa.method,
             scenario.room is None,
             robot.plant.friction is None,
+            robot.own_guard is None,
         )
         for robot in scenario.all_robots.values()
     )

@@ -28,20 +28,20 @@ __all__ = [
     "can_be_braked",
     "chosen",
     "danger_of",
-    "drive_a_tick",
+    "drive_wheels",
 ]
 
 #: What was done with a wish.
 PASSED, SLOWED, TURNED, BRAKED = range(4)
 #: Shares of a wish that are tried, from all of it on.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
-#: Cells that a robot may have to keep off at once.
-_MOST_CORNERS = 2_000
 
-#: Slower rims are at rest, m/s: what the lag leaves of them is a fifth of a millimetre.
-_REST_M_S = 0.004
-#: No faster ahead, a robot turns in its place, m/s: the lag leaves 0.05 mm of it.
-_IN_PLACE_M_S = 1e-3
+#: Rims are at rest where their lag leaves them no longer way, m.
+_REST_M = 2e-4
+#: A robot turns in its place where it is commanded no faster ahead, m/s, and where the
+#: lag leaves it no longer way ahead, m.
+_IN_PLACE_M_S = 1e-6
+_IN_PLACE_M = 5e-5
 #: Where a robot is nearer than it should be, it may come so much nearer in a tick, m.
 _SLACK_M = 5e-4
 
@@ -56,6 +56,10 @@ class BrakingNumbers(NamedTuple):
     braking_m_s2: float
     """Of the faster rim's commanded speed."""
     tick_s: float
+    parts: int
+    """Of a tick, at whose ends places are looked at."""
+    top_wheel_speed: float
+    """rad/s."""
     keep_m: float
     """Distance of the axle from what is not free, m: radius of the body, and margin."""
     least_m: float
@@ -85,27 +89,28 @@ class Danger(NamedTuple):
 
 
 @njit(cache=True)
-def drive_a_tick(
-    pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
+def drive_wheels(
+    pose: Any, speeds: Any, commanded: Any, duration: float, numbers: BrakingNumbers
 ) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
-    """Pose and wheel speeds a tick later, of a plant without slip.
+    """Pose and wheel speeds a tick or a part of it later, of a plant without slip.
 
     Args:
         pose: (x, y, theta), m and rad.
         speeds: Of the left and the right wheel, rad/s.
-        commanded: The same, held for the tick.
+        commanded: The same, held.
+        duration: For how long, s.
         numbers: The plant.
 
     Returns:
         (x, y, theta) and the speeds. Speeds are exact; the chord is as long as its
         arc, along the mean heading.
     """
-    tick, lag = numbers.tick_s, numbers.motor_lag_s
-    kept = math.exp(-tick / lag)
-    left = commanded[0] + (speeds[0] - commanded[0]) * kept
-    right = commanded[1] + (speeds[1] - commanded[1]) * kept
-    way_left = commanded[0] * tick + (speeds[0] - commanded[0]) * lag * (1.0 - kept)
-    way_right = commanded[1] * tick + (speeds[1] - commanded[1]) * lag * (1.0 - kept)
+    lag = numbers.motor_lag_s
+    kept = math.exp(-duration / lag)
+    less_left, less_right = speeds[0] - commanded[0], speeds[1] - commanded[1]
+    left, right = commanded[0] + less_left * kept, commanded[1] + less_right * kept
+    way_left = commanded[0] * duration + less_left * lag * (1.0 - kept)
+    way_right = commanded[1] * duration + less_right * lag * (1.0 - kept)
     radius = numbers.wheel_radius_m
     way = 0.5 * radius * (way_left + way_right)
     turn = radius * (way_right - way_left) / numbers.wheel_separation_m
@@ -181,32 +186,41 @@ def can_be_braked(
     Returns:
         Whether it may.
     """
-    tick, radius = numbers.tick_s, numbers.wheel_radius_m
+    radius, lag = numbers.wheel_radius_m, numbers.motor_lag_s
     now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
     need = max(min(keep, now - _SLACK_M), least) if now >= least else now
     # A robot that turns in its place stays within its disc.
-    in_place = max(_ahead(commanded, radius) * 1e3, _ahead(speeds, radius)) < (
-        _IN_PLACE_M_S
+    in_place = (
+        _ahead(commanded, radius) < _IN_PLACE_M_S
+        and _ahead(speeds, radius) * lag < _IN_PLACE_M
     )
+    if now <= 0.0 and not in_place:  # nobody knows which way leads out of there
+        return False
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= numbers.slow_turn_rad_s
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
-    begin_x, begin_y = pose[0], pose[1]
-    ahead_s = 0.0
+    begin_x, begin_y, begin_theta = pose[0], pose[1], pose[2]
+    part_s = numbers.tick_s / numbers.parts
+    parts = 0
     while True:
-        pose, speeds = drive_a_tick(pose, speeds, commanded, numbers)
-        ahead_s += tick
+        pose, speeds = drive_wheels(pose, speeds, commanded, part_s, numbers)
+        parts += 1
         x, y = pose[0], pose[1]
         way = math.hypot(x - begin_x, y - begin_y)
         reached = nearest_cell(danger.corners, danger.corner_count, danger.cell_m, x, y)
         if reached < need and not in_place:
             return False
-        if moving and not _keeps_off_moving((x, y), ahead_s, way, danger, numbers):
+        # Of the axle, or of the disc's rim by the turn.
+        moved = max(way, keep * abs(pose[2] - begin_theta))
+        if moving and not _keeps_off_moving(
+            (x, y), parts * part_s, moved, danger, numbers
+        ):
             return False
         fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
-        if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest < _REST_M_S:
+        if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest * lag < _REST_M:
             return in_place or now >= least or reached >= now + 0.05 * way
-        commanded = braked(commanded, numbers)
+        if parts % numbers.parts == 0:
+            commanded = braked(commanded, numbers)
 
 
 @njit(cache=True)
@@ -217,7 +231,7 @@ def _ahead(speeds: Any, wheel_radius_m: float) -> float:  # pragma: no cover  (c
 
 @njit(cache=True)
 def _keeps_off_moving(
-    place: Any, ahead_s: float, way: float, danger: Danger, numbers: BrakingNumbers
+    place: Any, ahead_s: float, moved: float, danger: Danger, numbers: BrakingNumbers
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether nothing in view can come near by then, or the robot withdraws from it."""
     x, y = place
@@ -225,7 +239,7 @@ def _keeps_off_moving(
     if _nearest_view(danger, x, y, ahead_s, speed) >= numbers.keep_m:
         return True
     withdrawn = _nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
-    return way > 0.0 and withdrawn >= 0.5 * way
+    return moved > 0.0 and withdrawn >= 0.5 * moved
 
 
 @njit(cache=True)
@@ -245,13 +259,14 @@ def danger_of(
     Returns:
         All that ``can_be_braked`` takes.
     """
-    corners = np.empty((_MOST_CORNERS, 2))
+    # As many as there are cells in that square.
+    corners = np.empty((int(2.0 * reach[0] / space.cell_m + 3.0) ** 2, 2))
     until = space.facts[0, ROLLED] + reach[1]
     x, y = pose[0], pose[1]
     count = edge_cells(space, x, y, reach[0], until, corners)
     distance = nearest_cell(corners, count, space.cell_m, x, y)
     i, j = math.floor(x / space.cell_m), math.floor(y / space.cell_m)
-    if count > _MOST_CORNERS or not cell_is_free(space, i, j, until):
+    if not cell_is_free(space, i, j, until):
         distance = 0.0
     ages = time - space.arcs_s[:, 0]
     danger = Danger(corners, count, space.cell_m, distance, space.arcs, ages, np.inf)
@@ -295,6 +310,9 @@ def chosen(
             return PASSED if number == 0 else SLOWED, part
     slower = braked(commanded, numbers)
     ahead, turn = 0.5 * (slower[0] + slower[1]), 0.5 * (wish[1] - wish[0])
+    # What a wheel cannot do would be less of a turn than was looked at.
+    most = numbers.top_wheel_speed - abs(ahead)
+    turn = min(max(turn, -most), most)
     part = ahead - turn, ahead + turn
     if can_be_braked(pose, speeds, part, danger, numbers):
         return TURNED, part

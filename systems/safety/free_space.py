@@ -27,8 +27,10 @@ __all__ = [
 FIRST_I, FIRST_J, ROLLED, TICK = range(4)
 #: A cell that was never seen free.
 NEVER = -1.0
-#: How far the window's middle may lie behind the robot, cells.
+#: How far the window's middle may lie behind the robot, cells, and of a small window
+#: which share.
 _SLACK = 20
+_SLACK_SHARE = 8
 #: At a tick every so many-th row of cells is entered: the rest can wait.
 _ROWS = 4
 #: Hits of a cell at this distance count full, farther ones less: arcs are longer, m.
@@ -152,11 +154,12 @@ def move_window(
         y: See x.
     """
     cells = space.free_until.shape[0]
+    slack = min(_SLACK, cells // _SLACK_SHARE)
     for axis in range(2):
         place = x if axis == 0 else y
         first = int(space.facts[0, axis])
         wanted = math.floor(place / space.cell_m) - cells // 2
-        if abs(wanted - first) <= _SLACK:
+        if abs(wanted - first) <= slack:
             continue
         for k in range(min(first, wanted), max(first, wanted)):
             # Cells k leave on one side, and k + cells enter on the other, or vice
@@ -220,20 +223,38 @@ def edge_cells(
     cell, count = space.cell_m, 0
     low_i, low_j = math.floor((x - reach) / cell), math.floor((y - reach) / cell)
     high_i, high_j = math.floor((x + reach) / cell), math.floor((y + reach) / cell)
-    for i in range(low_i, high_i + 1):
-        for j in range(low_j, high_j + 1):
-            if cell_is_free(space, i, j, until):
-                continue
-            if (
-                cell_is_free(space, i - 1, j, until)
-                or cell_is_free(space, i + 1, j, until)
-                or cell_is_free(space, i, j - 1, until)
-                or cell_is_free(space, i, j + 1, until)
+    # The square with a cell more around it.
+    free = _free_cells(space, low_i - 1, low_j - 1, high_i + 1, high_j + 1, until)
+    for a in range(1, free.shape[0] - 1):
+        for b in range(1, free.shape[1] - 1):
+            if not free[a, b] and (
+                free[a - 1, b] or free[a + 1, b] or free[a, b - 1] or free[a, b + 1]
             ):
                 if count < out.shape[0]:
-                    out[count, 0], out[count, 1] = i * cell, j * cell
+                    out[count, 0] = (low_i - 1 + a) * cell
+                    out[count, 1] = (low_j - 1 + b) * cell
                 count += 1
     return count
+
+
+@njit(cache=True)
+def _free_cells(
+    space: FreeSpace, low_i: int, low_j: int, high_i: int, high_j: int, until: float
+) -> NDArray[np.bool_]:  # pragma: no cover  (compiled)
+    """``cell_is_free`` of the cells of a rectangle."""
+    cells = space.free_until.shape[0]
+    first_i, first_j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    free = np.zeros((high_i - low_i + 1, high_j - low_j + 1), dtype=np.bool_)
+    for i in range(max(low_i, first_i), min(high_i, first_i + cells - 1) + 1):
+        row = space.free_until[i % cells]
+        begin = max(low_j, first_j)
+        at = begin % cells
+        for j in range(begin, min(high_j, first_j + cells - 1) + 1):
+            free[i - low_i, j - low_j] = row[at] >= until
+            at += 1
+            if at == cells:
+                at = 0
+    return free
 
 
 @njit(cache=True)
@@ -291,6 +312,7 @@ def see(
         ahead, aside = sectors.places[group]
         sx, sy = pose[0] + c * ahead - s * aside, pose[1] + s * ahead + c * aside
         right, left = sectors.right[begin, 0], sectors.left[end - 1, 0]
+        from_axle = math.hypot(ahead, aside)
         farthest = np.max(seen[begin:end, 2])
         box = _sector_box(sx, sy, pose[2] + right, pose[2] + left, farthest + cell)
         low_i = max(math.floor(box[0] / cell), int(space.facts[0, FIRST_I]))
@@ -316,7 +338,9 @@ def see(
                 )
                 at = i % cells, j % cells
                 if free >= distance + half:
-                    until = space.facts[0, ROLLED] + lasting(distance, drift)
+                    until = space.facts[0, ROLLED] + lasting(
+                        distance + from_axle, drift
+                    )
                     space.free_until[at] = max(space.free_until[at], until)
                     space.seen_s[at] = time
                     space.hits[at] = 0.0
@@ -413,7 +437,7 @@ def lasting(distance: float, drift: Any) -> float:  # pragma: no cover  (compile
     error of the way, and that of the heading times the distance.
 
     Args:
-        distance: Of the cell when it was seen, m.
+        distance: Of the cell from the axle when it was seen, m, or more.
         drift: (wheel error e, allowed error of the place, m, wheel separation L, m).
 
     Returns:

@@ -36,7 +36,13 @@ from systems.safety.free_space import (
     see,
 )
 
-__all__ = ["FreeSpaceMap", "FreeSpaceParameters", "body_radius", "sensor_sectors"]
+__all__ = [
+    "FreeSpaceMap",
+    "FreeSpaceParameters",
+    "body_radius",
+    "map_step",
+    "sensor_sectors",
+]
 
 #: Cells of a window at most: 16 million take 0.4 GB.
 _MOST_CELLS = 4_000

@@ -43,7 +43,9 @@ obstacles:
 stop: {goal_margin_m: 0.2, stuck_after_s: 5}
 room: {size_m: [8, 8, 3], reverberation_time_s: 0.3}
 sources: {source: {}, fan: {waypoints_m: [[0, 3]], sound: {kind: band_noise}}}
-robots: {robot: {}, second: {hearing: audio, start: {position_m: [-2, -1]}}}
+robots:
+  robot: {obstacle_sensing: ultrasonic}
+  second: {hearing: audio, obstacle_sensing: ultrasonic, start: {position_m: [-2, -1]}}
 acoustics: {temperature_c: 25}
 ideal_hearing: {burst_gaps: false, bearing_noise_deg: 1}
 tracker: {hold: robot, maximum_age_s: 4}
@@ -54,6 +56,8 @@ repulsion: {velocity_term: closing}
 robot: {mass_kg: 5}
 plant: {motor_lag_s: 0.1, slip: [0.1, 0]}
 odometry: {rounding: false}
+guard: {margin_m: 0.02}
+free_space: {cell_m: 0.04}
 integrator: {scheme: runge_kutta2, step_s: 0.005}
 """
 

@@ -17,6 +17,7 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "CollisionVector": {"sensors": IN_TURN},
     "IdealSourceSensor": {},
     "MicArray": {},
+    "MotionGuard": {},
     "SoundEmitter": {},
     "SourceTracker": {},
     "TDOAEstimator": {},

@@ -26,6 +26,8 @@ from systems.framework.signals import (
     Emission,
 )
 from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.safety.free_space import make_free_space
+from systems.safety.free_space_map import FreeSpaceParameters
 from systems.sound.adc import MicArrayParameters, convert
 from systems.sound.sound_emitter import make_emission
 from systems.sound.waveforms import SoundParameters
@@ -40,6 +42,11 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
 } | {
     # Fired at once, it reads neither ages nor pose.
     "CollisionVector": ({"sensors": UltrasonicParameters(firing="sequential")},),
+    # With wheel errors it keeps what lies under the body.
+    "FreeSpaceMap": (
+        {},
+        {"parameters": FreeSpaceParameters(wheel_error=0.01, place_error_m=0.03)},
+    ),
     "IdealObstacleSensor": ({"obstacle_count": 2},),
     "MicArray": ({}, {"others": ["radio"]}),
     "UltrasonicArray": (
@@ -73,6 +80,8 @@ def fix(block: Any, context: Any, port: Any, value: Any) -> None:
 
 
 def good_value(port: Any, level: float) -> Any:
+    if port.get_name() == "free_space":
+        return make_free_space(100, 0.05, 3, 17)
     if port.get_data_type() == PortDataType.kAbstractValued:
         return audio() if port.get_name() == "audio" else emission()
     if port.get_name() == "range_ages":
@@ -100,9 +109,14 @@ def spoilt(good: Any, bad: float) -> Iterator[tuple[str, Any]]:
 
 
 def injections(block: Any, level: float) -> Iterator[tuple[Any, str, Any]]:
-    """A context with one input that is not finite, and that input's name."""
+    """A context with one input that is not finite, and that input's name.
+
+    Space that is known for ever is so up to an infinite way: no fault of the map.
+    """
     ports = [block.get_input_port(i) for i in range(block.num_input_ports())]
     for port in ports:
+        if port.get_name() == "free_space":
+            continue
         for bad in NOT_FINITE:
             for element, value in spoilt(good_value(port, level), bad):
                 context = block.CreateDefaultContext()

@@ -55,6 +55,15 @@ FIELDS = {
     "CollisionVectorParameters.pair_separation_m": (0.0, 1e3),
     "TrackerParameters.measurement_floor_m": (0.0, 1e3),
     "TrackerParameters.believed_outliers": (1, 1000),
+    # Cells below 5 mm are too many for a window, above 25 cm too few.
+    "FreeSpaceParameters.cell_m": (0.005, 0.25),
+    "FreeSpaceParameters.range_margin_m": (0.0, 1e3),
+    "FreeSpaceParameters.wheel_error": (0.0, 1.0),
+    "FreeSpaceParameters.place_error_m": (0.0, 1e3),
+    "GuardParameters.obstacle_speed_m_s": (0.0, 100.0),
+    "GuardParameters.margin_m": (0.0, 1e3),
+    "GuardParameters.least_margin_m": (0.0, 1e3),
+    "GuardParameters.slow_turn_rad_s": (0.0, 10.0),
     # Air on earth; speeds of sound from rubber to steel.
     "AcousticParameters.temperature_c": (-50.0, 60.0),
     "UltrasonicParameters.beam_half_angle_deg": (ABOVE_0, math.nextafter(90.0, 0.0)),
@@ -118,7 +127,7 @@ LENGTHS = {
     "SourceRobotParameters.waypoints_m": (None, 1000),
     "RobotParameters.microphones_m": (3, None),
 }
-#: A room and an obstacle of which nothing is said.
+#: A room, an obstacle and a guard of which nothing is said.
 DEFAULTS = {
     "RoomParameters.size_m": [7.0, 7.0, 3.0],
     "RoomParameters.reverberation_time_s": 0.4,
@@ -134,6 +143,11 @@ DEFAULTS = {
     "ObstacleParameters.start_time_s": 0.0,
     "ObstacleParameters.at_end": "stop",
     "ObstacleParameters.corner_radius_m": 0.05,
+    "GuardParameters.obstacle_speed_m_s": 0.0,
+    "GuardParameters.braking_m_s2": 1.5,
+    "GuardParameters.margin_m": 0.012,
+    "GuardParameters.least_margin_m": 0.009,
+    "GuardParameters.slow_turn_rad_s": 0.3,
 }
 
 

@@ -1,0 +1,403 @@
+"""What can be braked: the motion that is foreseen, zones at an edge, moving bodies."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from systems.base.diff_drive_plant import (
+    PlantNumbers,
+    PlantParameters,
+    plant_derivatives,
+)
+from systems.base.robot import RobotParameters
+from systems.safety.braking import (
+    BRAKED,
+    PASSED,
+    SLOWED,
+    TURNED,
+    BrakingNumbers,
+    Danger,
+    braked,
+    can_be_braked,
+    chosen,
+    danger_of,
+    drive_wheels,
+)
+from systems.safety.free_space import clear_disc, make_free_space
+
+RADIUS = 0.5 * math.hypot(0.35, 0.82)
+WHEEL_M, AXLE_M, LAG_S, TICK_S = 0.06, 0.41, 0.05, 0.025
+NUMBERS = BrakingNumbers(
+    wheel_radius_m=WHEEL_M,
+    wheel_separation_m=AXLE_M,
+    motor_lag_s=LAG_S,
+    braking_m_s2=1.5,
+    tick_s=TICK_S,
+    parts=1,
+    top_wheel_speed=12.0,
+    keep_m=RADIUS + 0.012,
+    least_m=RADIUS + 0.009,
+    obstacle_speed_m_s=0.0,
+    slow_turn_rad_s=0.3,
+)
+ARC = np.full((1, 2, 2), 100.0)
+PLANT = PlantNumbers.of(RobotParameters(), PlantParameters())
+
+
+def by_the_plant(
+    state: NDArray[np.float64], commanded: Any, duration: float = TICK_S
+) -> NDArray[np.float64]:
+    """The plant's own equations, integrated to 1e-10; (7, 6) in between and at last."""
+    solution = solve_ivp(
+        lambda _, x: plant_derivatives(x, np.asarray(commanded, dtype=float), *PLANT),
+        (0.0, duration),
+        state,
+        rtol=1e-10,
+        atol=1e-12,
+        t_eval=np.linspace(0.0, duration, 6),
+    )
+    return np.asarray(solution.y)
+
+
+def straight(speed_m_s: float) -> tuple[float, float]:
+    return (speed_m_s / WHEEL_M,) * 2
+
+
+def danger(corners: Any, x: float = 0.0, y: float = 0.0) -> Danger:
+    """Cells of 5 cm, by their corners of least x and y."""
+    cells = np.reshape(np.array(corners, dtype=float), (-1, 2))
+    near = np.maximum(np.maximum(cells - [x, y], [x, y] - cells - 0.05), 0.0)
+    distance = float(np.hypot(*near.T).min()) if len(cells) else math.inf
+    return Danger(cells, len(cells), 0.05, distance, ARC, np.zeros(1), math.inf)
+
+
+def wall_at(distance: float) -> Danger:
+    """Cells ahead, their nearest side so far from the axle."""
+    return danger([(distance, y) for y in np.arange(-1.0, 1.0, 0.05)])
+
+
+def test_the_foreseen_tick_is_that_of_the_plant():
+    """Speeds to rounding; places to 0.07 mm a tick at full turns, headings exactly."""
+    draw = np.random.default_rng(0)
+    worst = 0.0
+    for _ in range(200):
+        pose, speeds, commanded = (
+            draw.uniform(-3, 3, 3),
+            draw.uniform(-12, 12, 2),
+            draw.uniform(-12, 12, 2),
+        )
+        end = by_the_plant(np.array([*pose, 0.0, 0.0, *speeds]), commanded)[:, -1]
+        moved, after = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+        np.testing.assert_allclose(after, end[5:], atol=1e-8)
+        assert moved[2] == pytest.approx(end[2], abs=1e-8)
+        worst = max(worst, math.dist(moved[:2], end[:2]))
+    assert worst < 7e-5
+
+
+def test_a_whole_braking_is_foreseen_to_a_fifth_of_a_millimetre():
+    """From speeds that a guard lets be: as commanded a tick ago."""
+    draw = np.random.default_rng(1)
+    worst = 0.0
+    for _ in range(60):
+        commanded = tuple(draw.uniform(-12, 12, 2))
+        speeds = np.array(commanded) * draw.uniform(0.5, 1.0, 2)
+        state = np.array([0.0, 0.0, 0.0, 0.0, 0.0, *speeds])
+        pose: Any = (0.0, 0.0, 0.0)
+        for _ in range(30):
+            state = by_the_plant(state, commanded)[:, -1]
+            pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+            worst = max(worst, math.dist(pose[:2], state[:2]))
+            commanded = braked(commanded, NUMBERS)
+        assert commanded == (0.0, 0.0)
+    assert worst < 2e-4
+
+
+@pytest.mark.parametrize("speed", [0.05, 0.3, 0.6, 0.72])
+@pytest.mark.parametrize("braking", [0.5, 1.5, 4.0])
+def test_braking_takes_the_closed_form_way(speed, braking):
+    """Of commands v - k a T, summed, and of the lag, v lag; below v^2/2a + v lag."""
+    numbers = NUMBERS._replace(braking_m_s2=braking)
+    commanded, speeds, pose = straight(speed), straight(speed), (0.0, 0.0, 0.0)
+    ticks = 0
+    while commanded != (0.0, 0.0):
+        commanded = braked(commanded, numbers)
+        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+        ticks += 1
+    for _ in range(100):
+        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+    assert abs(ticks - speed / (braking * TICK_S)) < 1.001
+    steps = np.arange(1, 100)
+    sums = np.maximum(speed - steps * braking * TICK_S, 0.0).sum() * TICK_S
+    assert pose[0] == pytest.approx(sums + speed * LAG_S, abs=1e-12)
+    assert pose[0] <= speed**2 / (2.0 * braking) + speed * LAG_S
+
+
+def test_braking_keeps_the_curve():
+    slower = braked((10.0, 4.0), NUMBERS)
+    assert slower[1] / slower[0] == pytest.approx(0.4)
+    assert (10.0 - slower[0]) * WHEEL_M == pytest.approx(1.5 * TICK_S)
+    assert braked((-0.5, 0.3), NUMBERS) == (0.0, 0.0)
+
+
+def nearest_on_the_way(
+    speeds: Any, commanded: Any, cells: NDArray[np.float64]
+) -> tuple[float, float]:
+    """Least distance from cells on the way to rest, and the one at its end.
+
+    By the plant's equations, six instants a tick, until the wheels have nearly stopped.
+    """
+    state, least = np.array([0.0, 0.0, 0.0, 0.0, 0.0, *speeds]), math.inf
+    left, right = commanded
+    while True:
+        path = by_the_plant(state, (left, right))
+        beyond = cells[:, :, None] - path[None, :2]
+        near = np.maximum(np.maximum(beyond, -beyond - 0.05), 0.0)
+        distances = np.hypot(near[:, 0], near[:, 1]).min(axis=0)
+        least, state = min(least, distances[1:].min()), path[:, -1]
+        if left == right == 0.0 and np.abs(state[5:]).max() < 1e-3:
+            return least, float(distances[-1])
+        fastest = max(abs(left), abs(right)) * WHEEL_M
+        share = max(0.0, 1.0 - 1.5 * TICK_S / fastest) if fastest > 0.0 else 0.0
+        left, right = left * share, right * share
+
+
+def test_what_can_be_braked_is_what_a_finer_simulation_brakes():
+    """Cells at random; decisions that hang on half a millimetre are left out."""
+    draw, judged = np.random.default_rng(4), {True: 0, False: 0}
+    for _ in range(250):
+        speeds, commanded = draw.uniform(-12, 12, (2, 2))
+        angle, far = draw.uniform(0, math.tau, 6), draw.uniform(0.5, 1.0, 6)
+        cells = np.column_stack([far * np.cos(angle), far * np.sin(angle)]) - 0.025
+        at_hand = danger(cells)
+        if at_hand.distance_m < NUMBERS.keep_m + 0.001:
+            continue
+        least, _ = nearest_on_the_way(speeds, commanded, cells)
+        if abs(least - NUMBERS.keep_m) < 5e-4:
+            continue
+        found = can_be_braked(
+            (0.0, 0.0, 0.0), tuple(speeds), tuple(commanded), at_hand, NUMBERS
+        )
+        assert found == (least >= NUMBERS.keep_m)
+        judged[found] += 1
+    assert min(judged.values()) > 30, judged
+
+
+@pytest.mark.parametrize(
+    ("beyond_keep", "way", "may"),
+    [
+        # Above the margin: as far as to it.
+        (0.05, 0.045, True),
+        (0.05, 0.055, False),
+        # In between: by half a millimetre, and not below the least.
+        (-0.001, 0.0004, True),
+        (-0.001, 0.0008, False),
+        (-0.0028, 0.0001, True),
+        (-0.0028, 0.0005, False),
+        (-0.001, -0.02, True),
+        # Below: away only.
+        (-0.004, 0.0002, False),
+        (-0.004, -0.0002, True),
+        (-0.1, -0.02, True),
+        (-0.1, 0.001, False),
+    ],
+)
+def test_the_three_zones(beyond_keep, way, may):
+    """Straight ways to a wall: a tick of a command, and what braking adds.
+
+    The last 0.2 mm, which the lag leaves, are not foreseen.
+    """
+    at_hand = wall_at(NUMBERS.keep_m + beyond_keep)
+    # A command below the braking of a tick is followed by rest: its way is c T.
+    for speed in np.linspace(-0.72, 0.72, 28_801):
+        pose, commanded = 0.0, speed
+        while commanded != 0.0:
+            pose += commanded * TICK_S
+            less = abs(commanded) - 1.5 * TICK_S
+            commanded = math.copysign(max(less, 0.0), commanded)
+        if abs(pose - way) < 2e-5:
+            break
+    else:
+        raise AssertionError("no such way")
+    rest: Any = (0.0, 0.0)
+    args = (0.0, 0.0, 0.0), rest, straight(speed), at_hand, NUMBERS
+    assert can_be_braked(*args) == may
+
+
+def test_turning_in_place_always_passes():
+    for beyond in (0.1, 0.0, -0.002, -0.01, -0.4):
+        at_hand = wall_at(NUMBERS.keep_m + beyond)
+        for speeds in ((0.0, 0.0), (-10.0, 10.0)):
+            args = (0.0, 0.0, 0.0), speeds, (-12.0, 12.0), at_hand, NUMBERS
+            assert can_be_braked(*args)
+    # With a millimetre a second ahead or more it is no turn in place.
+    args = (0.0, 0.0, 0.0), (0.0, 0.0), (-12.0, 12.1), wall_at(0.452), NUMBERS
+    assert not can_be_braked(*args)
+
+
+def test_from_where_nothing_is_known_nothing_leads_out():
+    nowhere = wall_at(0.3)._replace(distance_m=0.0)
+    for speed in (0.1, -0.1):
+        args = (0.0, 0.0, 0.0), (0.0, 0.0), straight(speed), nowhere, NUMBERS
+        assert not can_be_braked(*args)
+
+
+def test_a_long_tick_is_looked_at_in_parts():
+    """In a tick of 1 s it passes a cell, with 36 cm of room before and behind it."""
+    numbers = NUMBERS._replace(tick_s=1.0, braking_m_s2=1.0)
+    corner = danger([(0.5, NUMBERS.keep_m - 0.01)])
+    args = (0.0, 0.0, 0.0), straight(0.72), straight(0.72), corner
+    assert not can_be_braked(*args, numbers._replace(parts=40))
+
+
+@pytest.mark.parametrize("lag", [0.05, 1.0])
+def test_at_rest_no_way_is_left(lag):
+    """What is cut off after the last look is a fifth of a millimetre, at any lag."""
+    numbers = NUMBERS._replace(motor_lag_s=lag)
+    way = 0.1 * (TICK_S + 2.0 * lag)
+    for ahead in np.arange(0.0, way, 5e-4):
+        at_hand = wall_at(NUMBERS.keep_m + ahead)
+        args = (0.0, 0.0, 0.0), straight(0.1), straight(0.1), at_hand, numbers
+        if can_be_braked(*args):
+            break
+    commanded, speeds, pose = straight(0.1), straight(0.1), (0.0, 0.0, 0.0)
+    for _ in range(int(20.0 * lag / TICK_S) + 100):
+        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+        commanded = braked(commanded, numbers)
+    assert pose[0] <= ahead + 2.1e-4
+
+
+def press(wish: Any, ticks: int, error_m: float = 0.0, seed: int = 0) -> float:
+    """Least distance from the edge of a bubble that a driver reaches who presses.
+
+    Where models are wrong the robot is moved by up to error_m a tick besides.
+    """
+    draw = np.random.default_rng(seed)
+    space = make_free_space(80, 0.05, 1, 2)
+    clear_disc(space, 0.0, 0.0, 1.0, math.inf)
+    pose: Any = (0.0, 0.0, 0.0)
+    speeds: Any = (0.0, 0.0)
+    commanded: Any = (0.0, 0.0)
+    least = math.inf
+    for tick in range(ticks):
+        at_hand = danger_of(space, tick * TICK_S, pose, (1.0, 0.5), NUMBERS)
+        least = min(least, at_hand.distance_m)
+        _, commanded = chosen(
+            pose, speeds, wish(tick, pose), commanded, at_hand, NUMBERS
+        )
+        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+        off = draw.uniform(-error_m, error_m, 2)
+        pose = pose[0] + off[0], pose[1] + off[1], pose[2]
+    return least - RADIUS
+
+
+@pytest.mark.parametrize(
+    "wish",
+    [
+        lambda tick, pose: (12.0, 12.0),
+        lambda tick, pose: (-12.0, -12.0),
+        lambda tick, pose: (3.0, 8.0),
+        lambda tick, pose: (-12.0, -11.0),
+        lambda tick, pose: (2.0 * math.sin(0.3 * tick) + 9.0, 9.0),
+        lambda tick, pose: (12.0, 12.0) if tick % 7 else (-12.0, 12.0),
+        lambda tick, pose: (0.9, 0.9),
+    ],
+)
+def test_a_driver_who_presses_stays_off_by_the_least_margin(wish):
+    """For 10 s; and it does come as near as to the margin."""
+    assert 0.009 - 3e-4 <= press(wish, 400) <= 0.04
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_nor_does_it_where_models_are_wrong(seed):
+    """A random walk of 0.1 mm a tick pushes it below the least; then it leaves."""
+    least = press(lambda tick, pose: (12.0, 12.0), 2000, 1e-4, seed)
+    assert 0.005 < least < 0.0125
+
+
+def test_what_is_chosen():
+    far, rest = wall_at(5.0), (0.0, 0.0)
+    here: Any = (0.0, 0.0, 0.0)
+    wish = straight(0.5)
+    assert chosen(here, rest, wish, rest, far, NUMBERS) == (PASSED, wish)
+    # Room for 2 cm: part of the wish, along its curve.
+    near = wall_at(NUMBERS.keep_m + 0.02)
+    done, wheels = chosen(here, rest, (10.0, 9.0), rest, near, NUMBERS)
+    assert done == SLOWED
+    assert wheels[1] / wheels[0] == pytest.approx(0.9)
+    assert 0.0 < wheels[0] < 10.0
+    # Room for nothing but a turn.
+    near = wall_at(NUMBERS.keep_m)
+    done, wheels = chosen(here, rest, (12.0, 4.0), rest, near, NUMBERS)
+    assert (done, wheels) == (TURNED, (4.0, -4.0))
+    # Not even that: braking goes on as it was found possible.
+    speed = straight(0.72)
+    done, wheels = chosen(here, speed, speed, speed, near, NUMBERS)
+    assert done == BRAKED
+    assert wheels == braked(speed, NUMBERS)
+
+
+def moving(speed: float) -> BrakingNumbers:
+    return NUMBERS._replace(obstacle_speed_m_s=speed)
+
+
+def view(distance: float, age: float = 0.0) -> Danger:
+    """A view that ends so far ahead of the axle; nothing else is near."""
+    arc = np.array([[[distance, y] for y in np.linspace(-0.5, 0.5, 41)]])
+    nothing = np.empty((0, 2))
+    return Danger(nothing, 0, 0.05, math.inf, arc, np.array([age]), distance)
+
+
+@pytest.mark.parametrize("age", [0.0, 0.1])
+@pytest.mark.parametrize("obstacle_speed", [0.2, 0.6])
+def test_what_comes_nearer_is_kept_off_until_rest(age, obstacle_speed):
+    """Least room for going on at 0.5 m/s: way to rest, and what comes until then."""
+    speed = 0.5
+    for ahead in np.arange(0.0, 1.5, 1e-3):
+        args = (0.0, 0.0, 0.0), straight(speed), straight(speed)
+        at_hand = view(NUMBERS.keep_m + ahead, age)
+        if can_be_braked(*args, at_hand, moving(obstacle_speed)):
+            break
+    # Rest is where the lag leaves 0.2 mm, 4 mm/s.
+    state, t, needed = np.array([0.0] * 5 + [speed / WHEEL_M] * 2), 0.0, 0.0
+    commanded = speed
+    while True:
+        state = by_the_plant(state, straight(commanded))[:, -1]
+        t += TICK_S
+        needed = max(needed, state[0] + obstacle_speed * (t + age))
+        if commanded == 0.0 and state[5] * WHEEL_M < 0.004:
+            break
+        commanded = max(0.0, commanded - 1.5 * TICK_S)
+    assert ahead == pytest.approx(needed, abs=1.1e-3)
+
+
+def test_at_rest_and_turning_slowly_it_may_be_touched_turning_fast_it_may_not():
+    at_hand, rest = view(NUMBERS.keep_m + 0.01), (0.0, 0.0)
+    turn = 0.3 * AXLE_M / 2.0 / WHEEL_M
+    here: Any = (0.0, 0.0, 0.0)
+    for share, may in ((0.99, True), (1.01, False)):
+        wish = -share * turn, share * turn
+        assert can_be_braked(here, rest, wish, at_hand, moving(0.5)) == may
+    assert can_be_braked(here, rest, rest, at_hand, moving(0.5))
+
+
+def test_it_may_withdraw_from_what_comes():
+    at_hand, rest = view(NUMBERS.keep_m - 0.05), (0.0, 0.0)
+    here: Any = (0.0, 0.0, 0.0)
+    assert can_be_braked(here, rest, straight(-0.3), at_hand, moving(0.5))
+    assert not can_be_braked(here, rest, straight(0.3), at_hand, moving(0.5))
+
+
+def test_a_fast_turn_is_no_withdrawal():
+    """Drifting back by 6 mm/s, it would swing the bar's end into what is near."""
+    at_hand, rest = view(NUMBERS.keep_m - 0.05), (0.0, 0.0)
+    here: Any = (0.0, 0.0, 0.0)
+    assert not can_be_braked(here, rest, (-12.0, 11.8), at_hand, moving(0.5))
+    assert can_be_braked(here, rest, (-0.1, -0.1), at_hand, moving(0.5))
+    # A curve that leads away by more than it turns is one.
+    assert can_be_braked(here, rest, (-6.0, -5.0), at_hand, moving(0.5))

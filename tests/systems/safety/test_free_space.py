@@ -1,0 +1,375 @@
+"""Cells of free space: seen as a whole, remembered, forgotten, and their edge."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.safety.free_space import (
+    FIRST_I,
+    FIRST_J,
+    NEVER,
+    ROLLED,
+    FreeSpace,
+    cell_is_free,
+    clear_disc,
+    edge_cells,
+    end_view,
+    lasting,
+    make_free_space,
+    move_window,
+    nearest_cell,
+    see,
+)
+from systems.safety.free_space_map import sensor_sectors
+from systems.world.geometry import fan_ranges
+
+CONTROL_POINT_M = 0.175
+CELL_M = 0.05
+NO_DRIFT = (0.0, 0.0, 0.41)
+BEHIND = ((0, 0), (0, 0), (0, 0), (-0.35, 0), (-0.35, 0), (-0.35, 0))
+SETS: dict[str, dict[str, Any]] = {
+    "the papers' three": {},
+    "ring of 12": {"axes_deg": 12},
+    "three more behind": {
+        "axes_deg": (30.0, 0.0, -30.0, -150.0, -180.0, -210.0),
+        "positions_m": BEHIND,
+    },
+    "apart from each other": {"positions_m": ((0, 0.3), (0.02, 0), (0, -0.3))},
+    "72 narrow beams": {"axes_deg": 72, "beam_half_angle_deg": 2.5},
+    "with overlaps": {"axes_deg": (25.0, 0.0, -12.0), "beam_half_angle_deg": 17.0},
+    "ring that overlaps": {"axes_deg": 8, "beam_half_angle_deg": 40.0},
+    "with a gap": {"axes_deg": (40.0, 0.0, -30.0)},
+}
+
+
+def sensors_of(name: str) -> UltrasonicParameters:
+    return UltrasonicParameters.model_validate({"noise_m": 0.0, **SETS[name]})
+
+
+def ranges_of(
+    sensors: UltrasonicParameters, pose: NDArray[np.float64], boxes: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Free ways as the cones measure them, m."""
+    axes, places, half = sensors.beams
+    ranges = fan_ranges(pose, boxes, axes, places, half, CONTROL_POINT_M)
+    return np.minimum(ranges, sensors.maximum_range_m)
+
+
+def seen_space(
+    sensors: UltrasonicParameters, pose: NDArray[np.float64], boxes: NDArray[np.float64]
+) -> FreeSpace:
+    """What one look of all rows enters."""
+    space = make_free_space(160, CELL_M, sensors.count, 17)
+    free = ranges_of(sensors, pose, boxes)
+    readings = np.column_stack([free, np.full(sensors.count, np.inf)])
+    sectors = sensor_sectors(sensors, CONTROL_POINT_M)
+    for tick in range(4):
+        see(space, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+    return space
+
+
+def free_cells(space: FreeSpace) -> set[tuple[int, int]]:
+    n = space.free_until.shape[0]
+    first = space.facts[0, FIRST_I], space.facts[0, FIRST_J]
+    i, j = (range(int(f), int(f) + n) for f in first)
+    return {(a, b) for a in i for b in j if cell_is_free(space, a, b, 0.0)}
+
+
+def is_seen(
+    sensors: UltrasonicParameters,
+    pose: NDArray[np.float64],
+    boxes: NDArray[np.float64],
+    points: NDArray[np.float64],
+) -> NDArray[np.bool_]:
+    """(m, sensors) whose reading an obstacle at each of (m, 2) points would shorten."""
+    before = ranges_of(sensors, pose, boxes)
+    seen = np.zeros((len(points), sensors.count), dtype=bool)
+    for k, (x, y) in enumerate(points):
+        box = np.vstack([boxes, [x, y, 0.0, 1e-7, 1e-7]])
+        seen[k] = ranges_of(sensors, pose, box) < before + 1e-6
+        seen[k] &= ranges_of(sensors, pose, box[-1:]) < before + 1e-6
+        seen[k] &= ranges_of(sensors, pose, box[-1:]) < sensors.maximum_range_m
+    return seen
+
+
+def scene(seed: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """A pose and boxes around it."""
+    draw = np.random.default_rng(seed)
+    pose = draw.uniform([-0.3, -0.3, -math.pi], [0.3, 0.3, math.pi])
+    angle, distance = draw.uniform(-math.pi, math.pi, 8), draw.uniform(0.9, 3.0, 8)
+    boxes = np.column_stack(
+        [
+            pose[0] + distance * np.cos(angle),
+            pose[1] + distance * np.sin(angle),
+            draw.uniform(0, math.pi, 8),
+            draw.uniform(0.02, 0.6, 8),
+            draw.uniform(0.02, 0.3, 8),
+        ]
+    )
+    return pose, boxes
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_free_cell_was_seen_as_a_whole(name):
+    """An obstacle anywhere in it would have shortened a reading."""
+    sensors, share = sensors_of(name), np.array([0.0, 0.5, 1.0])
+    grid = np.stack(np.meshgrid(share, share), axis=-1).reshape(-1, 2)
+    for seed in range(2):
+        pose, boxes = scene(seed)
+        cells = np.array(sorted(free_cells(seen_space(sensors, pose, boxes))))
+        assert len(cells) > 100
+        draw = np.random.default_rng(seed)
+        for cell in draw.choice(cells, size=min(len(cells), 300), replace=False):
+            points = (cell + grid) * CELL_M
+            assert is_seen(sensors, pose, boxes, points).any(axis=1).all(), cell
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_a_cell_whose_whole_round_is_seen_from_one_place_is_free(name):
+    """Else nothing would ever count as free."""
+    sensors = sensors_of(name)
+    pose, boxes = scene(5)
+    space = seen_space(sensors, pose, boxes)
+    half = CELL_M * math.sqrt(0.5)
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    draw, whole = np.random.default_rng(1), 0
+    for i, j in draw.integers(-60, 60, size=(400, 2)):
+        middle = (np.array([i, j]) + 0.5) * CELL_M
+        for place in set(sensors.places):
+            ahead, aside = CONTROL_POINT_M + place[0], place[1]
+            offset = c * ahead - s * aside, s * ahead + c * aside
+            sensor = np.add(pose[:2], offset)
+            distance = math.dist(middle, sensor)
+            if distance < 2.0 * half + 1e-6 or distance > 3.1:
+                continue
+            hides = math.asin(half / distance) * (1.0 + 1e-6)
+            towards = middle - sensor
+            bearing = np.linspace(-hides, hides, 15) + math.atan2(*towards[::-1])
+            round_ = sensor + (distance + half + 1e-5) * np.column_stack(
+                [np.cos(bearing), np.sin(bearing)]
+            )
+            there = np.array([p == place for p in sensors.places])
+            seen = is_seen(sensors, pose, boxes, round_)[:, there]
+            # Seen at that distance in all directions, by sensors at one place.
+            if seen.any(axis=1).all():
+                whole += 1
+                assert cell_is_free(space, i, j, 0.0), (i, j)
+    assert whole > 5
+
+
+def ring_of(count: int, half_angle_deg: float) -> set[tuple[int, int]]:
+    sensors = UltrasonicParameters(
+        axes_deg=count,  # type: ignore[arg-type]
+        beam_half_angle_deg=half_angle_deg,
+    )
+    return free_cells(
+        seen_space(sensors, np.array([0.013, 0.02, 0.3]), np.empty((0, 5)))
+    )
+
+
+@pytest.mark.parametrize("count", [12, 72])
+def test_beams_with_common_edges_see_what_one_disc_holds(count):
+    """A ring without gaps sees all cells within its range, but for those at itself."""
+    x = 0.013 + CONTROL_POINT_M * math.cos(0.3)
+    y = 0.02 + CONTROL_POINT_M * math.sin(0.3)
+    half = CELL_M * math.sqrt(0.5)
+    expected = {
+        (i, j)
+        for i in range(-70, 70)
+        for j in range(-70, 70)
+        if 2.0 * half
+        <= math.hypot((i + 0.5) * CELL_M - x, (j + 0.5) * CELL_M - y)
+        <= 3.0 - half
+    }
+    assert ring_of(count, 180.0 / count) == expected
+
+
+def test_beams_with_gaps_see_no_cell_that_lies_in_one():
+    """Half a degree between beams is wider than nothing: far cells lie over gaps."""
+    cells = ring_of(72, 2.25)
+    assert cells  # near ones and far ones fit into 4.5 deg
+    x = 0.013 + CONTROL_POINT_M * math.cos(0.3)
+    y = 0.02 + CONTROL_POINT_M * math.sin(0.3)
+    half = CELL_M * math.sqrt(0.5)
+    for i, j in cells:
+        dx, dy = (i + 0.5) * CELL_M - x, (j + 0.5) * CELL_M - y
+        off = (math.degrees(math.atan2(dy, dx) - 0.3) + 2.5) % 5.0 - 2.5
+        hides = math.degrees(math.asin(half / math.hypot(dx, dy)))
+        assert abs(off) + hides <= 2.25 + 1e-9
+
+
+def test_every_fourth_row_at_a_tick():
+    sensors = sensors_of("the papers' three")
+    sectors = sensor_sectors(sensors, CONTROL_POINT_M)
+    readings = np.array([[2.0, np.inf]] * 3)
+    pose = np.zeros(3)
+    whole = make_free_space(160, CELL_M, 3, 17)
+    for tick in range(4):
+        space = make_free_space(160, CELL_M, 3, 17)
+        see(space, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+        cells = free_cells(space)
+        assert {(i - tick) % 4 for i, _ in cells} == {0}
+        see(whole, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+        assert free_cells(whole) >= cells
+
+
+def test_an_echo_is_counted_where_it_came_from_until_the_cell_is_seen_free():
+    sensors = sensors_of("the papers' three")
+    sectors = sensor_sectors(sensors, CONTROL_POINT_M)
+    space = make_free_space(160, CELL_M, 3, 17)
+    pose = np.zeros(3)
+    readings = np.array([[0.0, np.inf], [1.18, 1.2], [0.0, np.inf]])
+    for tick in range(8):
+        see(space, 0.1 * tick, tick, pose, sectors, readings, NO_DRIFT)
+    i = math.floor((CONTROL_POINT_M + 1.2) / CELL_M)
+    assert 0.9 < space.hits[i, 0] <= 2.0
+    assert not cell_is_free(space, i, 0, 0.0)
+    readings[1] = 2.0, np.inf
+    for tick in range(4):
+        see(space, 1.0, tick, pose, sectors, readings, NO_DRIFT)
+    assert space.hits[i, 0] == 0.0
+    assert space.seen_s[i, 0] == 1.0
+    assert cell_is_free(space, i, 0, 1e9)
+
+
+@pytest.mark.parametrize(("x", "y"), [(3.2, 0.0), (-2.4, 5.0), (0.3, -9.0), (40, 40)])
+def test_the_window_forgets_what_leaves_it_and_keeps_what_stays(x, y):
+    space = make_free_space(64, CELL_M, 1, 2)
+    draw = np.random.default_rng(3)
+    space.free_until[:] = draw.choice([NEVER, 7.0], size=(64, 64))
+    space.seen_s[:] = space.free_until
+    before = free_cells(space)
+    move_window(space, x, y)
+    i, j = int(space.facts[0, FIRST_I]), int(space.facts[0, FIRST_J])
+    # A window of 64 may lag behind by an eighth of itself.
+    assert abs(i + 32 - x / CELL_M) <= 9
+    assert abs(j + 32 - y / CELL_M) <= 9
+    window = {(a, b) for a in range(i, i + 64) for b in range(j, j + 64)}
+    assert free_cells(space) == before & window
+    assert (space.seen_s == space.free_until).all()
+    assert not cell_is_free(space, i - 1, j, 0.0)
+    assert not cell_is_free(space, i, j + 64, 0.0)
+
+
+def test_the_window_stays_where_the_robot_is_near_its_middle():
+    space = make_free_space(256, CELL_M, 1, 2)
+    for x in (0.0, 0.95, -0.95):
+        move_window(space, x, 0.0)
+        assert space.facts[0, FIRST_I] == -128
+
+
+def test_a_disc_clears_the_cells_that_lie_wholly_in_it():
+    space = make_free_space(100, CELL_M, 1, 2)
+    clear_disc(space, 0.51, -0.33, 0.7, 2.0)
+    expected = {
+        (i, j)
+        for i in range(-50, 50)
+        for j in range(-50, 50)
+        if all(
+            math.dist((a * CELL_M, b * CELL_M), (0.51, -0.33)) <= 0.7
+            for a in (i, i + 1)
+            for b in (j, j + 1)
+        )
+    }
+    assert free_cells(space) == expected
+    assert not cell_is_free(space, 10, -7, 2.5), "no longer than said"
+    clear_disc(space, 0.51, -0.33, 0.7, 1.0)
+    assert cell_is_free(space, 10, -7, 2.0), "what was known stays so"
+
+
+def test_the_edge_holds_the_nearest_of_all_cells_that_are_not_free():
+    draw = np.random.default_rng(8)
+    out, checked = np.empty((4000, 2)), 0
+    for _ in range(40):
+        space = make_free_space(60, CELL_M, 1, 2)
+        for _ in range(6):
+            x, y, radius = draw.uniform([-0.6, -0.6, 0.2], 0.6)
+            clear_disc(space, x, y, radius, 1.0)
+        known = free_cells(space)
+        corners = np.array(
+            [
+                (i * CELL_M, j * CELL_M)
+                for i in range(-40, 40)
+                for j in range(-40, 40)
+                if (i, j) not in known
+            ]
+        )
+        count = edge_cells(space, 0.0, 0.0, 1.5, 0.5, out)
+        for x, y in draw.uniform(-1.0, 1.0, (20, 2)):
+            if (math.floor(x / CELL_M), math.floor(y / CELL_M)) not in known:
+                continue
+            checked += 1
+            beyond = np.maximum(corners - [x, y], [x, y] - corners - CELL_M)
+            expected = np.hypot(*np.maximum(beyond, 0.0).T).min()
+            found = nearest_cell(out, count, CELL_M, x, y)
+            assert found == pytest.approx(expected, abs=1e-12)
+    assert checked > 200
+
+
+def test_without_an_edge_nothing_is_near():
+    assert nearest_cell(np.empty((4, 2)), 0, CELL_M, 0.0, 0.0) == math.inf
+
+
+def test_an_edge_that_is_longer_than_the_list_is_counted_all_the_same():
+    space = make_free_space(60, CELL_M, 1, 2)
+    clear_disc(space, 0.0, 0.0, 1.0, 1.0)
+    short, whole = np.full((5, 2), np.nan), np.empty((4000, 2))
+    count = edge_cells(space, 0.0, 0.0, 1.2, 0.5, whole)
+    assert edge_cells(space, 0.0, 0.0, 1.2, 0.5, short) == count > 5
+    np.testing.assert_array_equal(short, whole[:5])
+
+
+@pytest.mark.parametrize("error", [1e-3, 0.01, 0.1])
+@pytest.mark.parametrize("distance", [0.1, 1.0, 3.0])
+def test_a_place_lasts_as_long_as_its_error_is_small_enough(error, distance):
+    """e s + 2 e s/L (d + s) reaches what is allowed, found by bisection."""
+    allowed, separation = 0.03, 0.41
+
+    def excess(way: float) -> float:
+        turned = 2.0 * error * way / separation
+        return error * way + turned * (distance + way) - allowed
+
+    expected = brentq(excess, 0.0, 100.0, xtol=1e-13)
+    found = lasting(distance, (error, allowed, separation))
+    assert found == pytest.approx(expected, rel=1e-9)
+
+
+def test_without_wheel_errors_a_place_lasts_for_ever():
+    assert lasting(2.0, (0.0, 0.0, 0.41)) == math.inf
+
+
+def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
+    sensors = sensors_of("the papers' three")
+    sectors = sensor_sectors(sensors, CONTROL_POINT_M)
+    space, drift = make_free_space(160, CELL_M, 3, 17), (0.01, 0.03, 0.41)
+    space.facts[0, ROLLED] = 5.0
+    readings = np.array([[2.0, np.inf]] * 3)
+    for tick in range(4):
+        see(space, 0.0, tick, np.zeros(3), sectors, readings, drift)
+    for i, j in free_cells(space):
+        far = math.hypot((i + 0.5) * CELL_M, (j + 0.5) * CELL_M)
+        until = 5.0 + lasting(far, drift)
+        assert space.free_until[i % 160, j % 160] <= until + 1e-12
+        later = 5.0 + lasting(far + 2.0 * CONTROL_POINT_M, drift)
+        assert space.free_until[i % 160, j % 160] >= later - 1e-12
+
+
+def test_where_a_view_ends():
+    space = make_free_space(10, CELL_M, 2, 5)
+    end_view(space, 1, 3.0, (1.0, 2.0, 0.5), (0.2, 0.1), (0.3, 0.25), 1.7)
+    c, s = math.cos(0.5), math.sin(0.5)
+    sensor = 1.0 + 0.2 * c - 0.1 * s, 2.0 + 0.2 * s + 0.1 * c
+    expected = [
+        (sensor[0] + 1.7 * math.cos(angle), sensor[1] + 1.7 * math.sin(angle))
+        for angle in (0.55, 0.675, 0.8, 0.925, 1.05)
+    ]
+    np.testing.assert_allclose(space.arcs[1], expected, atol=1e-12)
+    assert space.arcs_s[1, 0] == 3.0
+    assert space.arcs_s[0, 0] == NEVER

@@ -1,0 +1,247 @@
+"""The guard in the loop: what it passes and refuses, the same with both engines."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from diagrams import InputError, Scenario, load_scenario, simulate
+from systems import FreeSpaceMap, MotionGuard, WheelSpeedCommand
+from systems.framework.step_block import RunFacts
+from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
+from systems.safety.free_space_map import FreeSpaceParameters, body_radius, map_step
+from systems.safety.motion_guard import GuardParameters
+
+OWN_LAWS = """
+import math
+
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.step_block import Step, StepBlock
+
+
+def pushing(tick, state, inputs, outputs, numbers):
+    outputs[0][0] = numbers[0] * math.cos(numbers[2] * tick)
+    outputs[0][1] = numbers[1] + numbers[3] * math.sin(numbers[2] * tick)
+
+
+class Pushing(LeafSystem, StepBlock):
+    FACTS = BlockFacts("controller", "control")
+    NUMBERS = (0.5, 0.3, 0.0, 0.0)
+
+    def __init__(self, tick_s):
+        super().__init__()
+        self.set_name("pushing")
+        step = Step(pushing, self.NUMBERS)
+        inputs = [("pose_WB_estimated", 3)]
+        self.declare_step(float, step, inputs, [("twist_B", 2)], tick_s)
+
+
+class Backing(Pushing):
+    NUMBERS = (-0.7, 0.2, 0.0, 0.0)
+
+
+class Swinging(Pushing):
+    NUMBERS = (0.7, 0.0, 0.03, 2.0)
+"""
+
+
+@pytest.fixture(scope="module")
+def own_laws(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    file = tmp_path_factory.mktemp("laws") / "own_laws.py"
+    file.write_text(OWN_LAWS, encoding="utf-8")
+    return file
+
+
+def known_space(radius: float = 3.0) -> Any:
+    space = make_free_space(200, 0.05, 3, 17)
+    clear_disc(space, 0.0, 0.0, radius, math.inf)
+    return space
+
+
+def guarded(bench: Any, space: Any, acceleration: Any, **fields: Any) -> Any:
+    """The guard's state after a tick: v_P, wheels, report, modelled wheels."""
+    from pydrake.common.value import Value
+
+    guard = MotionGuard(parameters=GuardParameters(**fields))
+    made = bench(guard, acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3])
+    guard.GetInputPort("free_space").FixValue(made.context, Value[object](space))
+    return made.updated()
+
+
+@pytest.mark.parametrize("acceleration", [(4.0, 1.0), (-3.0, 9.0), (80.0, -60.0)])
+def test_in_known_space_it_is_the_block_in_whose_place_it_stands(bench, acceleration):
+    plain = bench(
+        WheelSpeedCommand(), acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3]
+    ).updated()
+    state = guarded(bench, known_space(), acceleration)
+    np.testing.assert_array_equal(state[:4], plain)
+    assert state[4] == 0.0
+    # The wheels follow with the lag: 1 - 1/sqrt(e) after half of it.
+    np.testing.assert_allclose(state[8:], plain[2:] * (1.0 - math.exp(-0.5)))
+
+
+def test_what_it_reports(bench):
+    """Rest at an edge that is 0.8 m away: 8 mm of cells that are only partly free."""
+    state = guarded(bench, known_space(0.8), (0.0, 0.0))
+    assert state[4] == 0.0
+    needed = body_radius(Scenario().robot) + 0.012
+    assert 0.8 - 0.05 * math.sqrt(2.0) <= state[5] + needed <= 0.8
+    assert state[6] == 0.0
+    # At 0.4 m/s of the faster wheel it stops within v^2/2a + v (lag + tick).
+    state = guarded(bench, known_space(), (16.0 * math.cos(0.3), 16.0 * math.sin(0.3)))
+    assert state[6] == pytest.approx(0.4**2 / 3.0 + 0.4 * 0.075)
+
+
+def test_what_it_changes_the_virtual_mass_moves_by(bench):
+    """v_P is that of the wheels: else it would wind up against the guard."""
+    state = guarded(bench, known_space(0.55), (20.0, 0.0))
+    assert state[4] > 0.0
+    v = 0.06 * (state[2] + state[3]) / 2.0
+    omega = 0.06 * (state[3] - state[2]) / 0.41
+    c, s = math.cos(0.3), math.sin(0.3)
+    expected = c * v - s * 0.175 * omega, s * v + c * 0.175 * omega
+    np.testing.assert_allclose(state[:2], expected, atol=1e-12)
+
+
+def test_a_least_margin_above_the_margin_is_refused():
+    with pytest.raises(ValueError, match="least_margin_m"):
+        GuardParameters(margin_m=0.01, least_margin_m=0.02)
+
+
+@pytest.mark.parametrize(
+    ("fields", "field"),
+    [
+        ({"cell_m": 0.005, "window_m": 30.0}, "window_m"),
+        ({"start_bubble_m": 0.5}, "start_bubble_m"),
+        ({"window_m": 3.9}, "window_m"),
+        ({"wheel_error": 0.01}, "place_error_m"),
+    ],
+)
+def test_a_memory_that_cannot_serve_is_refused(fields, field):
+    with pytest.raises(InputError) as error:
+        FreeSpaceMap(parameters=FreeSpaceParameters(**fields))
+    assert error.value.field == field
+
+
+@pytest.mark.parametrize(
+    ("overrides", "field"),
+    [
+        (["obstacle_sensing=ideal"], "obstacle_sensing"),
+        (["free_space.start_bubble_m=0.5"], "free_space.start_bubble_m"),
+        (["ultrasonic.axes_deg=[60, -60]"], "ultrasonic.axes_deg"),
+        (["obstacles=[{name: box, waypoints_m: [[0.9, 0]]}]"], "start.position_m"),
+        (["source.waypoints_m=[[1.1, 0]]"], "start.position_m"),
+        (
+            ["free_space.wheel_error=0.02", "free_space.place_error_m=0.02"],
+            "free_space.place_error_m",
+        ),
+    ],
+)
+def test_a_guard_that_could_not_serve_is_refused(overrides, field):
+    with pytest.raises(InputError) as error:
+        load_scenario("default", ["guard={}", *overrides])
+    assert error.value.field == field
+
+
+def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
+    """Of the bubble, 1 m: 0.02 s + 0.04 s (1 + s)/0.41 = 0.03, solved by hand."""
+    known = FreeSpaceParameters(wheel_error=0.02, place_error_m=0.03)
+    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta3", 0.025, len, {})
+    numbers = FreeSpaceMap(parameters=known).step_for(run).numbers
+    blind = [0.03] * 3, [1.0] * 3, [0.0] * 3
+    b = 0.02 + 0.04 / 0.41
+    lasts = (math.sqrt(b * b + 4.0 * 0.03 * 0.04 / 0.41) - b) / (2.0 * 0.04 / 0.41)
+    for tick in range(100):
+        way = 0.004 * tick
+        map_step(tick, (), (*blind, (way, 0.0, 0.0)), (), numbers)
+        assert numbers.space.facts[0, ROLLED] == pytest.approx(way)
+        behind = cell_is_free(numbers.space, -14, 0, way)
+        assert behind == (way <= lasts)
+        # Under the body space stays known: the body is there.
+        for x in (way - 0.3, way, way + 0.3):
+            assert cell_is_free(numbers.space, math.floor(x / 0.05), 0, way)
+    assert 0.15 < lasts < 0.35
+
+
+@pytest.mark.parametrize(
+    ("motion", "rolled"),
+    [((0.1, 0.0, 0.0), 0.1), ((0.0, 0.0, -0.4), 0.4 * 0.205), ((0.1, 0, 0.4), 0.1)],
+)
+def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
+    """(|v + w| + |v - w|)/2 = max(|v|, |w|), with w of half the turn's rim."""
+    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta3", 0.025, len, {})
+    numbers = FreeSpaceMap().step_for(run).numbers
+    blind = [0.03] * 3, [1.0] * 3, [0.0] * 3
+    for tick in range(4):
+        pose = tuple(tick * each for each in motion)
+        map_step(tick, (), (*blind, pose), (), numbers)
+    assert numbers.space.facts[0, ROLLED] == pytest.approx(3.0 * rolled)
+
+
+GUARD = "guard={}"
+ERRORS = "free_space.wheel_error=0.005", "free_space.place_error_m=0.03"
+MOVING = "guard.obstacle_speed_m_s=0.3"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "overrides"),
+    [
+        ("two_static_obstacles", (GUARD, "seed=3")),
+        ("one_moving_obstacle", (MOVING,)),
+        ("corridor", (GUARD, "law=conventional", "ultrasonic.noise_m=0.01")),
+        ("u_trap", (GUARD, "ultrasonic.axes_deg=12")),
+        ("two_static_obstacles", (MOVING, "ultrasonic.firing=sequential")),
+        ("default", (GUARD, "ultrasonic.period_s=0.05")),
+        ("corridor", (GUARD, "tick_s=0.0125")),
+        ("corridor", (*ERRORS, GUARD, "plant.slip=[0.005, -0.005]")),
+        ("convoy", (GUARD, "law=conventional")),
+    ],
+)
+def test_guarded_runs_are_those_of_drake(name, overrides):
+    scenario = load_scenario(name, ["hearing=ideal", "duration_s=12", *overrides])
+    drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
+    assert_same(drake, compiled)
+    for each in drake.robots.values():
+        assert np.ptp(each.columns["p_WB_x"]) > 0.02
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("law", ["Pushing", "Backing", "Swinging"])
+def test_a_pressing_law_is_held_at_the_edge_with_both_engines(own_laws, law):
+    """12 s against unseen space: as near as the margin, and never much nearer."""
+    scenario = load_scenario(
+        "default",
+        [
+            "hearing=ideal",
+            "duration_s=12",
+            f"law={own_laws}:{law}",
+            GUARD,
+            "stop.stuck_after_s=100",
+            "stop.lost_after_s=100",
+            "source.waypoints_m=[[3, 3]]",
+        ],
+    )
+    drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
+    assert_same(drake, compiled)
+    assert len(drake.time) == 481
+    # Of the distance beyond the margin of 12 mm; the least one is 3 mm nearer.
+    assert -0.0033 <= drake.columns["guard_distance"].min() < 0.02
+    assert drake.columns["guard_action"].max() > 0.0
+
+
+def assert_same(drake: Any, compiled: Any) -> None:
+    assert compiled.cause == drake.cause
+    assert compiled.columns.keys() == drake.columns.keys()
+    np.testing.assert_array_equal(compiled.time, drake.time)
+    for column, values in drake.columns.items():
+        atol = 1e-6 if "speed" in column else 1e-9
+        np.testing.assert_allclose(
+            compiled.columns[column], values, rtol=0.0, atol=atol, err_msg=column
+        )
