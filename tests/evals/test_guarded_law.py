@@ -1,4 +1,4 @@
-"""The guarded law does its job among what rests: nothing is touched, the goal reached."""
+"""The guarded law among what rests: nothing is touched, and the goal is reached."""
 
 from __future__ import annotations
 
