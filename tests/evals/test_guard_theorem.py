@@ -29,7 +29,7 @@ from systems.base.diff_drive_plant import (
 from systems.base.robot import RobotParameters
 from systems.base.wheel_odometry import advance_pose
 from systems.ranging.ultrasonic_array import UltrasonicParameters, measured_ranges
-from systems.safety.braking import braked, drive
+from systems.safety.braking import braked, roll_on
 from systems.safety.free_space import lasting
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
@@ -245,7 +245,7 @@ def foreseen_way(speed: float = 0.72) -> float:
     speeds, pose = commanded, (0.0, 0.0, 0.0)
     for _ in range(120):
         commanded = braked(commanded, braking)
-        pose, speeds = drive(pose, speeds, commanded, 0.025, braking)
+        pose, speeds = roll_on(pose, speeds, commanded, 0.025, braking)
     return float(pose[0])
 
 
