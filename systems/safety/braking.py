@@ -28,7 +28,7 @@ __all__ = [
     "can_be_braked",
     "chosen",
     "danger_of",
-    "drive_wheels",
+    "roll_on",
 ]
 
 #: What was done with a wish.
@@ -89,7 +89,7 @@ class Danger(NamedTuple):
 
 
 @njit(cache=True)
-def drive_wheels(
+def roll_on(
     pose: Any, speeds: Any, commanded: Any, duration: float, numbers: BrakingNumbers
 ) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
     """Pose and wheel speeds a tick or a part of it later, of a plant without slip.
@@ -203,7 +203,7 @@ def can_be_braked(
     part_s = numbers.tick_s / numbers.parts
     parts = 0
     while True:
-        pose, speeds = drive_wheels(pose, speeds, commanded, part_s, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, part_s, numbers)
         parts += 1
         x, y = pose[0], pose[1]
         way = math.hypot(x - begin_x, y - begin_y)

@@ -35,7 +35,7 @@ from systems.safety.braking import (
     BrakingNumbers,
     chosen,
     danger_of,
-    drive_wheels,
+    roll_on,
 )
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
@@ -115,7 +115,7 @@ def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untype
         v = 0.5 * radius * (wheels[0] + wheels[1])
         omega = radius * (wheels[1] - wheels[0]) / separation
         v_WP = hand_position_velocity((v, omega), theta, robot.control_point_m)
-    _, after = drive_wheels(here, speeds, wheels, tick_s, braking)
+    _, after = roll_on(here, speeds, wheels, tick_s, braking)
     fastest = max(abs(wheels[0]), abs(wheels[1])) * robot.wheel_radius_m
     state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
     # Nothing near is as far as was looked.

@@ -27,7 +27,7 @@ from systems.safety.braking import (
     can_be_braked,
     chosen,
     danger_of,
-    drive_wheels,
+    roll_on,
 )
 from systems.safety.free_space import clear_disc, make_free_space
 
@@ -93,7 +93,7 @@ def test_the_foreseen_tick_is_that_of_the_plant():
             draw.uniform(-12, 12, 2),
         )
         end = by_the_plant(np.array([*pose, 0.0, 0.0, *speeds]), commanded)[:, -1]
-        moved, after = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+        moved, after = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
         np.testing.assert_allclose(after, end[5:], atol=1e-8)
         assert moved[2] == pytest.approx(end[2], abs=1e-8)
         worst = max(worst, math.dist(moved[:2], end[:2]))
@@ -111,7 +111,7 @@ def test_a_whole_braking_is_foreseen_to_a_fifth_of_a_millimetre():
         pose: Any = (0.0, 0.0, 0.0)
         for _ in range(30):
             state = by_the_plant(state, commanded)[:, -1]
-            pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+            pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
             worst = max(worst, math.dist(pose[:2], state[:2]))
             commanded = braked(commanded, NUMBERS)
         assert commanded == (0.0, 0.0)
@@ -127,10 +127,10 @@ def test_braking_takes_the_closed_form_way(speed, braking):
     ticks = 0
     while commanded != (0.0, 0.0):
         commanded = braked(commanded, numbers)
-        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
         ticks += 1
     for _ in range(100):
-        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
     assert abs(ticks - speed / (braking * TICK_S)) < 1.001
     steps = np.arange(1, 100)
     sums = np.maximum(speed - steps * braking * TICK_S, 0.0).sum() * TICK_S
@@ -267,7 +267,7 @@ def test_at_rest_no_way_is_left(lag):
             break
     commanded, speeds, pose = straight(0.1), straight(0.1), (0.0, 0.0, 0.0)
     for _ in range(int(20.0 * lag / TICK_S) + 100):
-        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
         commanded = braked(commanded, numbers)
     assert pose[0] <= ahead + 2.1e-4
 
@@ -290,7 +290,7 @@ def press(wish: Any, ticks: int, error_m: float = 0.0, seed: int = 0) -> float:
         _, commanded = chosen(
             pose, speeds, wish(tick, pose), commanded, at_hand, NUMBERS
         )
-        pose, speeds = drive_wheels(pose, speeds, commanded, TICK_S, NUMBERS)
+        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
         off = draw.uniform(-error_m, error_m, 2)
         pose = pose[0] + off[0], pose[1] + off[1], pose[2]
     return least - RADIUS
