@@ -57,8 +57,8 @@ class KnownSpace:
         Returns:
             (m, 2) their middles, m.
         """
-        places: NDArray[np.float64] = (np.argwhere(cells) + 0.5) * self.cell_m
-        return places + np.array(self.corner_m)
+        counted = np.argwhere(cells).astype(np.float64)
+        return np.array(self.corner_m) + (counted + 0.5) * np.float64(self.cell_m)
 
 
 def has_known_space(result: RunResult) -> bool:
