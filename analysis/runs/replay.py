@@ -16,10 +16,21 @@ from pydrake.geometry import Meshcat, MeshcatParams
 
 from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
+from analysis.runs.floor_layers import clipped, floor_layers
+from analysis.runs.guarded_motion import guarded_motion
+from analysis.runs.known_space import known_space
 from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
-from analysis.runs.scene import looks, moving_and_static, run_title, sound_bursts
+from analysis.runs.scene import (
+    Look,
+    lightened,
+    looks,
+    moving_and_static,
+    run_title,
+    sound_bursts,
+)
 from diagrams import RunResult, Scenario
 from diagrams.bodies import RecordedPath
+from systems.safety.braking import BRAKED, PASSED, SLOWED, TURNED
 from systems.sound.waveforms import SoundParameters
 
 __all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
@@ -30,6 +41,10 @@ FRAMES_PER_S = 32.0
 TRAIL_PIECE_S = 0.5
 #: Time for which one ring of the sound is seen, s.
 RING_S = 0.0625
+#: What a robot knows of the floor is shown anew so often, s.
+KNOWN_PERIOD_S = 0.5
+#: A map takes so many ticks to enter all that was seen at the first one.
+FIRST_TICKS = 3
 
 
 def write_replay(result: RunResult, path: str | Path) -> None:
@@ -38,7 +53,11 @@ def write_replay(result: RunResult, path: str | Path) -> None:
     The robot with its microphone bar, wheels and cones (a cone is orange
     while it has an echo), the obstacles, the source with a ring that grows
     while it sounds, where the robot takes the source to be (a ball), and both
-    trails. The page needs a browser with WebGL, but no network.
+    trails. Of a guarded robot also the floor that it knows to be free, dots where
+    echoes came from, and a circle about the place where it could rest by now: the
+    edge of what the guard keeps free, grey where it passed what the law commanded,
+    orange where it gave less, red where it braked. The page needs a browser with
+    WebGL, but no network.
 
     Args:
         result: The run.
@@ -136,6 +155,8 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
         if own.name in sounds:
             _record_rings(meshcat, result, path, sounds[own.name])
+        _record_known_space(meshcat, result, look, path)
+        _record_guard(meshcat, own, f"guard/{path}", frames)
     for name, source in scenario.all_sources.items():
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
@@ -258,6 +279,61 @@ def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
             meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
         time = float(result.time[tick])
         meshcat.SetTransform(path, upright(x, y, height, 0.0), time)
+
+
+def _record_known_space(
+    meshcat: Meshcat, result: RunResult, look: Look, path: str
+) -> None:
+    """Parts of the floor, seen while the robot knows them; and dots of echoes."""
+    own = look.result
+    end, first = own.simulated_s, FIRST_TICKS * own.scenario.tick_s
+    times = np.arange(KNOWN_PERIOD_S, end, KNOWN_PERIOD_S)
+    known = known_space(own, [min(first, end), *times, end])
+    if known is None:
+        return
+    floor = replay_scene.floor_rectangle(result)
+    # Of several robots no two are in one plane, which would flicker.
+    above = 0.0005 * [*result.robots].index(own.name)
+    dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
+    for name, cells, colour, height, inset in (
+        ("free", known.free, lightened(look.seen, 0.35), 0.001, 0.0 * dots),
+        ("echoes", known.hits > 0.0, look.echoes, 0.006, dots),
+    ):
+        layers = floor_layers(known, cells, whole=name == "free")
+        for number, layer in enumerate(layers):
+            rectangles = clipped(layer.rectangles + inset, floor)
+            if not len(rectangles):
+                continue
+            part = f"known/{path}/{name}_{number}"
+            replay_scene.add_floor_part(
+                meshcat, part, rectangles, colour, height + above
+            )
+            states = [layer.begin <= k < layer.end for k in range(len(known.times))]
+            _record_switch(meshcat, part, known.times, states)
+
+
+def _record_guard(
+    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
+) -> None:
+    """The edge of the disc that the guard keeps free, about where robots can rest."""
+    motion = guarded_motion(result)
+    if motion is None:
+        return
+    rests = _at_frames(result, motion.resting_poses, frames)
+    _record_path(meshcat, path, frames, rests)
+    for name, colour, numbers in _EDGES:
+        edge = f"{path}/{name}"
+        replay_scene.add_disc_edge(meshcat, edge, motion.keep_m, colour)
+        seen = np.isin(motion.actions, numbers)
+        _record_switch(meshcat, edge, result.time, seen)
+
+
+#: Edges of the guarded disc, their colours, and what the guard did meanwhile.
+_EDGES = (
+    ("passed", "empty", (PASSED,)),
+    ("lessened", "echo", (SLOWED, TURNED)),
+    ("braked", "source", (BRAKED,)),
+)
 
 
 def _record_trail(

@@ -24,11 +24,14 @@ from systems.sound.recorder import microphones_B
 
 __all__ = [
     "RINGS",
+    "add_disc_edge",
     "add_floor",
+    "add_floor_part",
     "add_obstacles",
     "add_robot",
     "add_source",
     "add_trail",
+    "floor_rectangle",
     "set_stage",
     "upright",
 ]
@@ -282,6 +285,46 @@ def add_trail(
         colour: As matplotlib takes it, or a key of ``COLOURS``.
     """
     _ribbon(meshcat, path, points, _colour(colour), 0.008, 0.03)
+
+
+def add_floor_part(
+    meshcat: Meshcat,
+    path: str,
+    rectangles: NDArray[np.float64],
+    colour: str,
+    height: float,
+) -> None:
+    """Rectangles of the floor in one colour, a mesh of two triangles each.
+
+    Args:
+        meshcat: The scene.
+        path: Where it is in Meshcat's tree.
+        rectangles: (m, 4) least and greatest x, least and greatest y in W, m.
+        colour: As matplotlib takes it, or a key of ``COLOURS``.
+        height: Above the floor, m.
+    """
+    x_low, x_high, y_low, y_high = np.asarray(rectangles, dtype=float).T
+    x = np.column_stack([x_low, x_high, x_high, x_low]).ravel()
+    y = np.column_stack([y_low, y_low, y_high, y_high]).ravel()
+    vertices = np.vstack([x, y, np.full(len(x), height)])
+    first = 4 * np.arange(len(x_low))
+    faces = np.hstack([[first, first + 1, first + 2], [first, first + 2, first + 3]])
+    triangles = _plain(faces.astype(np.int32))
+    meshcat.SetTriangleMesh(path, _plain(vertices), triangles, _colour(colour))
+
+
+def add_disc_edge(meshcat: Meshcat, path: str, radius: float, colour: str) -> None:
+    """The edge of a disc about the origin, on the floor.
+
+    Args:
+        meshcat: The scene.
+        path: Where it is in Meshcat's tree.
+        radius: m.
+        colour: As matplotlib takes it, or a key of ``COLOURS``.
+    """
+    turns = np.linspace(0.0, 2.0 * math.pi, 73)
+    circle = radius * np.column_stack([np.cos(turns), np.sin(turns)])
+    _ribbon(meshcat, path, circle, _colour(colour), 0.012, 0.03)
 
 
 def set_stage(meshcat: Meshcat, result: RunResult) -> None:

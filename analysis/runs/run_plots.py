@@ -11,11 +11,14 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
+from analysis.runs.known_space import known_space
 from analysis.runs.scene import bounds, looks, run_title, sound_bursts
 from analysis.runs.trajectory_artists import (
     draw_collision,
     draw_cones,
     draw_estimates,
+    draw_known_space,
     draw_obstacles,
     draw_robot,
     draw_sources,
@@ -41,13 +44,19 @@ def plot_trajectory(result: RunResult) -> Figure:
     Drawn at a few instants, with the time beside: the robot's footprint with
     its microphone bar, the source, moving obstacles and the sensor cones, up
     to the range read (no cones with ideal sensing). Estimates of the source
-    are drawn where a frame was heard, faint ones early, strong ones late.
+    are drawn where a frame was heard, faint ones early, strong ones late. Of a
+    guarded robot, what it knew of the floor at the end stands for the cones.
     """
     figure, axes = _map(result)
     draw_grid(axes)
     axes.set_title(_title(result), fontsize=11)
-    for own in result.robots.values():
-        draw_cones(axes, own, times_apart(own))
+    for look in looks(result):
+        known = known_space(look.result, look.result.simulated_s)
+        if known is None:
+            draw_cones(axes, look.result, times_apart(look.result))
+        else:
+            # What the cones have seen: they would hide it.
+            draw_known_space(axes, look, known)
     draw_obstacles(axes, result)
     shown = looks(result)
     draw_sources(axes, result, times_apart(shown[0].result))
@@ -103,12 +112,15 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             tick, m (``analysis.runs.proximity``); none leaves its panel out.
 
     Returns:
-        The picture, a panel for each quantity.
+        The picture, a panel for each quantity; with a guard also what it did, and
+        what it had to spare.
 
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
     panels = [_range, _bearing, _forces, _speeds, _turning]
+    if guarded_motion(result) is not None:
+        panels += [_guard_actions, _guard_distances]
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
     if distance is not None and distance.shape != result.time.shape:
         raise InputError(
@@ -209,6 +221,39 @@ def _turning(axes: Axes, result: RunResult) -> None:
     axes.plot(result.time, rate, color=COLOURS["robot"], label="robot, to the left")
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_ylabel("turn rate\n(deg/s)")
+
+
+def _guard_actions(axes: Axes, result: RunResult) -> None:
+    actions, tick_s = np.rint(result.columns["guard_action"]), result.scenario.tick_s
+    for number, name in enumerate(GUARD_ACTIONS):
+        done = actions == number
+        colour = COLOURS["empty" if number == 0 else "source"]
+        # A row tells of the tick before it. The edge hides seams between ticks.
+        axes.broken_barh(
+            [(time - tick_s, tick_s) for time in result.time[done]],
+            (number - 0.35, 0.7),
+            facecolor=colour,
+            edgecolor=colour,
+            linewidth=0.4,
+            zorder=2,
+            label=f"{name}: {100.0 * np.mean(done):.0f} %",
+        )
+    axes.set_yticks(range(len(GUARD_ACTIONS)), GUARD_ACTIONS)
+    axes.set_ylim(len(GUARD_ACTIONS) - 0.4, -0.6)
+    axes.set_ylabel("command,\nby the guard")
+
+
+def _guard_distances(axes: Axes, result: RunResult) -> None:
+    time, columns = result.time, result.columns
+    spare, view = columns["guard_distance"], columns["guard_view_distance"]
+    axes.plot(time, spare, color=COLOURS["robot"], label="to spare")
+    guard = result.scenario.guard
+    if guard is not None and guard.obstacle_speed_m_s > 0.0:
+        axes.plot(time, view, color=COLOURS["left"], lw=1.0, label="to spare, in view")
+    way, colour = columns["guard_stopping_distance"], COLOURS["source"]
+    axes.plot(time, way, color=colour, label="needed to stop")
+    axes.axhline(0.0, color="black", lw=0.6)
+    axes.set_ylabel("guard's\ndistances (m)")
 
 
 def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) -> None:

@@ -7,6 +7,7 @@ from itertools import cycle
 from typing import NamedTuple
 
 import numpy as np
+from matplotlib.colors import to_hex, to_rgb
 from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
@@ -23,6 +24,7 @@ __all__ = [
     "bounds",
     "compose",
     "contact_point",
+    "lightened",
     "looks",
     "moving_and_static",
     "picture_times",
@@ -77,6 +79,12 @@ class Look(NamedTuple):
     path_label: str = "path of the control point P"
     body_label: str = "robot with its microphones"
     estimates_label: str = "estimates of the source, faint: early"
+    seen: str = COLOURS["seen"]
+    """Of the floor that it knows to be free, much lightened."""
+    echoes: str = COLOURS["echoes"]
+    """Colour of where its echoes came from."""
+    seen_label: str = "seen free, at the end"
+    echoes_label: str = "where echoes came from"
 
 
 def looks(result: RunResult) -> list[Look]:
@@ -92,9 +100,27 @@ def looks(result: RunResult) -> list[Look]:
             f"path of {name}'s P",
             f"{name} with its microphones",
             f"{name}'s estimates, faint: early",
+            colour,
+            colour,
+            f"seen free by {name}, at the end",
+            f"where {name}'s echoes came from",
         )
         for (name, own), colour in zip(result.several.items(), colours, strict=False)
     ]
+
+
+def lightened(colour: str, part: float) -> str:
+    """A colour laid thinly on white.
+
+    Args:
+        colour: As matplotlib takes it.
+        part: How much of it is left.
+
+    Returns:
+        The light colour.
+    """
+    red, green, blue = (1.0 - part * (1.0 - level) for level in to_rgb(colour))
+    return to_hex((red, green, blue))
 
 
 def run_title(result: RunResult) -> str:

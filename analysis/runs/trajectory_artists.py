@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.colors import to_rgb
+from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.patches import Polygon, Wedge
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import COLOURS
+from analysis.runs.known_space import KnownSpace
 from analysis.runs.scene import (
     Look,
     compose,
@@ -31,6 +32,7 @@ __all__ = [
     "draw_collision",
     "draw_cones",
     "draw_estimates",
+    "draw_known_space",
     "draw_obstacles",
     "draw_robot",
     "draw_sources",
@@ -194,6 +196,49 @@ def draw_estimates(axes: Axes, look: Look) -> None:
     )
     # A legend's sample would else be as faint as the first estimate.
     axes.scatter([], [], color=colour, marker="x", s=16, label=look.estimates_label)
+
+
+def draw_known_space(axes: Axes, look: Look, known: KnownSpace) -> None:
+    """What the robot knew last: floor seen free, and a dot where echoes came from.
+
+    Args:
+        axes: Where to draw, in the frame of the odometry, m.
+        look: The robot's colours and labels.
+        known: Of that robot.
+    """
+    free, echoed = known.free[-1], known.middles(known.hits[-1] > 0.0)
+    # Thin, for what is drawn on it, and for floor that several robots know.
+    colour = to_rgba(look.seen, 0.13)
+    layer = np.zeros((*free.T.shape, 4))
+    layer[free.T] = colour
+    limits = axes.axis()
+    axes.imshow(
+        layer,
+        origin="lower",
+        extent=known.extent,
+        interpolation="nearest",
+        zorder=0.3,
+    ).set_gid("seen free")
+    # A picture takes the axes for itself.
+    axes.axis(limits)
+    axes.scatter(
+        [],
+        [],
+        facecolor=colour,
+        edgecolor="none",
+        marker="s",
+        s=60,
+        label=look.seen_label,
+    )
+    if len(echoed):
+        axes.plot(
+            *echoed.T,
+            ".",
+            color=look.echoes,
+            markersize=2.5,
+            label=look.echoes_label,
+            zorder=1.8,
+        )
 
 
 def draw_obstacles(axes: Axes, result: RunResult) -> None:

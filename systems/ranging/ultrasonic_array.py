@@ -182,6 +182,11 @@ class UltrasonicParameters(Parameters):
         rounds = self.count if self.firing == "sequential" else 1
         return rounds * self.period_ticks(tick_s)
 
+    def turns(self, tick_s: float) -> NDArray[np.int64]:
+        """(n,) ticks into the round at which each sensor fires."""
+        turns = np.arange(self.count) * self.period_ticks(tick_s)
+        return turns if self.firing == "sequential" else 0 * turns
+
     def errors(self, sound_speed: float) -> tuple[float, float, float, float, float]:
         """Stretch of the ranges, noise, m, least luck, least and greatest range, m.
 
@@ -449,14 +454,13 @@ class UltrasonicArray(LeafSystem):
 
     def _numbers(self, seed: int) -> UltrasonicNumbers:
         sensors = self._parameters
-        turns = np.arange(sensors.count) * sensors.period_ticks(self._tick_s)
         return UltrasonicNumbers(
             *sensors.beams,
             self._control_point,
             self._source_size,
             sensors.errors(self._sound_speed),
             tick_noise(seed),
-            turns if sensors.firing == "sequential" else 0 * turns,
+            sensors.turns(self._tick_s),
             self._round,
             self._tick_s,
         )

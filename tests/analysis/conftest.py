@@ -42,3 +42,10 @@ def collision_run() -> RunResult:
 def shortest_run() -> RunResult:
     """A single tick: it ends before the second."""
     return simulate(load_scenario("default", ["hearing=ideal", "duration_s=0.01"]))
+
+
+@pytest.fixture(scope="session")
+def guarded_run() -> RunResult:
+    """A robot with a guard that stops it between two boxes."""
+    overrides = ["hearing=ideal", "guard={}", "duration_s=8"]
+    return simulate(load_scenario("two_static_obstacles", overrides))

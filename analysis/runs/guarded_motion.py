@@ -1,0 +1,95 @@
+"""What a guard did in a run, and where the robot could have come to rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from diagrams import RunResult
+from systems.safety.braking import BrakingNumbers, braked, drive_a_tick
+from systems.safety.motion_guard import MotionGuard
+
+__all__ = ["GUARD_ACTIONS", "GuardedMotion", "guarded_motion"]
+
+#: What a guard does with a command, by its number in a run's table.
+GUARD_ACTIONS = ("passed", "slowed", "turned", "braked")
+#: Braking ends once the rims are so slow, m/s; the motors' lag leaves no way then.
+_REST_M_S = 1e-4
+
+
+@dataclass(frozen=True)
+class GuardedMotion:
+    """What a guard did at the ticks of a run."""
+
+    actions: NDArray[np.int64]
+    """(n,) places in ``GUARD_ACTIONS``."""
+    resting_poses: NDArray[np.float64]
+    """(n, 3) x, y, theta at which the robot would rest if it braked from then on, in
+    the frame of the odometry, m and rad."""
+    keep_m: float
+    """Radius of the disc about the axle that the guard keeps in free space, m."""
+
+
+def guarded_motion(result: RunResult) -> GuardedMotion | None:
+    """What a guard did in a run.
+
+    Args:
+        result: The run of one robot.
+
+    Returns:
+        What it did; None without a guard.
+    """
+    columns, scenario = result.columns, result.scenario
+    if scenario.guard is None or "guard_action" not in columns:
+        return None
+    guard = MotionGuard(
+        parameters=scenario.guard,
+        known=scenario.free_space,
+        robot=scenario.robot,
+        plant=scenario.plant,
+        tick_s=scenario.tick_s,
+    )
+    braking = guard.step.numbers.braking
+    names = "p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"
+    poses = np.column_stack([columns[name] for name in names])
+    sides = "wheel_speed_left", "wheel_speed_right"
+    commands = np.column_stack([columns[name] for name in sides])
+    return GuardedMotion(
+        np.rint(columns["guard_action"]).astype(np.int64),
+        _resting_poses(poses, commands, braking),
+        braking.keep_m,
+    )
+
+
+@njit(cache=True)
+def _resting_poses(
+    poses: NDArray[np.float64],
+    commands: NDArray[np.float64],
+    numbers: BrakingNumbers,
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Where braking ends, as the guard reckons it.
+
+    Args:
+        poses: (n, 3) at the ticks, m and rad.
+        commands: (n, 2) of the tick before each, left and right wheel, rad/s.
+        numbers: How the robot brakes.
+    """
+    rests = np.empty(poses.shape)
+    speeds = 0.0, 0.0
+    for k in range(len(poses)):
+        pose = poses[k, 0], poses[k, 1], poses[k, 2]
+        command = commands[k, 0], commands[k, 1]
+        if k > 0:
+            _, speeds = drive_a_tick(pose, speeds, command, numbers)
+        now = speeds
+        while True:
+            command = braked(command, numbers)
+            pose, now = drive_a_tick(pose, now, command, numbers)
+            fastest = max(abs(now[0]), abs(now[1])) * numbers.wheel_radius_m
+            if command[0] == 0.0 and command[1] == 0.0 and fastest < _REST_M_S:
+                break
+        rests[k, 0], rests[k, 1], rests[k, 2] = pose
+    return rests
