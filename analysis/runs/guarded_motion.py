@@ -9,7 +9,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from diagrams import RunResult
-from systems.safety.braking import BrakingNumbers, braked, drive_a_tick
+from systems.safety.braking import BrakingNumbers, braked, roll_on
 from systems.safety.motion_guard import MotionGuard
 
 __all__ = ["GUARD_ACTIONS", "GuardedMotion", "guarded_motion"]
@@ -78,16 +78,16 @@ def _resting_poses(
         numbers: How the robot brakes.
     """
     rests = np.empty(poses.shape)
-    speeds = 0.0, 0.0
+    speeds, tick_s = (0.0, 0.0), numbers.tick_s
     for k in range(len(poses)):
         pose = poses[k, 0], poses[k, 1], poses[k, 2]
         command = commands[k, 0], commands[k, 1]
         if k > 0:
-            _, speeds = drive_a_tick(pose, speeds, command, numbers)
+            _, speeds = roll_on(pose, speeds, command, tick_s, numbers)
         now = speeds
         while True:
             command = braked(command, numbers)
-            pose, now = drive_a_tick(pose, now, command, numbers)
+            pose, now = roll_on(pose, now, command, tick_s, numbers)
             fastest = max(abs(now[0]), abs(now[1])) * numbers.wheel_radius_m
             if command[0] == 0.0 and command[1] == 0.0 and fastest < _REST_M_S:
                 break

@@ -290,7 +290,7 @@ def chosen(
     """What to command: a wish, as far as it can be braked, or the brake.
 
     Tried are the wish, less of it along the same curve, its turn while the way ahead is
-    braked, and at last braking as it was found possible before.
+    braked, a slow turn, and at last braking as it was found possible before.
 
     Args:
         pose: (x, y, theta) now, m and rad.
@@ -313,6 +313,14 @@ def chosen(
     # What a wheel cannot do would be less of a turn than was looked at.
     most = numbers.top_wheel_speed - abs(ahead)
     turn = min(max(turn, -most), most)
+    part = ahead - turn, ahead + turn
+    if can_be_braked(pose, speeds, part, danger, numbers):
+        return TURNED, part
+    # Slowly enough to count as rest, it may always turn: it could never get away from
+    # what stands near by, else.
+    slow = numbers.slow_turn_rad_s * numbers.wheel_separation_m
+    slow *= 0.5 / numbers.wheel_radius_m
+    turn = min(max(turn, -slow), slow)
     part = ahead - turn, ahead + turn
     if can_be_braked(pose, speeds, part, danger, numbers):
         return TURNED, part

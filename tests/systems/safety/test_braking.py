@@ -401,3 +401,15 @@ def test_a_fast_turn_is_no_withdrawal():
     assert can_be_braked(here, rest, (-0.1, -0.1), at_hand, moving(0.5))
     # A curve that leads away by more than it turns is one.
     assert can_be_braked(here, rest, (-6.0, -5.0), at_hand, moving(0.5))
+
+
+@pytest.mark.parametrize("wish", [(-7.0, 7.0), (8.0, 2.0)])
+def test_beside_what_is_near_it_can_still_turn_slowly(wish):
+    """Else it would stand before a wall for ever: 0.3 rad/s, to the side wished."""
+    at_hand, rest = view(NUMBERS.keep_m - 0.05), (0.0, 0.0)
+    here: Any = (0.0, 0.0, 0.0)
+    done, (left, right) = chosen(here, rest, wish, rest, at_hand, moving(0.6))
+    rate = (right - left) * WHEEL_M / AXLE_M
+    assert done == TURNED
+    assert left + right == pytest.approx(0.0)
+    assert rate == pytest.approx(math.copysign(0.3, wish[1] - wish[0]))
