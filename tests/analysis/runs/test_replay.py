@@ -15,7 +15,13 @@ import pytest
 
 from analysis.runs.guarded_motion import guarded_motion
 from analysis.runs.known_space import known_space
-from analysis.runs.replay import record_run, ring_at, wheel_angles, write_replay
+from analysis.runs.replay import (
+    known_times,
+    record_run,
+    ring_at,
+    wheel_angles,
+    write_replay,
+)
 from analysis.runs.replay_scene import RINGS, add_robot, floor_rectangle
 from analysis.runs.scene import looks
 
@@ -302,6 +308,18 @@ def test_the_guards_disc_is_where_the_robot_could_rest(guarded_run, guarded):
         ]
         by_number = "passed", "lessened", "lessened", "braked"
         assert seen == [by_number[motion.actions[tick]]]
+
+
+def test_fine_cells_are_shown_more_seldom(guarded_run):
+    """30 million cells in all: of 12.8 m in 5 mm, 2560 by 2560, 4 maps; and the end."""
+    end = guarded_run.simulated_s
+    times = known_times(guarded_run)
+    assert times[:3] == pytest.approx([0.075, 0.5, 1.0])
+    assert times[-1] == end
+    fine = guarded_run.scenario.free_space.model_copy(update={"cell_m": 0.005})
+    scenario = guarded_run.scenario.model_copy(update={"free_space": fine})
+    seldom = known_times(replace(guarded_run, scenario=scenario))
+    assert seldom == pytest.approx([0.075, end / 4, end / 2, 3 * end / 4, end])
 
 
 def test_runs_without_guard_have_no_such_layers(recorded):
