@@ -76,3 +76,19 @@ def test_the_source_drives_to_the_right_and_the_robot_after_it(pictures):
     early, late = pictures
     assert _place(late, 0)[0] > _place(early, 0)[0] + 20.0
     assert _place(late, 2)[0] > _place(early, 2)[0] + 20.0
+
+
+def test_the_floor_that_is_known_grows(tmp_path: Path, chromium: Chromium) -> None:
+    """It is light green, on a floor of grey; the robot drives into the open."""
+    overrides = ["hearing=ideal", "guard={}", "duration_s=4"]
+    result = simulate(load_scenario("two_static_obstacles", overrides))
+    write_replay(result, tmp_path / "replay.html")
+    shares = []
+    for time in (0.3, 3.8):
+        red, green, blue = np.moveaxis(
+            _picture(chromium, tmp_path / "replay.html", time), 2, 0
+        )
+        greenish = (green > red + 0.06) & (green > blue + 0.005) & (green > 0.6)
+        shares.append(greenish.mean())
+    assert shares[0] > 0.02
+    assert shares[1] > 1.5 * shares[0]

@@ -1,6 +1,8 @@
 """What a run did: metrics, pictures, replay, its files."""
 
 from analysis.runs.collision_warning import collision_warning
+from analysis.runs.guarded_motion import GuardedMotion, guarded_motion
+from analysis.runs.known_space import KnownSpace, known_space
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.run_report import run_summary, summary_text, write_run
@@ -13,9 +15,13 @@ from analysis.runs.smoothness import (
 )
 
 __all__ = [
+    "GuardedMotion",
+    "KnownSpace",
     "Proximity",
     "collision_warning",
+    "guarded_motion",
     "jerk",
+    "known_space",
     "log_dimensionless_jerk",
     "run_metrics",
     "run_summary",

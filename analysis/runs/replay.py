@@ -33,7 +33,7 @@ from diagrams.bodies import RecordedPath
 from systems.safety.braking import BRAKED, PASSED, SLOWED, TURNED
 from systems.sound.waveforms import SoundParameters
 
-__all__ = ["record_run", "ring_at", "wheel_angles", "write_replay"]
+__all__ = ["known_times", "record_run", "ring_at", "wheel_angles", "write_replay"]
 
 #: Meshcat records at most so many frames a second.
 FRAMES_PER_S = 32.0
@@ -45,6 +45,8 @@ RING_S = 0.0625
 KNOWN_PERIOD_S = 0.5
 #: A map takes so many ticks to enter all that was seen at the first one.
 FIRST_TICKS = 3
+#: Cells of all these maps at most.
+MOST_CELLS = 30_000_000
 
 
 def write_replay(result: RunResult, path: str | Path) -> None:
@@ -286,9 +288,7 @@ def _record_known_space(
 ) -> None:
     """Parts of the floor, seen while the robot knows them; and dots of echoes."""
     own = look.result
-    end, first = own.simulated_s, FIRST_TICKS * own.scenario.tick_s
-    times = np.arange(KNOWN_PERIOD_S, end, KNOWN_PERIOD_S)
-    known = known_space(own, [min(first, end), *times, end])
+    known = known_space(own, known_times(own))
     if known is None:
         return
     floor = replay_scene.floor_rectangle(result)
@@ -310,6 +310,18 @@ def _record_known_space(
             )
             states = [layer.begin <= k < layer.end for k in range(len(known.times))]
             _record_switch(meshcat, part, known.times, states)
+
+
+def known_times(result: RunResult) -> list[float]:
+    """When the floor that a robot knows is shown anew, s.
+
+    Each half second, or so seldom that fine cells do not fill the memory.
+    """
+    end, scenario = result.simulated_s, result.scenario
+    most = max(2, MOST_CELLS // scenario.free_space.cells**2)
+    period = max(KNOWN_PERIOD_S, end / most)
+    first = min(FIRST_TICKS * scenario.tick_s, end)
+    return [first, *np.arange(period, end, period).tolist(), end]
 
 
 def _record_guard(

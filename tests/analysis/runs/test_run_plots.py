@@ -10,8 +10,10 @@ from matplotlib.colors import to_rgb
 from matplotlib.patches import Polygon, Rectangle, Wedge
 
 from analysis.reporting.palette import COLOURS
+from analysis.runs.known_space import known_space
 from analysis.runs.run_plots import plot_time_series, plot_trajectory
-from analysis.runs.scene import contact_point, sound_bursts
+from analysis.runs.scene import bounds, contact_point, sound_bursts
+from diagrams import load_scenario, simulate
 
 PANELS = 5
 
@@ -247,3 +249,63 @@ def test_a_run_of_one_tick_can_be_drawn(shortest_run):
     assert len(_patches(figure, Polygon, "robot at ")) == 1
     axes = plot_time_series(shortest_run, np.array([0.4])).axes
     assert axes[0].get_xlim()[1] > 0.0
+
+
+def test_a_guarded_run_lies_on_what_the_robot_knew_last(guarded_run):
+    """The picture's cells are those of the log, in its place; no cone hides them."""
+    figure = plot_trajectory(guarded_run)
+    axes = figure.axes[0]
+    known = known_space(guarded_run, guarded_run.simulated_s)
+    assert known is not None
+    (layer,) = axes.get_images()
+    assert layer.get_extent() == pytest.approx(known.extent)
+    shown = np.asarray(layer.get_array())[:, :, 3] > 0.0
+    assert np.array_equal(shown, known.free[0].T)
+    dots = np.array(_line(axes, "where echoes came from").get_data()).T
+    assert np.array_equal(dots, known.middles(known.hits[0] > 0.0))
+    texts = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "seen free, at the end" in texts
+    assert not _patches(figure, Wedge)
+    # Light enough to read what is drawn on it: the layer leaves 0.87 of white.
+    assert np.asarray(layer.get_array())[:, :, 3].max() == pytest.approx(0.13)
+
+
+def test_the_map_of_a_guarded_run_has_the_limits_of_the_run(guarded_run, crossing_run):
+    axes = plot_trajectory(guarded_run).axes[0]
+    known = known_space(guarded_run, guarded_run.simulated_s)
+    assert known is not None
+    x_low, x_high, y_low, y_high = bounds(guarded_run, margin=0.7)
+    assert axes.get_xlim() == pytest.approx((x_low, x_high))
+    assert axes.get_ylim()[0] <= y_low
+    assert axes.get_ylim()[1] >= y_high
+    assert known.extent[3] > axes.get_ylim()[1]
+    assert not plot_trajectory(crossing_run).axes[0].get_images()
+
+
+def test_panels_of_a_guard_show_its_columns(guarded_run):
+    figure, columns = plot_time_series(guarded_run), guarded_run.columns
+    assert len(figure.axes) == PANELS + 2
+    actions, distances = figure.axes[-2:]
+    for number, bars in enumerate(actions.collections):
+        ends = [np.max(np.asarray(bar.vertices)[:, 0]) for bar in bars.get_paths()]
+        done = guarded_run.time[columns["guard_action"] == number]
+        assert np.allclose(sorted(ends), done)
+    named = [text.get_text() for text in actions.get_yticklabels()]
+    assert named == ["passed", "slowed", "turned", "braked"]
+    spare = _line(distances, "to spare").get_ydata()
+    assert np.array_equal(spare, columns["guard_distance"])
+    way = _line(distances, "needed to stop").get_ydata()
+    assert np.array_equal(way, columns["guard_stopping_distance"])
+    labels = [line.get_label() for line in distances.get_lines()]
+    assert "to spare, in view" not in labels
+
+
+def test_robots_know_each_its_own_floor():
+    overrides = ["hearing=ideal", "guard={}", "duration_s=1"]
+    run = simulate(load_scenario("two_followers", overrides))
+    layers = plot_trajectory(run).axes[0].get_images()
+    assert len(layers) == len(run.robots) == 2
+    for layer, own in zip(layers, run.robots.values(), strict=True):
+        known = known_space(own, own.simulated_s)
+        assert known is not None
+        assert layer.get_extent() == pytest.approx(known.extent)
