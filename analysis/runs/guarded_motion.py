@@ -43,10 +43,10 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         What it did; None without a guard.
     """
     columns, scenario = result.columns, result.scenario
-    if scenario.guard is None or "guard_action" not in columns:
+    if scenario.own_guard is None or "guard_action" not in columns:
         return None
     guard = MotionGuard(
-        parameters=scenario.guard,
+        parameters=scenario.own_guard,
         known=scenario.free_space,
         robot=scenario.robot,
         plant=scenario.plant,

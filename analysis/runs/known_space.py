@@ -71,7 +71,7 @@ def has_known_space(result: RunResult) -> bool:
         Whether it has a guard, and sensors and a map of ours.
     """
     scenario = result.scenario
-    if result.several or scenario.guard is None:
+    if result.several or scenario.own_guard is None:
         return False
     own = {import_own(name, "blocks").FACTS.part for name in scenario.blocks}
     columns = {*_POSE, *_numbered("range", scenario), *_numbered("echo", scenario)}

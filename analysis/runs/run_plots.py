@@ -118,7 +118,9 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
-    panels = [_range, _bearing, _forces, _speeds, _turning]
+    panels = [_range, _bearing, _speeds, _turning]
+    if "attraction_x" in result.columns:  # a law may tell no forces
+        panels.insert(2, _forces)
     if guarded_motion(result) is not None:
         panels += [_guard_actions, _guard_distances]
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
@@ -196,8 +198,7 @@ def _bearing(axes: Axes, result: RunResult) -> None:
 
 
 def _forces(axes: Axes, result: RunResult) -> None:
-    said = "attraction_x" in result.columns
-    for name in ("attraction", "repulsion") if said else ():
+    for name in ("attraction", "repulsion"):
         size = np.hypot(*result.vector(name))
         axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
     axes.set_ylabel("force on P\n(N)")
@@ -247,7 +248,7 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
     time, columns = result.time, result.columns
     spare, view = columns["guard_distance"], columns["guard_view_distance"]
     axes.plot(time, spare, color=COLOURS["robot"], label="to spare")
-    guard = result.scenario.guard
+    guard = result.scenario.own_guard
     if guard is not None and guard.obstacle_speed_m_s > 0.0:
         axes.plot(time, view, color=COLOURS["left"], lw=1.0, label="to spare, in view")
     way, colour = columns["guard_stopping_distance"], COLOURS["source"]
