@@ -124,7 +124,7 @@ def test_table_on_the_terminal(quick, capsys, tmp_path):
     ("words", "field", "hint"),
     [
         (["--law", "magic"], "law", "active2017"),
-        (["no_such"], "scenario", "obstacle_free"),
+        (["no_such"], "scenario", "phonotaxis scenarios"),
         (["--set", "plant.motor_lag_s=0.001"], "plant.motor_lag_s", "step_s"),
         (
             ["--set", "attraction.damping_n_s_m=0"],

@@ -18,11 +18,11 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from diagrams import build_sound_follower, make_simulator, simulate
 from diagrams.builder import SoundFollower
-from diagrams.laws import LAWS
 from diagrams.robot import block_seed, connect_by_name
 from diagrams.scenario import Scenario
 from systems import DiffDrivePlant, WheelOdometry, WheelSpeedCommand
 from systems.framework.block_facts import block_facts
+from systems.laws.catalogue import FORCE_LAWS
 
 T = 0.025
 IDEAL: dict[str, Any] = {
@@ -128,7 +128,7 @@ def test_blocks_of_the_ideal_build():
 
 @pytest.mark.parametrize("hearing", ["audio", "ideal"])
 @pytest.mark.parametrize("obstacle_sensing", ["ultrasonic", "ideal"])
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", FORCE_LAWS)
 def test_every_input_is_connected_to_the_output_of_its_name(
     hearing, obstacle_sensing, law
 ):
@@ -352,7 +352,7 @@ class Step:
         return self._stacked(context)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", FORCE_LAWS)
 def test_jacobian_of_a_step_agrees_with_finite_differences(law):
     scenario = {
         "law": law,

@@ -11,7 +11,7 @@ import pytest
 from pydrake.common.value import Value
 
 import systems.framework.noise
-import systems.sound.mic_array
+import systems.sound.recorder
 from diagrams import build_sound_follower, load_scenario, make_simulator, simulate
 from diagrams.builder import SoundFollower
 from systems.framework.signals import TICK_S, AudioFrame, Emission
@@ -95,6 +95,6 @@ def test_noise_of_the_microphones_that_goes_bad_stops_the_run(
         return noise
 
     simulate(follower.scenario.model_copy(update={"duration_s": 0.1}))
-    monkeypatch.setattr(systems.sound.mic_array, "frame_noise", broken)
+    monkeypatch.setattr(systems.sound.recorder, "frame_noise", broken)
     with pytest.raises(ValueError, match=r"^MicArray: noise\[1, 100\] is nan"):
         simulate(follower.scenario, follower=follower)

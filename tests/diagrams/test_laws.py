@@ -12,6 +12,7 @@ from diagrams import build_sound_follower
 from diagrams.laws import LAWS, make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import FORCE_LAWS
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController
@@ -102,7 +103,7 @@ def test_own_law_is_built_into_the_diagram(own_laws):
     [
         (
             "activ",
-            "use none, conventional, active, conventional2017, active2017, package",
+            "use none, conventional, active, conventional2017, active2017, guarded, package",
         ),
         (":inverse", "is not known"),
         ("own_laws_for_test:", "is not known"),
@@ -128,7 +129,7 @@ def test_unknown_laws(own_laws, law, message):
 )
 def test_laws_remember_a_round_of_the_sensors(sensing, firing, rounds):
     """Three numbers of three slots a tick; exact sensing has no order of firing."""
-    for law in LAWS:
+    for law in FORCE_LAWS:
         scenario = Scenario.model_validate(
             {
                 "law": law,

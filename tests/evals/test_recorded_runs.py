@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from diagrams import library_scenarios, load_scenario, simulate
-from diagrams.laws import LAWS
+from systems.laws.catalogue import FORCE_LAWS
 
 pytestmark = pytest.mark.slow
 
@@ -36,7 +36,10 @@ def builds() -> list[tuple[str, ...]]:
     return [
         *((name,) for name in names),
         *((name, "hearing=ideal") for name in names),
-        *(("two_static_obstacles", "hearing=ideal", f"law={law}") for law in LAWS),
+        *(
+            ("two_static_obstacles", "hearing=ideal", f"law={law}")
+            for law in FORCE_LAWS
+        ),
         (
             "default",
             "hearing=ideal",
