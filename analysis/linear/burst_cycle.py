@@ -40,6 +40,8 @@ HOLDS: tuple[Hold, ...] = ("world", "robot", "motion")
 
 #: Multipliers nearer to 1 belong to a continuum of equilibria.
 _NEUTRAL = 1e-6
+#: Of the response, less than this part of the greatest is no share.
+_NO_SHARE = 1e-14
 #: Kick that starts a run, m/s.
 _KICK_M_S = 1e-5
 #: Cycles at rest before the linearisation: the tracker's memory settles.
@@ -199,7 +201,12 @@ def _multipliers(
             D=np.zeros((1, 1)),
         )
     )
-    poles = line.poles[np.abs(line.poles - 1.0) > _NEUTRAL]
+    # Rounding, other on another machine, may leave states of the other direction in it,
+    # whose share in the response is nothing.
+    poles, modes = np.linalg.eig(line.A)
+    seen, moved = (line.C @ modes)[0], np.linalg.solve(modes, line.B)[:, 0]
+    share = np.abs(seen * moved)
+    poles = poles[(np.abs(poles - 1.0) > _NEUTRAL) & (share > _NO_SHARE * share.max())]
     return poles[np.argsort(-np.abs(poles))]
 
 
