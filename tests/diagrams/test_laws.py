@@ -103,7 +103,7 @@ def test_own_law_is_built_into_the_diagram(own_laws):
     [
         (
             "activ",
-            "use none, conventional, active, conventional2017, active2017, guarded, package",
+            "use none, conventional, active, conventional2017, active2017, guarded, p",
         ),
         (":inverse", "is not known"),
         ("own_laws_for_test:", "is not known"),

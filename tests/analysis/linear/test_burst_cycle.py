@@ -100,7 +100,7 @@ def test_simulation_with_the_active_law_shows_both_directions(direction):
     run = simulate_burst_cycle(cycle, 24, direction=direction)
     largest = abs(getattr(cycle, direction)[0])
     assert run.factor == pytest.approx(largest, rel=0.05)
-    assert set(np.abs(cycle.multipliers)) >= {largest}
+    assert np.isclose(np.abs(cycle.multipliers), largest, rtol=1e-12).any()
 
 
 @pytest.mark.parametrize(("on", "gap"), [(0.0, 2.0), (0.5, -0.1), (0.51, 1.5)])
