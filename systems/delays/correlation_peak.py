@@ -13,8 +13,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.framework.compiling import REORDER
-
 __all__ = ["measure_peaks"]
 
 # Largest number of steps, and the step at which it ends, samples.
@@ -25,7 +23,7 @@ _TOLERANCE = 1e-6
 _ROUNDING = 1.0 / 24.0
 
 
-@njit(cache=True, fastmath=REORDER, forceinline=True)
+@njit(cache=True, forceinline=True)
 def _turned(
     cross: NDArray[np.complex64],
     first: float,
@@ -54,7 +52,7 @@ def _turned(
         imaginary[k] = x * sine[k] + y * cosine[k]
 
 
-@njit(cache=True, fastmath=REORDER, forceinline=True)
+@njit(cache=True, forceinline=True)
 def _slope_and_curve(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],
@@ -71,7 +69,7 @@ def _slope_and_curve(
     return slope, curve
 
 
-@njit(cache=True, fastmath=REORDER, forceinline=True)
+@njit(cache=True, forceinline=True)
 def _sums(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],

@@ -18,7 +18,6 @@ from rocket_fft import c2r
 
 from systems.delays.delay_peaks import whitening
 from systems.delays.delay_plan import DelayPlan
-from systems.framework.compiling import REORDER
 
 __all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
 
@@ -67,7 +66,7 @@ def amdf(
     return _amdf(np.ascontiguousarray(x_i), np.ascontiguousarray(x_j), max_lag)
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True)
 def _amdf(
     x_i: NDArray[np.float32], x_j: NDArray[np.float32], max_lag: int
 ) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
@@ -107,7 +106,7 @@ def _peak(
     return best, second / top
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True)
 def _cross_spectra(
     spectra: NDArray[np.complex64], edges: NDArray[np.int64], first: int, size: int
 ) -> tuple[

@@ -8,8 +8,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.framework.compiling import REORDER
-
 __all__ = ["BLOCK_SAMPLES", "frame_energy"]
 
 #: The mean of so many samples does not count: rumble of 100 Hz loses 19 dB of it at
@@ -17,7 +15,7 @@ __all__ = ["BLOCK_SAMPLES", "frame_energy"]
 BLOCK_SAMPLES = 64
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True)
 def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
     """Sum of squares of an (n, samples) frame about the means of short blocks."""
     channels, samples = frame.shape
@@ -32,7 +30,7 @@ def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
 
 
 # Inlined, so that blocks of a known length vectorise.
-@njit(cache=True, fastmath=REORDER, inline="always", error_model="numpy")
+@njit(cache=True, inline="always", error_model="numpy")
 def _block_energy(
     samples: NDArray[Any], begin: int, count: int
 ) -> Any:  # pragma: no cover  (compiled)

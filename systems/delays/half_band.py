@@ -13,8 +13,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.framework.compiling import REORDER
-
 __all__ = ["PASSED", "halve_rate"]
 
 #: Highest frequency that passes, as a share of the rate.
@@ -60,7 +58,7 @@ def halve_rate(
     return out
 
 
-@njit(cache=True, fastmath=REORDER, forceinline=True)
+@njit(cache=True, forceinline=True)
 def _halve_row(
     samples: NDArray[Any],
     even: NDArray[np.float32],

@@ -16,7 +16,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.framework.compiling import REORDER
 from systems.framework.scalar_math import float_of
 
 __all__ = [
@@ -118,7 +117,7 @@ def check_record(context: Any, port: Any, record: Any) -> None:
             check_port(context, port, field, f".{name}")
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True)
 def total(values: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
     """Sum of (n,) numbers in any order: not finite where one of them is not."""
     out = values.dtype.type(0.0)

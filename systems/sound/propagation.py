@@ -14,7 +14,6 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.framework.compiling import REORDER
 from systems.framework.input_error import InputError
 from systems.framework.signals import Emission
 
@@ -235,7 +234,7 @@ def _sample_delays(
     return first, delays, rates, earliest
 
 
-@njit(cache=True, fastmath=REORDER, forceinline=True)
+@njit(cache=True, forceinline=True)
 def _delayed(
     samples: NDArray[np.float32],
     first: int,
@@ -258,7 +257,7 @@ def _delayed(
 
 
 # Divisions that check for zero, as Python's do, would keep the loop from vectorising.
-@njit(cache=True, fastmath=REORDER, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _interpolate(
     samples: NDArray[np.float32],
     kernel: NDArray[np.float32],

@@ -17,7 +17,6 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, model_validator
 
-from systems.framework.compiling import REORDER
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, Parameters, Point
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
@@ -210,7 +209,7 @@ def room_images(room: RoomParameters, c: float) -> RoomImages:
     )
 
 
-@njit(cache=True, fastmath=REORDER)
+@njit(cache=True)
 def _add_arrivals(
     images: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]],
     p_S: NDArray[np.float64],
