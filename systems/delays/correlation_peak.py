@@ -23,7 +23,7 @@ _TOLERANCE = 1e-6
 _ROUNDING = 1.0 / 24.0
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True)
 def _turned(
     cross: NDArray[np.complex64],
     first: float,
@@ -52,7 +52,7 @@ def _turned(
         imaginary[k] = x * sine[k] + y * cosine[k]
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True)
 def _slope_and_curve(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],
@@ -69,7 +69,7 @@ def _slope_and_curve(
     return slope, curve
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True)
 def _sums(
     real: NDArray[np.float64],
     imaginary: NDArray[np.float64],

@@ -29,8 +29,7 @@ def frame_energy(frame: NDArray[Any]) -> float:  # pragma: no cover  (compiled)
     return energy
 
 
-# Inlined, so that blocks of a known length vectorise.
-@njit(cache=True, inline="always", error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _block_energy(
     samples: NDArray[Any], begin: int, count: int
 ) -> Any:  # pragma: no cover  (compiled)

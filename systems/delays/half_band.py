@@ -58,7 +58,7 @@ def halve_rate(
     return out
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True)
 def _halve_row(
     samples: NDArray[Any],
     even: NDArray[np.float32],

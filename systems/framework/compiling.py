@@ -1,9 +1,9 @@
 """Where compiled functions are kept.
 
 None takes numba's ``fastmath``: sums that the compiler may reorder come out as the
-machine, the caller and the order of compiling have it, and runs of 40 s make metres
-of their last bit (``tests/evals/test_compiled_code.py``). Without it a run by ear
-takes some 5 % longer.
+machine, the caller and the order of compiling have it, and runs of 40 s make
+centimetres of their last bit (``tests/evals/test_compiled_code.py``). Without it the
+compiled loop by ear takes 10 to 15 % longer, Drake's 5 %.
 """
 
 from __future__ import annotations

@@ -185,7 +185,7 @@ _ROOT_HALF_BITS = np.float32(np.sqrt(0.5)).view(np.int32)
 _PAIRS = 625
 
 
-@njit(cache=True, forceinline=True, error_model="numpy")
+@njit(cache=True, error_model="numpy")
 def _normal_pairs(
     state: np.uint64,
     uniform: NDArray[np.float32],

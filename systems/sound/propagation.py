@@ -234,7 +234,7 @@ def _sample_delays(
     return first, delays, rates, earliest
 
 
-@njit(cache=True, forceinline=True)
+@njit(cache=True)
 def _delayed(
     samples: NDArray[np.float32],
     first: int,
