@@ -16,7 +16,9 @@ from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
 from systems.framework.parameters import (
     Duration,
+    Fraction,
     Length,
+    NonNegative,
     NonNegativeLength,
     NonNegativeSpeed,
     Parameters,
@@ -27,6 +29,7 @@ from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.laws.impedance import AttractionParameters
 from systems.laws.law import Equation, Law
+from systems.planning.evasion import EvasionNumbers
 from systems.planning.guarded_drive import (
     AT_TICK,
     CARROT_X,
@@ -39,7 +42,9 @@ from systems.planning.guarded_drive import (
     DriveNumbers,
     drive_guarded,
 )
+from systems.planning.hazards import Hazards, HazardSensors, make_hazards
 from systems.planning.way import Way, make_way
+from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.safety.free_space import make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
 
@@ -67,6 +72,18 @@ class GuardedParameters(Parameters):
     """It weaves by so much to both sides, so that its sensors sweep, rad."""
     weave_period_s: Duration = 2.4
     """Period of that, s."""
+    search_rad: float = Field(default=1.0, ge=0.0, le=1.5)
+    """The same where something moves, the target or another body, rad."""
+    search_period_s: Duration = 3.4
+    """Period of that, s."""
+    search_less: Fraction = 0.3
+    """By this share it searches less where it lags behind the target."""
+    hazard_speed_m_s: Speed = 0.6
+    """Bodies that it tracks are no faster, m/s."""
+    risk_gain: NonNegative = 8.0
+    """Price of a body that would be hit, m/s off the wanted speed."""
+    watch_gain: NonNegative = 0.7
+    """Price of a threat that is 1 rad out of view, m/s off the wanted speed."""
     replan_s: Duration = 0.5
     """Time from one plan to the next, s."""
     patience_s: Duration = 0.3
@@ -78,7 +95,9 @@ class GuardedParameters(Parameters):
     clearance_m: NonNegativeLength = 0.02
     """By so much ways keep the disc that holds the body off echoes, m."""
     source_clearance_m: NonNegativeLength = 0.85
-    """Echoes from so near to the target are the target's, m."""
+    """Echoes from so near to the target do not block ways, m."""
+    source_radius_m: Length = 0.35
+    """Echoes from so near to the target are its own: no other body is there, m."""
 
 
 def guarded_step(
@@ -109,6 +128,9 @@ class GuardedController(LeafSystem):
         - target_valid [0 or 1]
         - pose_WB_estimated [m, m, rad]
         - guard_report [number of what was done, m, m, m]
+        - ranges [m]
+        - echo [0 or 1]
+        - range_ages [s, since each sensor fired]
         - free_space [FreeSpace]
         output_ports:
         - twist_B [m/s, rad/s]
@@ -122,6 +144,11 @@ class GuardedController(LeafSystem):
     looks past both sides of the cell that blocks; if that stays unseen, ways keep off
     it for a time. What stays all the same backs off.
 
+    What moves it tracks (``systems.planning.hazards``): echoes from floor that was seen
+    free are of bodies that have come there. While one may come near, it takes of some
+    speeds and headings the one of least price: off what is wanted, off the bodies,
+    and off keeping them in view.
+
     ``plan``: 0 no target, 1 driving, 2 looking, 3 backing off; the point it heads for,
     and the way to go. It needs the guard: by itself it keeps off nothing.
 
@@ -132,7 +159,7 @@ class GuardedController(LeafSystem):
         robot: Its body, and place of P.
         attraction: The follow distance.
         repulsion: ``RepulsionParameters``; uses ``guarded``.
-        sensors: Not used: what they see is in the map.
+        sensors: The range sensors.
         known: Grid of the map.
         tick_s: Period of the controller, s.
 
@@ -163,6 +190,7 @@ class GuardedController(LeafSystem):
         own = GuardedParameters() if repulsion is None else repulsion.guarded
         self._tick_s = tick_s
         self.set_name("guarded_controller")
+        sensors = sensors or UltrasonicParameters()
         memory = np.zeros((1, MEMORY))
         memory[0, AT_TICK] = -1.0
         self._numbers = DriveNumbers(
@@ -172,6 +200,16 @@ class GuardedController(LeafSystem):
             own,
             (attraction or AttractionParameters()).follow_distance_m,
             robot.control_point_m,
+            make_hazards(sensors.count),
+            _hazard_sensors(sensors, robot, known, own, tick_s),
+            EvasionNumbers(
+                own.turn_gain,
+                own.turn_rate_rad_s,
+                (0.5 * robot.length_m, 0.5 * robot.width_m),
+                own.cruise_speed_m_s,
+                own.risk_gain,
+                own.watch_gain,
+            ),
             body_radius(robot) + known.place_error_m + own.clearance_m,
             tick_s,
         )
@@ -183,6 +221,9 @@ class GuardedController(LeafSystem):
                 ("target_valid", 1),
                 ("pose_WB_estimated", 3),
                 ("guard_report", 4),
+                ("ranges", sensors.count),
+                ("echo", sensors.count),
+                ("range_ages", sensors.count),
             )
         ]
         self._free_space = self.DeclareAbstractInputPort(
@@ -210,27 +251,31 @@ class GuardedController(LeafSystem):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        memory, way = _copied(self._numbers)
+        memory, way, hazards = _copied(self._numbers)
         space = run.carried["free_space"](0)
-        numbers = self._numbers._replace(memory=memory, way=way, space=space)
+        numbers = self._numbers._replace(
+            memory=memory, way=way, space=space, hazards=hazards
+        )
         return Step(guarded_step, numbers)
 
     def _decide(self, context: Any) -> tuple[Any, Any]:
         """Memory and way, and the outputs."""
         state: Any = context.get_abstract_state(0).get_value()
         tick = round(context.get_time() / self._tick_s)
-        numbers = self._numbers._replace(memory=state[0], way=state[1])
+        numbers = self._numbers._replace(
+            memory=state[0], way=state[1], hazards=state[2]
+        )
         outputs = np.zeros(2), np.zeros(4)
         # What was decided at this tick is not decided twice.
         if state[0][0, AT_TICK] != tick:
-            memory, way = _copied(numbers)
-            numbers = numbers._replace(memory=memory, way=way)
+            memory, way, hazards = _copied(numbers)
+            numbers = numbers._replace(memory=memory, way=way, hazards=hazards)
             inputs = read_arrays(context, self._inputs)
             space: Any = self._free_space.Eval(context)
             guarded_step(tick, (), inputs, outputs, numbers._replace(space=space))
         else:
             _tell(numbers.memory, outputs)
-        return (numbers.memory, numbers.way), outputs
+        return (numbers.memory, numbers.way, numbers.hazards), outputs
 
     def _remember(self, context: Any, state: Any) -> None:
         known = self._decided.Eval(context)[0]
@@ -246,9 +291,28 @@ def _tell(memory, outputs):  # type: ignore[no-untyped-def]
     plan[2], plan[3] = memory[0, CARROT_Y], memory[0, WAY_LEFT]
 
 
-def _copied(numbers: DriveNumbers) -> tuple[Any, Way]:
+def _hazard_sensors(
+    sensors: UltrasonicParameters,
+    robot: RobotParameters,
+    known: FreeSpaceParameters,
+    own: GuardedParameters,
+    tick_s: float,
+) -> HazardSensors:
+    axes, places, half_angle = sensors.beams
+    return HazardSensors(
+        np.add(places, [robot.control_point_m, 0.0]),
+        np.column_stack([axes, np.full(len(axes), half_angle)]),
+        sensors.maximum_range_m,
+        known.range_error(sensors),
+        sensors.noise_m,
+        own.hazard_speed_m_s,
+        tick_s,
+    )
+
+
+def _copied(numbers: DriveNumbers) -> tuple[Any, Way, Hazards]:
     arrays: list[Any] = [np.copy(values) for values in numbers.way]
-    return np.copy(numbers.memory), Way(*arrays)
+    return np.copy(numbers.memory), Way(*arrays), numbers.hazards.copy()
 
 
 GUARDED = Law(

@@ -11,7 +11,16 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.planning.carrot import find_carrot
-from systems.planning.way import TIGHT, Way, find_way, mark_blocked
+from systems.planning.evasion import EvasionNumbers, choose_motion
+from systems.planning.hazards import (
+    MOVED_S,
+    Hazards,
+    HazardSensors,
+    find_movers,
+    pick_hazards,
+    track_hazards,
+)
+from systems.planning.way import NEAR, TIGHT, Way, find_way, mark_blocked
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
 
@@ -40,8 +49,10 @@ WAITING, DRIVING, LOOKING, BACKING = range(4)
     BLOCK_X,
     BLOCK_Y,
     BACKED_S,
+    HELD,
+    HELD_S,
     MEMORY,
-) = range(20)
+) = range(22)
 
 #: Half of the first look around, before the robot has moved, and of one at what blocks
 #: it, rad.
@@ -60,6 +71,14 @@ _THERE_M, _RESTS_M_S = 0.2, 0.1
 _DETOUR = 1.15
 #: It backs off for so long, s.
 _BACKING_S = 2.0
+#: Where something was found to move, it searches for so long, s; less the farther it
+#: lags behind what it follows, from the first to the second, m.
+_MOVES_S = 5.0
+_LITTLE_BEHIND_M, _FAR_BEHIND_M = 0.3, 0.9
+#: Bodies within this are evaded, m; less than this to be watched is none.
+_NEAR_M, _WATCHED = 3.5, 0.05
+#: Where the guard has not let the robot go on it does not try again for so long, s.
+_HELD_S = 0.4
 #: Cells around the robot that may block it.
 _MOST_CELLS = 1_000
 
@@ -77,6 +96,10 @@ class DriveNumbers(NamedTuple):
     follow_distance_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
+    hazards: Hazards
+    """Changed."""
+    sensors: HazardSensors
+    evasion: EvasionNumbers
     radius_m: float
     """Of the disc for which ways are sought, m."""
     tick_s: float
@@ -99,7 +122,8 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
     Args:
         tick: Its number.
         inputs: Place and velocity of the target, m and m/s, whether there is one, pose
-            of the robot, m and rad, and the guard's report; more are not read.
+            of the robot, m and rad, the guard's report, and ranges, echoes and ages of
+            the range sensors; more are not read.
         numbers: ``DriveNumbers``; its memory and way are changed.
     """
     target, velocity, valid = inputs[0], inputs[1], inputs[2][0]
@@ -109,10 +133,16 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
         m[0, PLANNED_S], m[0, BLOCKED_S] = -np.inf, time
         _stays(m, pose, time)
     m[0, AT_TICK] = tick
+    _remember_held(m, report, time)
     m[0, SPEED], m[0, TURN] = 0.0, 0.0
+    nowhere = np.inf, np.inf
+    x, y = (target[0], target[1]) if valid > 0.5 else nowhere
+    followed = x, y, own.source_radius_m
+    _track(time, pose, (inputs[5], inputs[6], inputs[7]), followed, numbers)
     if valid < 0.5:
         m[0, MODE], m[0, BLOCKED_S] = WAITING, time
         _stays(m, pose, time)
+        _evade(time, pose, 0.0, 0.0, numbers)
         return
     wanted, error, there = _find_heading(time, target, velocity, pose, numbers)
     if math.hypot(pose[0] - m[0, STAYS_X], pose[1] - m[0, STAYS_Y]) > _STAYS_M or there:
@@ -136,7 +166,46 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
             m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
             _stays(m, pose, time)
     if m[0, MODE] == DRIVING:
-        _drive(time, wanted, error, there, numbers)
+        _drive(time, velocity, wanted, error, there, numbers)
+    _evade(time, pose, wanted, error, numbers)
+
+
+@njit(cache=True)
+def _remember_held(
+    m: Any, report: Any, time: float
+) -> None:  # pragma: no cover  (compiled)
+    """Remembers at which speed the guard has not let the robot go on."""
+    if report[0] >= TURNED and m[0, SPEED] != 0.0:
+        m[0, HELD], m[0, HELD_S] = m[0, SPEED], time
+    elif time - m[0, HELD_S] > _HELD_S:
+        m[0, HELD] = 0.0
+
+
+@register_jitable
+def _track(time, pose, readings, followed, numbers):  # type: ignore[no-untyped-def]
+    hazards, space, sensors = numbers.hazards, numbers.space, numbers.sensors
+    track_hazards(hazards, time, pose, readings, space, followed, sensors)
+
+
+@register_jitable
+def _evade(time, pose, wanted, error, numbers):  # type: ignore[no-untyped-def]
+    """Goes otherwise than wanted where a body may come near."""
+    m, own, hazards = numbers.memory, numbers.own, numbers.hazards
+    count = pick_hazards(hazards, time, pose, _NEAR_M)
+    if count == 0:
+        return
+    weaving = pose[2] + m[0, TURN] / own.turn_gain
+    way = wanted, pose[2] + error, weaving
+    speed, heading, watched = choose_motion(
+        hazards.picked, count, pose, way, m[0, HELD], numbers.evasion
+    )
+    if watched < _WATCHED:
+        return
+    if m[0, MODE] == LOOKING and m[0, HAS_LOOKED] > 0.5:
+        m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
+    m[0, SPEED] = speed
+    turn = own.turn_gain * _wrapped(heading - pose[2])
+    m[0, TURN] = _within(turn, own.turn_rate_rad_s)
 
 
 @njit(cache=True)
@@ -152,8 +221,11 @@ def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-unt
     x, y, theta = pose[0], pose[1], pose[2]
     if time - m[0, PLANNED_S] >= own.replan_s - 0.5 * numbers.tick_s:
         goal = target[0], target[1]
-        clear_m, radius = own.source_clearance_m, numbers.radius_m
-        find_way(way, numbers.space, (x, y), goal, time, radius, clear_m)
+        clear = np.empty((1 + len(numbers.hazards.tracks), 3))
+        clear[0, 0], clear[0, 1], clear[0, 2] = *goal, own.source_clearance_m
+        count = 1 + find_movers(numbers.hazards, time, clear[1:])
+        radius = numbers.radius_m
+        find_way(way, numbers.space, (x, y), goal, time, radius, clear[:count])
         m[0, PLANNED_S] = time
     follow, offset = numbers.follow_distance_m, numbers.control_point_m
     dx = target[0] - x - offset * math.cos(theta)
@@ -233,7 +305,7 @@ def _blocking(
 
 
 @register_jitable
-def _drive(time, wanted, error, there, numbers):  # type: ignore[no-untyped-def]
+def _drive(time, velocity, wanted, error, there, numbers):  # type: ignore[no-untyped-def]
     """Towards the carrot, weaving, so that the sensors sweep what lies beside."""
     m, own = numbers.memory, numbers.own
     if there:
@@ -241,7 +313,16 @@ def _drive(time, wanted, error, there, numbers):  # type: ignore[no-untyped-def]
         return
     weave = 0.0
     if wanted > 0.0:
-        weave = own.weave_rad * math.sin(math.tau * time / own.weave_period_s)
+        width, period = own.weave_rad, own.weave_period_s
+        moves = math.hypot(velocity[0], velocity[1]) > _RESTS_M_S
+        narrow = numbers.way.facts[0, 2] >= NEAR
+        recent = time - numbers.hazards.memory[0, MOVED_S] < _MOVES_S
+        if recent or (moves and not narrow):
+            behind = m[0, WAY_LEFT] - numbers.follow_distance_m - _LITTLE_BEHIND_M
+            part = min(max(behind / (_FAR_BEHIND_M - _LITTLE_BEHIND_M), 0.0), 1.0)
+            width = own.search_rad * (1.0 - own.search_less * part)
+            period = own.search_period_s
+        weave = width * math.sin(math.tau * time / period)
     turn = own.turn_gain * _wrapped(error + weave)
     m[0, TURN] = _within(turn, own.turn_rate_rad_s)
     m[0, SPEED] = wanted

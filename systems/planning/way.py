@@ -98,7 +98,7 @@ def find_way(
     goal: Any,
     time: float,
     radius: float,
-    clear_m: float,
+    clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Finds the way from a robot to a goal.
 
@@ -109,11 +109,12 @@ def find_way(
         goal: (x, y); beyond the window the nearest of its cells counts, m.
         time: s.
         radius: Of the disc that must pass, m.
-        clear_m: Echoes that are this near to the goal come from what is followed, m.
+        clear: (n, 3) places, m, and how near to them echoes come from what is followed
+            or moves, m, and block no way.
     """
     size, cell = way.price.shape[0], 2.0 * space.cell_m
     low = _first_cells(space)
-    _set_prices(way, space, low, goal, time, radius, clear_m)
+    _set_prices(way, space, low, time, radius, clear)
     si, sj = _cell_at(start, low, cell, size)
     gi, gj = _cell_at(goal, low, cell, size)
     _search(way, si * size + sj, gi * size + gj)
@@ -173,10 +174,9 @@ def _set_prices(
     way: Way,
     space: FreeSpace,
     low: Any,
-    goal: Any,
     time: float,
     radius: float,
-    clear_m: float,
+    clear: Any,
 ) -> None:  # pragma: no cover  (compiled)
     size, cells, cell = way.price.shape[0], space.free_until.shape[0], 2 * space.cell_m
     for i in range(size):
@@ -191,13 +191,21 @@ def _set_prices(
             if hits < _DOUBTFUL_HITS:
                 continue
             x, y = (low[0] + 0.5 * i + 0.25) * cell, (low[1] + 0.5 * j + 0.25) * cell
-            if math.hypot(x - goal[0], y - goal[1]) >= clear_m:
+            if not _is_near(clear, x, y):
                 highest = OCCUPIED if hits >= _OCCUPIED_HITS else DOUBTFUL
                 _keep_off(way, (x, y), low, cell, radius, highest)
     for k in range(len(way.marks)):
         if way.marks[k, 2] > time:
             place = way.marks[k, 0], way.marks[k, 1]
             _keep_off(way, place, low, cell, radius, OCCUPIED)
+
+
+@njit(cache=True)
+def _is_near(clear: Any, x: float, y: float) -> bool:  # pragma: no cover  (compiled)
+    for k in range(len(clear)):
+        if math.hypot(x - clear[k, 0], y - clear[k, 1]) < clear[k, 2]:
+            return True
+    return False
 
 
 @njit(cache=True)

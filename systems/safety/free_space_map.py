@@ -75,6 +75,10 @@ class FreeSpaceParameters(Parameters):
         """Of the window along a side."""
         return math.ceil(self.window_m / self.cell_m - 1e-9)
 
+    def range_error(self, sensors: UltrasonicParameters) -> float:
+        """What ranges may be too long, m."""
+        return self.range_margin_m + _SIGMAS * sensors.noise_m
+
     def check(self, robot: RobotParameters) -> None:
         """Refuses what cannot serve a robot.
 
@@ -320,15 +324,15 @@ class FreeSpaceMap(LeafSystem):
 
     def _make_numbers(self) -> MapNumbers:
         own, sensors, robot = self._parameters, self._sensors, self._robot
+        error = own.range_error(sensors)
         axes, places, half_angle = sensors.beams
         points = 2 + math.ceil(2.0 * half_angle / _ARC_STEP)
-        margin = own.range_margin_m + _SIGMAS * sensors.noise_m
         return MapNumbers(
             make_free_space(own.cells, own.cell_m, sensors.count, points),
             sensor_sectors(sensors, robot.control_point_m),
             np.column_stack([axes, np.full(len(axes), half_angle)]),
             np.add(places, [robot.control_point_m, 0.0]),
-            (sensors.minimum_range_m, sensors.maximum_range_m, margin),
+            (sensors.minimum_range_m, sensors.maximum_range_m, error),
             (own.wheel_error, own.place_error_m, robot.wheel_separation_m),
             body_radius(robot),
             own.start_bubble_m,

@@ -1,4 +1,4 @@
-"""The guarded law among what rests: nothing is touched, and the goal is reached."""
+"""The guarded law: what rests is not touched, what moves is evaded."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from systems.framework.input_error import InputError
 SEED, LAYOUTS = 2026, 12
 
 
-def runs(name):
+def runs(name, layouts=LAYOUTS):
     settings = {"hearing": "ideal"}
     plan = comparison_plan(
-        name, laws=["guarded"], runs=LAYOUTS, seed=SEED, settings=settings
+        name, laws=["guarded"], runs=layouts, seed=SEED, settings=settings
     )
     for point in plan.points():
         yield simulate(plan.scenario_of(point), engine="compiled")
@@ -41,14 +41,26 @@ def test_nothing_that_rests_is_touched(name):
 
 
 @pytest.mark.slow
-def test_compiled_and_drake_agree():
-    scenario = load_scenario("u_trap", ["hearing=ideal", "law=guarded"])
+@pytest.mark.parametrize("name", ["one_moving_obstacle", "two_moving_obstacles"])
+def test_what_moves_is_evaded(name):
+    """The papers' laws touch something in 7 and 11 of 24 (docs/safety.md)."""
+    hit = [run.collision for run in runs(name, 24) if run.collision is not None]
+    assert len(hit) <= 3
+    assert sum(contact.fault == "robot" for contact in hit) <= 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("name", "cause"), [("u_trap", "reached"), ("two_moving_obstacles", "completed")]
+)
+def test_compiled_and_drake_agree(name, cause):
+    scenario = load_scenario(name, ["hearing=ideal", "law=guarded"])
     drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
-    assert drake.cause == compiled.cause == "reached"
+    assert drake.cause == compiled.cause == cause
     assert drake.columns.keys() == compiled.columns.keys()
-    for name, values in drake.columns.items():
-        atol = 1e-6 if "speed" in name else 1e-9
-        np.testing.assert_allclose(compiled.columns[name], values, rtol=0, atol=atol)
+    for column, values in drake.columns.items():
+        atol = 1e-6 if "speed" in column else 1e-9
+        np.testing.assert_allclose(compiled.columns[column], values, rtol=0, atol=atol)
 
 
 def test_the_law_brings_its_guard():

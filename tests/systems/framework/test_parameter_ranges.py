@@ -104,6 +104,10 @@ FIELDS = {
     "GuardedParameters.turn_rate_rad_s": (ABOVE_0, 20.0),
     "GuardedParameters.source_share": (0.0, 1.0),
     "GuardedParameters.weave_rad": (0.0, 1.5),
+    "GuardedParameters.search_rad": (0.0, 1.5),
+    "GuardedParameters.search_less": (0.0, 1.0),
+    "GuardedParameters.risk_gain": (0.0, 1e6),
+    "GuardedParameters.watch_gain": (0.0, 1e6),
     "GuardedParameters.clearance_m": (0.0, 1e3),
     "GuardedParameters.source_clearance_m": (0.0, 1e3),
     # The room's response is worked out anew at most once a frame.

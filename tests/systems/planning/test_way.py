@@ -42,6 +42,11 @@ def echoes(space, x, y, hits):
     space.hits[at], space.free_until[at] = hits, -1.0
 
 
+def seek(way, space, start, goal, time):
+    """Echoes within 30 cm of the goal are its own."""
+    find_way(way, space, start, goal, time, RADIUS, np.array([[*goal, 0.3]]))
+
+
 def cost_by_scipy(price, start, goal):
     """Least cost by another program: a step costs the price of the cell it leads to
     the goal from."""
@@ -72,7 +77,7 @@ def test_a_way_costs_what_dijkstra_finds(seed):
         echoes(space, x, y, generator.choice([2.0, 9.0]))
     space.free_until[:, : CELLS // 4] = -1.0
     start, goal = generator.uniform(-1.9, 1.9, (2, 2))
-    find_way(way, space, tuple(start), tuple(goal), 0.0, RADIUS, 0.3)
+    seek(way, space, tuple(start), tuple(goal), 0.0)
     size = CELLS // 2
     (si, sj), (gi, gj) = (np.floor(p / 0.1).astype(int) + 20 for p in (start, goal))
     assert way.cost[si, sj] == cost_by_scipy(way.price, si * size + sj, gi * size + gj)
@@ -87,7 +92,7 @@ def test_a_way_costs_what_dijkstra_finds(seed):
 def test_prices_go_by_distance_from_the_cell_that_echoed():
     space, way = known_space(), make_way(CELLS)
     echoes(space, 0.51, 0.01, 9.0)
-    find_way(way, space, (-1.0, -1.0), (-1.5, 1.5), 0.0, RADIUS, 0.3)
+    seek(way, space, (-1.0, -1.0), (-1.5, 1.5), 0.0)
     for i in range(CELLS // 2):
         for j in range(CELLS // 2):
             x, y = (i - 19.5) * 0.1, (j - 19.5) * 0.1
@@ -103,7 +108,7 @@ def test_prices_go_by_distance_from_the_cell_that_echoed():
 def test_what_echoed_seldom_is_doubtful_and_what_is_unseen_dearer():
     space, way = known_space(free=False), make_way(CELLS)
     echoes(space, 0.51, 0.01, 2.0)
-    find_way(way, space, (-1.0, -1.0), (-1.5, 1.5), 0.0, RADIUS, 0.3)
+    seek(way, space, (-1.0, -1.0), (-1.5, 1.5), 0.0)
     assert way.price[25, 20] == DOUBTFUL
     assert way.price[0, 0] == UNKNOWN
 
@@ -111,7 +116,7 @@ def test_what_echoed_seldom_is_doubtful_and_what_is_unseen_dearer():
 def test_echoes_from_the_goal_are_no_obstacle():
     space, way = known_space(), make_way(CELLS)
     echoes(space, 0.51, 0.01, 9.0)
-    find_way(way, space, (-1.0, 0.0), (0.7, 0.0), 0.0, RADIUS, 0.3)
+    seek(way, space, (-1.0, 0.0), (0.7, 0.0), 0.0)
     # But for the cell that was not seen free.
     assert sorted(np.unique(way.price)) == [FREE, UNKNOWN]
 
@@ -120,7 +125,7 @@ def test_marks_hold_for_their_time():
     space, way = known_space(), make_way(CELLS)
     mark_blocked(way, (0.5, 0.0), 10.0)
     for time, price in ((9.9, OCCUPIED), (10.1, FREE)):
-        find_way(way, space, (-1.0, 0.0), (1.5, 0.0), time, RADIUS, 0.3)
+        seek(way, space, (-1.0, 0.0), (1.5, 0.0), time)
         assert way.price[25, 20] == price
 
 
@@ -129,7 +134,7 @@ def test_the_carrot_is_in_sight():
     space, way = known_space(), make_way(CELLS)
     for y in np.arange(-2.0, 0.6, 0.05):
         echoes(space, 0.01, y + 0.01, 9.0)
-    find_way(way, space, (-1.2, -1.0), (1.2, -1.0), 0.0, RADIUS, 0.3)
+    seek(way, space, (-1.2, -1.0), (1.2, -1.0), 0.0)
     x, y = find_carrot(way, -1.2, -1.0, 5.0)
     # 0.466 m around the wall's end at (0, 0.6), which the disc just passes.
     assert -0.8 < x < 0.2
@@ -141,12 +146,12 @@ def test_the_carrot_is_in_sight():
 
 def test_the_carrot_is_straight_ahead_where_nothing_is():
     space, way = known_space(), make_way(CELLS)
-    find_way(way, space, (-1.5, 0.05), (1.5, 0.05), 0.0, RADIUS, 0.3)
+    seek(way, space, (-1.5, 0.05), (1.5, 0.05), 0.0)
     assert find_carrot(way, -1.5, 0.05, 1.5) == pytest.approx((-0.05, 0.05))
     assert find_carrot(way, -1.5, 0.05, 9.0) == pytest.approx((1.55, 0.05))
 
 
 def test_a_goal_beyond_the_window_is_headed_for_at_its_edge():
     space, way = known_space(), make_way(CELLS)
-    find_way(way, space, (0.05, 0.05), (30.0, 0.05), 0.0, RADIUS, 0.3)
+    seek(way, space, (0.05, 0.05), (30.0, 0.05), 0.0)
     assert way.path[int(way.facts[0, 0]) - 1] == pytest.approx((1.95, 0.05))
