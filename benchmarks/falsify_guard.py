@@ -1,15 +1,16 @@
 """Tries to make the guard collide with what rests: by chance, and by a directed search.
 
     python -m benchmarks.falsify_guard [--runs N] [--search N] [--seed S] [--workers N]
+        [--drivers NAME,...]
     python -m benchmarks.falsify_guard --seed S --only K
     python -m benchmarks.falsify_guard --cost
 
 Runs of 10 s by compiled loops: layouts and drivers of ``guard_drivers``, then SciPy's
 differential evolution over places of posts and commands, which lessens the clearance
 of the disc that holds the body. Prints collisions and the least clearances of each
-layout, driver and setting, and the worst run; ``--only`` runs one again, ``--cost``
-prints what the guard takes of a tick. Exit status 1 where the robot has touched
-something.
+layout, driver and setting, and the worst run; ``--drivers`` takes others, as laws that
+plan, ``--only`` runs one again, ``--cost`` prints what the guard and the guarded law
+take of a tick. Exit status 1 where the robot has touched something.
 """
 
 from __future__ import annotations
@@ -28,8 +29,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import differential_evolution
 
-from benchmarks.guard_drivers import BUBBLE_M, Trial, draw_trial, make_trial, run_trial
+from benchmarks.guard_drivers import (
+    BUBBLE_M,
+    USUAL,
+    Trial,
+    draw_trial,
+    make_trial,
+    run_trial,
+)
 from diagrams import load_scenario, simulate
+from diagrams.simulation import prepared_loop
 
 __all__ = ["Found", "by_chance", "by_search", "largest_rate", "searched_trial"]
 
@@ -53,19 +62,22 @@ class Found(NamedTuple):
     """Least one of the disc that holds the body."""
 
 
-def by_chance(seed: int, numbers: Iterable[int]) -> list[Found]:
+def by_chance(
+    seed: int, numbers: Iterable[int], drivers: Sequence[str] = USUAL
+) -> list[Found]:
     """Runs trials drawn by chance.
 
     Args:
         seed: Of all trials.
         numbers: Of these.
+        drivers: As of ``draw_trial``.
 
     Returns:
         What each came to.
     """
     found = []
     for number in numbers:
-        trial = draw_trial(seed, number)
+        trial = draw_trial(seed, number, drivers)
         kinds = trial.layout, trial.driver, trial.variant
         found.append(Found(number, kinds, *run_trial(trial)))
     return found
@@ -138,13 +150,15 @@ def largest_rate(collisions: int, runs: int) -> float:
     return (p + z * z / (2.0 * runs) + spread) / (1.0 + z * z / runs)
 
 
-def _all(runs: int, search: int, seed: int, workers: int) -> Iterator[list[Found]]:
+def _all(
+    runs: int, search: int, seed: int, workers: int, drivers: Sequence[str]
+) -> Iterator[list[Found]]:
     numbers = range(runs)
     edges = [*range(0, runs, _CHUNK), runs]
     chunks = [numbers[a:b] for a, b in pairwise(edges)]
     # Each setting makes blocks, which Drake never frees.
     with ProcessPoolExecutor(workers, max_tasks_per_child=200) as pool:
-        yield from pool.map(partial(by_chance, seed), chunks)
+        yield from pool.map(partial(by_chance, seed, drivers=drivers), chunks)
         if search:
             each = [search // workers] * workers
             seeds = [seed * workers + k for k in range(workers)]
@@ -163,7 +177,7 @@ def _report(found: Sequence[Found], what: str) -> None:
 
 
 def _cost() -> None:
-    """Prints the time of a tick with and without a guard, by both engines."""
+    """Prints the time of a tick with and without a guard, and of the guarded law."""
     for engine in ("compiled", "drake"):
         for guard in ("{}", "null"):
             fields = ["hearing=ideal", "duration_s=20", f"guard={guard}"]
@@ -171,6 +185,28 @@ def _cost() -> None:
             runs = [simulate(scenario, engine=engine) for _ in range(3)]
             tick_s = min(run.wall_s / len(run.time) for run in runs)
             print(f"{engine}, guard {guard}: {1e6 * tick_s:.0f} us a tick")
+    for name in ("clutter", "rooms", "two_moving_obstacles", "crowd"):
+        for preset in ("three", "ring_12"):
+            each = 1e3 * _tick_times(name, preset)
+            most = np.quantile(each, 0.99)
+            print(
+                f"guarded law, {name}, {preset}: {each.mean():.2f} ms a tick, "
+                f"99 % below {most:.1f} ms, worst {each.max():.1f} ms"
+            )
+
+
+def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
+    """(ticks,) s of a compiled run of the guarded law; of each the least of three."""
+    fields = ["hearing=ideal", "law=guarded", f"ultrasonic.preset={preset}"]
+    scenario, times = load_scenario(name, fields), []
+    for _ in range(3):
+        loop, spent = prepared_loop(scenario), []
+        while not loop.over:
+            start = perf_counter()
+            loop.advance(1)
+            spent.append(perf_counter() - start)
+        times.append(spent)
+    return np.min(times, axis=0)
 
 
 def main() -> int:
@@ -180,20 +216,22 @@ def main() -> int:
     parser.add_argument("--search", type=int, default=0, help="runs of the search")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--drivers", default=",".join(USUAL), help="names")
     parser.add_argument("--only", type=int, help="number of one trial to run again")
     parser.add_argument("--cost", action="store_true")
     arguments = parser.parse_args()
+    drivers = arguments.drivers.split(",")
     if arguments.cost:
         _cost()
         return 0
     if arguments.only is not None:
-        trial = draw_trial(arguments.seed, arguments.only)
+        trial = draw_trial(arguments.seed, arguments.only, drivers)
         print(trial._replace(table=trial.table.reshape(-1, 6)))
         print(run_trial(trial))
         return 0
     start, found = perf_counter(), []
     for part in _all(
-        arguments.runs, arguments.search, arguments.seed, arguments.workers
+        arguments.runs, arguments.search, arguments.seed, arguments.workers, drivers
     ):
         found += part
     for place, kind in enumerate(("layout", "driver", "setting")):

@@ -8,7 +8,7 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.own_code import import_own, made
+from diagrams.own_code import asked_for, import_own, made
 from diagrams.own_laws import checked_law, try_law
 from diagrams.scenario import Scenario
 from systems import (
@@ -36,18 +36,21 @@ _COMMANDS: dict[str, Callable[..., Any]] = {
 _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
 
-def make_controller(scenario: Scenario) -> Any:
+def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
     """Builds the controller that ``scenario.law`` names.
 
     ``package.module:Name`` or ``path/to/file.py:Name`` is a function
     ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
     a LeafSystem class that may ask for ``robot``, ``attraction``, ``repulsion``,
-    ``sensors`` and ``tick_s``. Its inputs are output ports of the diagram, by name;
-    it has one of the outputs that ``make_command`` knows. Either is looked up in the
-    working directory, too. A function is tried at a few distances and speeds.
+    ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and ``seed``. Its
+    inputs are output ports of the diagram, by name; it has one of the outputs that
+    ``make_command`` knows. Either is looked up in the working directory, too. A
+    function is tried at a few distances and speeds.
 
     Args:
         scenario: Its law, and the parameters of the law's block.
+        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        seed: Of a law that draws random numbers.
 
     Returns:
         The block.
@@ -66,11 +69,18 @@ def make_controller(scenario: Scenario) -> Any:
         "tick_s": scenario.tick_s,
         "sensors": sensors,
     }
+    more = {
+        "following": scenario.following,
+        "known": scenario.free_space,
+        "bodies": bodies,
+        "seed": seed,
+    }
     name = scenario.law
     if name in LAWS:
-        if LAWS[name].plans:
-            parts["known"] = scenario.free_space
-        return _block(LAWS[name], parts)
+        law = LAWS[name]
+        if law.controller is not None and law.plans:
+            return law.controller(**asked_for(law.controller, {**parts, **more}))
+        return _block(law, parts)
     if ":" not in name:
         raise InputError(
             "law",
@@ -79,7 +89,10 @@ def make_controller(scenario: Scenario) -> Any:
         )
     law = import_own(name, "law")
     if inspect.isclass(law):
-        return _own_block(name, law, parts)
+        # One that takes any keyword may hand it on to a law of ours, which does not.
+        named = inspect.signature(getattr(law, "_construct", law)).parameters
+        wanted = {key: value for key, value in more.items() if key in named}
+        return _own_block(name, law, {**parts, **wanted})
     function = checked_law(name, law)
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)

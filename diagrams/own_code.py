@@ -19,6 +19,7 @@ from systems.framework.input_error import InputError
 
 __all__ = [
     "OURS",
+    "asked_for",
     "files_of",
     "import_own",
     "made",
@@ -145,16 +146,29 @@ def made(
         InputError: It cannot be made.
     """
     try:
-        asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
-        if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
-            return maker(**parts)
-        return maker(**{key: parts[key] for key in asked if key in parts})
+        return maker(**asked_for(maker, parts))
     except (Exception, SystemExit) as error:  # whatever it raises
         raise InputError(
             field,
             f"{name!r} cannot be made ({why(error)}); it may ask for "
             f"{', '.join(parts)}",
         ) from error
+
+
+def asked_for(maker: Callable[..., Any], parts: Mapping[str, Any]) -> dict[str, Any]:
+    """Those of some parts that a class asks for.
+
+    Args:
+        maker: The class, as of ``made``.
+        parts: By name.
+
+    Returns:
+        Those that its arguments name; all, where it takes any keyword.
+    """
+    asked = inspect.signature(getattr(maker, "_construct", maker)).parameters
+    if any(each.kind is each.VAR_KEYWORD for each in asked.values()):
+        return dict(parts)
+    return {key: parts[key] for key in asked if key in parts}
 
 
 def with_own_blocks(

@@ -19,6 +19,7 @@ from systems.hearing.tracker_model import TrackerParameters
 from systems.laws.catalogue import LAWS
 from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
+from systems.planning.following import FollowingParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.safety.free_space_map import FreeSpaceParameters
@@ -75,6 +76,7 @@ class FollowerParameters(Parameters):
     collision_vector: CollisionVectorParameters = CollisionVectorParameters()
     attraction: AttractionParameters = AttractionParameters()
     repulsion: RepulsionParameters = RepulsionParameters()
+    following: FollowingParameters = FollowingParameters()
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
@@ -90,8 +92,8 @@ class FollowerParameters(Parameters):
 
     @property
     def own_guard(self) -> GuardParameters | None:
-        """``guard``, which a law that plans always has; none: nothing guards it."""
-        if self.guard is None and self.law in LAWS and LAWS[self.law].plans:
+        """``guard``, which a guarded law always has; none: nothing guards it."""
+        if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
             return GuardParameters(obstacle_speed_m_s=0.6)
         return self.guard
 

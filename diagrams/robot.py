@@ -162,7 +162,10 @@ def robot_blocks(
     Raises:
         InputError: As ``make_robot``.
     """
-    controller = make_controller(scenario)
+    seed = seed_of(scenario, "controller", name)
+    controller = make_controller(scenario, bodies=bodies, seed=seed)
+    _check_sensing(scenario, controller)
+    mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
     ours = [
         DiffDrivePlant(
             robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
@@ -175,7 +178,7 @@ def robot_blocks(
         ),
         *_hearing(scenario, name, others),
         _tracker(scenario),
-        *_obstacle_sensing(scenario, name, bodies),
+        *_obstacle_sensing(scenario, name, bodies, mapped=mapped),
         controller,
         _driving(scenario, controller),
     ]
@@ -385,7 +388,29 @@ def _tracker(scenario: Scenario) -> Any:
     )
 
 
-def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
+#: What only range sensors give.
+_OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
+
+
+def _check_sensing(scenario: Scenario, controller: Any) -> None:
+    """Refuses a law that reads ranges where there are none."""
+    wanted = _OF_RANGES.intersection(_inputs(controller))
+    if wanted and scenario.obstacle_sensing != "ultrasonic" and not scenario.blocks:
+        raise InputError(
+            "obstacle_sensing",
+            f"is {scenario.obstacle_sensing}, but law {scenario.law!r} reads "
+            f"{', '.join(sorted(wanted))}; set it to ultrasonic",
+        )
+
+
+def _inputs(block: Any) -> list[str]:
+    ports = map(block.get_input_port, range(block.num_input_ports()))
+    return [port.get_name() for port in ports]
+
+
+def _obstacle_sensing(
+    scenario: Scenario, name: str, bodies: int, *, mapped: bool
+) -> list[Any]:
     seen: dict[str, Any] = {
         "robot": scenario.robot,
         "source_size": scenario.source_size,
@@ -415,7 +440,7 @@ def _obstacle_sensing(scenario: Scenario, name: str, bodies: int) -> list[Any]:
             tick_s=scenario.tick_s,
         ),
     ]
-    if scenario.own_guard is not None:
+    if mapped:
         known = FreeSpaceMap(
             parameters=scenario.free_space,
             sensors=scenario.ultrasonic,

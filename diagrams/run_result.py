@@ -35,8 +35,8 @@ class RunResult:
     scenario: Scenario
     """Of one robot among several, that of it alone (``Scenario.of_robot``)."""
     cause: str
-    """One of reached, completed, unsettled, timeout, astray, collision, stuck, lost,
-    diverged, interrupted; docs/model.md says when."""
+    """One of reached, completed, unsettled, timeout, astray, collision, stuck, no way
+    found, lost, diverged, interrupted; docs/model.md says when."""
     collision: Collision | None
     """Set where the cause is collision."""
     columns: dict[str, NDArray[np.float64]]

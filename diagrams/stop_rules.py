@@ -25,6 +25,7 @@ from systems.world.geometry import (
 __all__ = [
     "BETWEEN_TICKS",
     "DIVERGED",
+    "GIVES_UP",
     "ROUNDING_S",
     "SUCCESSFUL",
     "UNJUDGED",
@@ -52,6 +53,9 @@ ROUNDING_S = 1e-9
 NEAR_M = 0.1
 #: Instants looked at between two ticks.
 BETWEEN_TICKS = 5
+
+#: Port of a law that says when it has found that there is no way, 0 or 1.
+GIVES_UP = "gives_up"
 
 _Places = Mapping[str, tuple[float, float, float]]
 _GO_ON = EventStatus.DidNothing()
@@ -99,6 +103,8 @@ class Seen(NamedTuple):
     """vx, vy, omega of it in W, m/s and rad/s."""
     valid: bool
     """Whether there is a target."""
+    gives_up: bool = False
+    """Whether the law says that there is no way to it."""
 
 
 class RunRules:
@@ -193,10 +199,14 @@ class _View:
     """Reads a robot in the diagram's context."""
 
     def __init__(self, parts: Parts) -> None:
-        self._blocks = parts.blocks["plant"], parts.blocks["tracker"]
+        self._blocks: tuple[Any, ...] = parts.blocks["plant"], parts.blocks["tracker"]
         self._pose = parts.port("plant", "pose_WB")
         self._velocity = parts.port("plant", "velocity_WB")
         self._valid = parts.port("tracker", "target_valid")
+        controller = parts.blocks["controller"]
+        if controller.HasOutputPort(GIVES_UP):
+            self._blocks += (controller,)
+            self._gives_up = controller.GetOutputPort(GIVES_UP)
         self._root: Any = None
         self._contexts: list[Any] = []
 
@@ -204,11 +214,12 @@ class _View:
         if context is not self._root:
             self._root = context
             self._contexts = [b.GetMyContextFromRoot(context) for b in self._blocks]
-        plant, tracker = self._contexts
+        plant, tracker, *controller = self._contexts
         return Seen(
             self._pose.Eval(plant).tolist(),
             self._velocity.Eval(plant).tolist(),
             self._valid.Eval(tracker)[0] > 0.5,
+            any(self._gives_up.Eval(each)[0] > 0.5 for each in controller),
         )
 
 
@@ -224,7 +235,7 @@ class RuleNumbers(NamedTuple):
 
 
 #: Causes that ``judge_tick`` finds, by their numbers.
-FOUND = ("", "diverged", "reached", "lost", "stuck")
+FOUND = ("", "diverged", "reached", "lost", "stuck", "no way found")
 DIVERGED = FOUND.index("diverged")
 
 #: State of ``judge_tick`` before the first tick: time and place of P from which it has
@@ -240,6 +251,7 @@ def judge_tick(
     velocity: Any,
     p_WS: Any,
     valid: bool,  # noqa: FBT001  # compiled code has no keywords
+    gives_up: bool,  # noqa: FBT001
     numbers: RuleNumbers,
 ) -> int:
     """Why a run ends at a tick, contacts apart.
@@ -251,6 +263,7 @@ def judge_tick(
         velocity: (vx, vy, omega) of it in W, m/s and rad/s.
         p_WS: What it follows, m.
         valid: Whether it has a target.
+        gives_up: Whether its law says that there is no way to it.
         numbers: ``RuleNumbers``.
 
     Returns:
@@ -286,7 +299,9 @@ def judge_tick(
     if not valid or in_goal or moved:
         state[0], state[1], state[2] = time, x_P, y_P
         return 0
-    return 4 if time - state[0] >= stop.stuck_after_s else 0
+    if time - state[0] < stop.stuck_after_s:
+        return 0
+    return 5 if gives_up else 4
 
 
 class JudgedTick(NamedTuple):
@@ -363,6 +378,7 @@ class RobotRules:
                 seen.velocity,
                 places[self.surroundings.target],
                 self._valid,
+                seen.gives_up,
                 self.numbers,
             )
             self.cause = FOUND[found]

@@ -27,6 +27,11 @@ from systems.laws.active_impedance_controller import (
     ActiveImpedanceController,
     ActiveImpedanceController_,
 )
+from systems.laws.baselines.dynamic_window import DynamicWindowController
+from systems.laws.baselines.path_integral import PathIntegralController
+from systems.laws.baselines.reciprocal_avoidance import ReciprocalAvoidanceController
+from systems.laws.baselines.stop_when_near import StopWhenNearController
+from systems.laws.baselines.vector_field_histogram import VectorFieldHistogramController
 from systems.laws.conventional_impedance_2017_controller import (
     ConventionalImpedance2017Controller,
     ConventionalImpedance2017Controller_,
@@ -62,6 +67,7 @@ __all__ = [
     "ConventionalImpedanceController_",
     "DiffDrivePlant",
     "DiffDrivePlant_",
+    "DynamicWindowController",
     "FreeSpaceMap",
     "GuardedController",
     "IdealObstacleSensor",
@@ -72,17 +78,21 @@ __all__ = [
     "MotionGuard",
     "Obstacles",
     "Obstacles_",
+    "PathIntegralController",
     "RadialLawController",
     "RadialLawController_",
+    "ReciprocalAvoidanceController",
     "SoundEmitter",
     "SourceRobot",
     "SourceRobot_",
     "SourceTracker",
     "SourceTracker_",
+    "StopWhenNearController",
     "TDOAEstimator",
     "TwistWheelCommand",
     "TwistWheelCommand_",
     "UltrasonicArray",
+    "VectorFieldHistogramController",
     "VelocityWheelCommand",
     "VelocityWheelCommand_",
     "WheelOdometry",

@@ -33,7 +33,8 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     Of the others: ``jam`` (stuck, or out of time, without ever having come into the
     goal), ``held off`` (stuck after it came: the push off the source itself keeps
     it outside), ``swings`` (unsettled: it came, and did not come to rest there),
-    ``lost``, ``astray`` and ``diverged`` (the source), ``failed`` (an error).
+    ``lost``, ``astray`` and ``diverged`` (the source), ``no way found`` (as the law
+    says), ``failed`` (an error).
 
     Args:
         rows: Of ``analysis.sweeps.store.load_results``, with cones.

@@ -24,6 +24,7 @@ COLOURS = {
     "right": "#E69F00",
     "seen": "#009E73",
     "echoes": "#9A6A00",
+    "tracked": "#882255",
 }
 #: Of several robots, in turn.
 ROBOT_COLOURS = ("#0072B2", "#009E73", "#AA4499", "#56B4E9", "#B07D00", "#332288")

@@ -14,7 +14,13 @@ from systems.framework.step_block import RunFacts
 from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap
 
-__all__ = ["KnownSpace", "has_known_space", "known_space", "remembered_space"]
+__all__ = [
+    "KnownSpace",
+    "has_known_space",
+    "known_space",
+    "logged_readings",
+    "remembered_space",
+]
 
 #: Columns of a run without which the map cannot be worked out.
 _POSE = ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated")
@@ -87,7 +93,7 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     Yields:
         The same map at every tick of the log, changed: copy what is to be kept.
     """
-    scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
+    scenario, tick_s = result.scenario, result.scenario.tick_s
     sensors = scenario.ultrasonic
     block = FreeSpaceMap(
         parameters=scenario.free_space,
@@ -108,16 +114,32 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
     step = block.step_for(run)
     space = run.carried["free_space"](0)
     ticks = np.rint(result.time / tick_s).astype(np.int64)
+    for tick, inputs in zip(ticks.tolist(), logged_readings(result), strict=True):
+        step.step(tick, (), inputs, (), step.numbers)
+        yield space
+
+
+def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ...]]:
+    """What the range sensors read at each tick, and where the robot took itself to be.
+
+    Args:
+        result: The run of one guarded robot.
+
+    Yields:
+        (sensors,) ranges, m, echoes, 0 or 1, and ages of them, s, and (3,) the pose by
+        the odometry, m and rad.
+    """
+    scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
+    sensors = scenario.ultrasonic
+    ticks = np.rint(result.time / tick_s).astype(np.int64)
     # Of sensors that fire in turn the log does not tell which one has just fired.
     since = (ticks[:, None] - sensors.turns(tick_s)) % sensors.round_ticks(tick_s)
     ranges, echo, poses = (
         np.column_stack([columns[name] for name in names])
         for names in (_numbered("range", scenario), _numbered("echo", scenario), _POSE)
     )
-    for row, tick in enumerate(ticks):
-        inputs = ranges[row], echo[row], since[row] * tick_s, poses[row]
-        step.step(int(tick), (), inputs, (), step.numbers)
-        yield space
+    for row in range(len(ticks)):
+        yield ranges[row], echo[row], since[row] * tick_s, poses[row]
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:

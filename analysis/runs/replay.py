@@ -8,6 +8,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ from analysis.runs.scene import (
     run_title,
     sound_bursts,
 )
+from analysis.runs.tracked_bodies import tracked_bodies
 from diagrams import RunResult, Scenario
 from diagrams.bodies import RecordedPath
 from systems.safety.braking import BRAKED, PASSED, SLOWED, TURNED
@@ -45,6 +47,9 @@ RING_S = 0.0625
 KNOWN_PERIOD_S = 0.5
 #: A map takes so many ticks to enter all that was seen at the first one.
 FIRST_TICKS = 3
+#: Bodies are shown as tracked that are so likely, with rings of these radii, m.
+LEAST_EXISTS = 0.3
+TRACKED_M = (0.1, 0.2, 0.4, 0.8)
 #: Cells of all these maps at most.
 MOST_CELLS = 30_000_000
 
@@ -58,8 +63,9 @@ def write_replay(result: RunResult, path: str | Path) -> None:
     trails. Of a guarded robot also the floor that it knows to be free, dots where
     echoes came from, and a circle about the place where it could rest by now: the
     edge of what the guard keeps free, grey where it passed what the law commanded,
-    orange where it gave less, red where it braked. The page needs a browser with
-    WebGL, but no network.
+    orange where it gave less, red where it braked. Of the guarded law also a ring about
+    each body that it takes to move, as wide as it is unsure of its place. The page
+    needs a browser with WebGL, but no network.
 
     Args:
         result: The run.
@@ -159,6 +165,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
             _record_rings(meshcat, result, path, sounds[own.name])
         _record_known_space(meshcat, result, look, path)
         _record_guard(meshcat, own, f"guard/{path}", frames)
+        _record_tracked_bodies(meshcat, own, f"tracked/{path}", frames)
     for name, source in scenario.all_sources.items():
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
@@ -346,6 +353,32 @@ _EDGES = (
     ("lessened", "echo", (SLOWED, TURNED)),
     ("braked", "source", (BRAKED,)),
 )
+
+
+def _record_tracked_bodies(
+    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
+) -> None:
+    """A ring about each body that the law takes to move, as wide as it is unsure."""
+    tracked = tracked_bodies(result, frames)
+    if tracked is None:
+        return
+    for k in range(tracked.exists.shape[1]):
+        seen = tracked.exists[:, k] > LEAST_EXISTS
+        if not seen.any():
+            continue
+        for time, there, (x, y) in zip(
+            tracked.times, seen, tracked.places[:, k], strict=True
+        ):
+            if there:
+                place = upright(float(x), float(y), 0.0)
+                meshcat.SetTransform(f"{path}/{k}", place, float(time))
+        wide = np.minimum(tracked.spreads[:, k], TRACKED_M[-1])
+        for least, radius in pairwise((0.0, *TRACKED_M)):
+            ring = f"{path}/{k}/{radius:g}"
+            states = seen & (wide > least) & (wide <= radius)
+            if states.any():
+                replay_scene.add_disc_edge(meshcat, ring, radius, "tracked")
+                _record_switch(meshcat, ring, tracked.times, states)
 
 
 def _record_trail(

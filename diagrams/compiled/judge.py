@@ -82,7 +82,7 @@ def judge_all(
         tick: Its number.
         tick_s: s.
         watched: Of each robot its pose, velocity, what it follows, whether it has a
-            target, and its pose at the tick before.
+            target, whether its law gives up, and its pose at the tick before.
         contacts: ``Contacts`` of each.
         judged: (robots, 8) states of ``judge_tick``, changed.
         ended: (robots, 2) what that has returned, and whether a body is touched;
@@ -93,7 +93,7 @@ def judge_all(
     """
     all_ended, over = True, False
     for k in range(len(contacts)):
-        pose, velocity, pose_WS, valid, _ = watched[k]
+        pose, velocity, pose_WS, valid, gives_up, _ = watched[k]
         if _touches(tick, k, watched, contacts[k]):
             ended[k, 1] = 1
         elif ended[k, 0] == 0:
@@ -104,6 +104,7 @@ def judge_all(
                 velocity,
                 pose_WS,
                 valid[0] > 0.5,
+                gives_up[0] > 0.5,
                 contacts[k].rules,
             )
         over = over or ended[k, 1] > 0 or ended[k, 0] == DIVERGED
@@ -112,7 +113,7 @@ def judge_all(
     if not over:
         for k in range(len(contacts)):
             for j in range(3):
-                watched[k][4][j] = watched[k][0][j]
+                watched[k][5][j] = watched[k][0][j]
     return over
 
 
@@ -121,7 +122,7 @@ def _touches(
     tick: int, number: int, watched: Any, contacts: Contacts
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether a robot has touched a body since the last tick."""
-    pose, before, at = watched[number][0], watched[number][4], BETWEEN_TICKS * tick
+    pose, before, at = watched[number][0], watched[number][5], BETWEEN_TICKS * tick
     mine, other = np.empty(5), np.empty(5)
     mine[3], mine[4] = contacts.size
     for body in range(len(contacts.reach)):
@@ -138,7 +139,7 @@ def _touches(
             for k in range(3):
                 mine[k] = before[k] + part * (pose[k] - before[k])
                 if robot >= 0:
-                    then, now = watched[robot][4][k], watched[robot][0][k]
+                    then, now = watched[robot][5][k], watched[robot][0][k]
                     other[k] = then + part * (now - then)
                 elif tick > 0:
                     other[k] = contacts.poses[body, at - BETWEEN_TICKS + fifth, k]

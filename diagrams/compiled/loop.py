@@ -28,7 +28,7 @@ from diagrams.compiled.sounds import sounds_of_a_run
 from diagrams.compiled.source import PACKED, Packing, compiled_from
 from diagrams.robot import seed_of
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import UNJUDGED, JudgedTick, RunRules
+from diagrams.stop_rules import GIVES_UP, UNJUDGED, JudgedTick, RunRules
 from systems.framework.host_step import HostCall, HostError, HostFunction, host_step
 from systems.framework.input_error import InputError, shortened
 from systems.framework.step_block import RunFacts
@@ -223,7 +223,7 @@ def compile_loop(
 
 
 #: What a robot is judged by, and its pose at the tick before.
-_WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid"
+_WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid", GIVES_UP
 
 
 #: What a step is called with after the tick.
@@ -252,7 +252,8 @@ class _LoopRobot:
             {**heard},
         )
         self.made, self.steps = made, made.steps(self.facts)
-        self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
+        sizes = {GIVES_UP: 1, **made.sizes}
+        self._views = {port: np.zeros(size) for port, size in sizes.items()}
 
     def view(self, port: str) -> NDArray[np.float64]:
         """What a port carries."""

@@ -26,6 +26,7 @@ MECHANISMS = (
     "lost",
     "astray",
     "diverged",
+    "no way found",
     "failed",
 )
 

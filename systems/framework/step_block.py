@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from pydrake.common.value import Value
 
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
@@ -74,6 +75,7 @@ class StepBlock:
         tick_s: float,
         *,
         unread: Sequence[str] = (),
+        carried: Sequence[str] = (),
     ) -> None:
         """Declares all of it.
 
@@ -84,6 +86,8 @@ class StepBlock:
             outputs: The same of the output ports.
             tick_s: Period of the update, s.
             unread: Last input ports that it has no use for, and may be left open.
+            carried: Abstract input ports; what they carry takes the place of the field
+                of that name in the step's numbers.
         """
         self.step = done
         self._zero, self._sizes = scalar(0.0), [size for _, size in outputs]
@@ -92,7 +96,12 @@ class StepBlock:
             self.DeclareVectorInputPort(name=name, size=size) for name, size in inputs
         ]
         self._read = [port for port in self._inputs if port.get_name() not in unread]
-        sources = {port.ticket() for port in self._read} | {self.time_ticket()}
+        self._carried = [
+            self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
+            for name in carried
+        ]
+        sources = {port.ticket() for port in (*self._read, *self._carried)}
+        sources.add(self.time_ticket())
         if done.state:
             self.DeclareDiscreteState([scalar(x) for x in done.state])
             self.DeclarePeriodicDiscreteUpdateEvent(
@@ -115,11 +124,18 @@ class StepBlock:
     def step_for(self: Any, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
         step: Step = self.step
-        return step
+        names = [port.get_name() for port in self._carried]
+        if not names:
+            return step
+        values = {name: run.carried[name](0) for name in names}
+        return step._replace(numbers=step.numbers._replace(**values))
 
     def _do_step(self: Any, context: Any) -> tuple[Any, Any]:
         """Outputs, and the state of the next tick."""
         step, numbers, initial = self.step[:3]
+        if self._carried:
+            values = {port.get_name(): port.Eval(context) for port in self._carried}
+            numbers = numbers._replace(**values)
         inputs, state = read_lists(context, self._read), []
         inputs += [[]] * (len(self._inputs) - len(inputs))
         if initial:

@@ -6,6 +6,11 @@ from collections.abc import Mapping
 
 from systems.laws.active_impedance_2017_controller import ACTIVE_2017
 from systems.laws.active_impedance_controller import ACTIVE
+from systems.laws.baselines.dynamic_window import DWA
+from systems.laws.baselines.path_integral import MPPI
+from systems.laws.baselines.reciprocal_avoidance import ORCA
+from systems.laws.baselines.stop_when_near import STOP_WHEN_NEAR
+from systems.laws.baselines.vector_field_histogram import VFH_PLUS
 from systems.laws.conventional_impedance_2017_controller import CONVENTIONAL_2017
 from systems.laws.conventional_impedance_controller import CONVENTIONAL
 from systems.laws.guarded_controller import GUARDED
@@ -24,6 +29,11 @@ LAWS: Mapping[str, Law] = {
         CONVENTIONAL_2017,
         ACTIVE_2017,
         GUARDED,
+        STOP_WHEN_NEAR,
+        DWA,
+        VFH_PLUS,
+        MPPI,
+        ORCA,
     )
 }
 

@@ -20,9 +20,7 @@ from systems.framework.parameters import (
     Length,
     NonNegative,
     NonNegativeLength,
-    NonNegativeSpeed,
     Parameters,
-    Positive,
     Speed,
 )
 from systems.framework.signals import TICK_S
@@ -30,10 +28,12 @@ from systems.framework.step_block import RunFacts, Step
 from systems.laws.impedance import AttractionParameters
 from systems.laws.law import Equation, Law
 from systems.planning.evasion import EvasionNumbers
+from systems.planning.following import FollowingParameters
 from systems.planning.guarded_drive import (
     AT_TICK,
     CARROT_X,
     CARROT_Y,
+    GIVING_UP,
     MEMORY,
     MODE,
     SPEED,
@@ -48,24 +48,12 @@ from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.safety.free_space import make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius
 
-__all__ = ["GUARDED", "GuardedController", "GuardedParameters"]
+__all__ = ["GUARDED", "GuardedController", "GuardedParameters", "hazard_sensors"]
 
 
 class GuardedParameters(Parameters):
     """How the guarded law drives, looks and plans."""
 
-    cruise_speed_m_s: Speed = 0.62
-    """Largest wanted speed, m/s."""
-    back_speed_m_s: NonNegativeSpeed = 0.15
-    """Speed of backing off, m/s."""
-    approach_gain: Positive = 1.2
-    """Wanted speed for a distance to go, 1/s."""
-    source_share: float = Field(default=0.8, ge=0.0, le=1.0)
-    """Part of the target's own speed that is added."""
-    turn_gain: Positive = 3.0
-    """Yaw rate for an error of the heading, 1/s."""
-    turn_rate_rad_s: float = Field(default=2.0, gt=0.0, le=20.0)
-    """Largest wanted yaw rate, rad/s."""
     look_ahead_m: Length = 1.5
     """It heads for points of its way no farther away, m."""
     weave_rad: float = Field(default=0.3, ge=0.0, le=1.5)
@@ -90,6 +78,8 @@ class GuardedParameters(Parameters):
     """Blocked by the guard for so long, it looks at what blocks it, s."""
     give_up_s: Duration = 5.5
     """It stays for so long at most, then it marks what is ahead and backs off, s."""
+    search_way_s: Duration = 20.0
+    """For so long it seeks a way where all lead through what echoes, s."""
     mark_s: Duration = 10.0
     """For so long it seeks ways that keep off what has blocked it, s."""
     clearance_m: NonNegativeLength = 0.02
@@ -135,6 +125,7 @@ class GuardedController(LeafSystem):
         output_ports:
         - twist_B [m/s, rad/s]
         - plan [number of what it does, m, m, m]
+        - gives_up [0 or 1]
 
     Every ``replan_s`` it seeks the cheapest way for the disc that holds the body:
     unknown cells cost a little more than those seen free, what echoed much more. It
@@ -149,8 +140,12 @@ class GuardedController(LeafSystem):
     speeds and headings the one of least price: off what is wanted, off the bodies,
     and off keeping them in view.
 
-    ``plan``: 0 no target, 1 driving, 2 looking, 3 backing off; the point it heads for,
-    and the way to go. It needs the guard: by itself it keeps off nothing.
+    Where for ``search_way_s`` every way leads through what echoes, and unknown space
+    leads nowhere, it stands and says so (``gives_up``), until there is one.
+
+    ``plan``: 0 no target, 1 driving, 2 looking, 3 backing off, 4 no way found; the
+    point it heads for, and the way to go. It needs the guard: by itself it keeps off
+    nothing.
 
     Abstract state: the memory of ``systems.planning.guarded_drive`` and the way. Rate
     and latency: a function of state and present inputs, at every tick; no latency.
@@ -159,6 +154,7 @@ class GuardedController(LeafSystem):
         robot: Its body, and place of P.
         attraction: The follow distance.
         repulsion: ``RepulsionParameters``; uses ``guarded``.
+        following: How fast it drives and turns.
         sensors: The range sensors.
         known: Grid of the map.
         tick_s: Period of the controller, s.
@@ -181,6 +177,7 @@ class GuardedController(LeafSystem):
         robot: RobotParameters | None = None,
         attraction: AttractionParameters | None = None,
         repulsion: Any = None,
+        following: FollowingParameters | None = None,
         sensors: Any = None,
         known: FreeSpaceParameters | None = None,
         tick_s: float = TICK_S,
@@ -188,6 +185,7 @@ class GuardedController(LeafSystem):
         super().__init__()
         robot, known = robot or RobotParameters(), known or FreeSpaceParameters()
         own = GuardedParameters() if repulsion is None else repulsion.guarded
+        following = following or FollowingParameters()
         self._tick_s = tick_s
         self.set_name("guarded_controller")
         sensors = sensors or UltrasonicParameters()
@@ -198,15 +196,16 @@ class GuardedController(LeafSystem):
             make_way(known.cells),
             make_free_space(1, known.cell_m, 1, 2),
             own,
+            following,
             (attraction or AttractionParameters()).follow_distance_m,
             robot.control_point_m,
             make_hazards(sensors.count),
-            _hazard_sensors(sensors, robot, known, own, tick_s),
+            hazard_sensors(sensors, robot, known, own, tick_s),
             EvasionNumbers(
-                own.turn_gain,
-                own.turn_rate_rad_s,
+                following.turn_gain,
+                following.turn_rate_rad_s,
                 (0.5 * robot.length_m, 0.5 * robot.width_m),
-                own.cruise_speed_m_s,
+                following.cruise_speed_m_s,
                 own.risk_gain,
                 own.watch_gain,
             ),
@@ -237,7 +236,9 @@ class GuardedController(LeafSystem):
         sources = {port.ticket() for port in ports}
         sources |= {self.time_ticket(), self.xa_ticket()}
         self._decided: Any = declare_cache(self, "decided", self._decide, sources)
-        for place, (name, size) in enumerate((("twist_B", 2), ("plan", 4))):
+        for place, (name, size) in enumerate(
+            (("twist_B", 2), ("plan", 4), ("gives_up", 1))
+        ):
 
             def calc(context: Any, output: Any, place: int = place) -> None:
                 output.SetFromVector(self._decided.Eval(context)[1][place])
@@ -265,7 +266,7 @@ class GuardedController(LeafSystem):
         numbers = self._numbers._replace(
             memory=state[0], way=state[1], hazards=state[2]
         )
-        outputs = np.zeros(2), np.zeros(4)
+        outputs = np.zeros(2), np.zeros(4), np.zeros(1)
         # What was decided at this tick is not decided twice.
         if state[0][0, AT_TICK] != tick:
             memory, way, hazards = _copied(numbers)
@@ -285,19 +286,32 @@ class GuardedController(LeafSystem):
 @register_jitable
 def _tell(memory, outputs):  # type: ignore[no-untyped-def]
     """Outputs from the memory."""
-    twist, plan = outputs
+    twist, plan, gives_up = outputs
     twist[0], twist[1] = memory[0, SPEED], memory[0, TURN]
     plan[0], plan[1] = memory[0, MODE], memory[0, CARROT_X]
     plan[2], plan[3] = memory[0, CARROT_Y], memory[0, WAY_LEFT]
+    gives_up[0] = 1.0 if memory[0, MODE] == GIVING_UP else 0.0
 
 
-def _hazard_sensors(
+def hazard_sensors(
     sensors: UltrasonicParameters,
     robot: RobotParameters,
     known: FreeSpaceParameters,
     own: GuardedParameters,
     tick_s: float,
 ) -> HazardSensors:
+    """What the tracks of what moves need to know.
+
+    Args:
+        sensors: The range sensors.
+        robot: Place of P.
+        known: Of the map, for the margin of ranges.
+        own: Parameters of the law.
+        tick_s: Period of the controller, s.
+
+    Returns:
+        Places, directions and errors of the sensors, and the bodies' top speed.
+    """
     axes, places, half_angle = sensors.beams
     return HazardSensors(
         np.add(places, [robot.control_point_m, 0.0]),
@@ -330,4 +344,5 @@ GUARDED = Law(
     gains=GuardedParameters,
     controller=GuardedController,
     plans=True,
+    guarded=True,
 )

@@ -73,8 +73,11 @@ class Law:
     tuning: Tuning | None = None
     """None for a law without gains to choose."""
     plans: bool = False
-    """Whether its block plans with a map: it takes ``known``, too, and its robot is
-    always guarded."""
+    """Whether its block decides on a motion in the place of a force: it may ask for
+    ``following``, ``known``, the map's parameters, ``bodies``, how many there are, and
+    ``seed``, too, and has no linear model."""
+    guarded: bool = False
+    """Whether its robot is always guarded."""
     colour: str | None = None
     """In pictures; none: the next one of the palette."""
 

@@ -9,6 +9,7 @@ import numpy as np
 from numba import njit
 
 from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
+from systems.planning.turning import wrapped
 
 __all__ = ["EvasionNumbers", "choose_motion", "find_threats", "risk_of", "watch_of"]
 
@@ -56,11 +57,6 @@ class EvasionNumbers(NamedTuple):
 
 
 @njit(cache=True)
-def _wrapped(angle: float) -> float:  # pragma: no cover  (compiled)
-    return (angle + math.pi) % math.tau - math.pi
-
-
-@njit(cache=True)
 def _between(
     value: float, none: float, full: float
 ) -> float:  # pragma: no cover  (compiled)
@@ -94,7 +90,7 @@ def risk_of(
     x, y, theta = pose[0], pose[1], pose[2]
     worst = np.zeros(count)
     for k in range(steps):
-        omega = numbers.turn_gain * _wrapped(heading - theta)
+        omega = numbers.turn_gain * wrapped(heading - theta)
         omega = min(max(omega, -numbers.turn_rate_rad_s), numbers.turn_rate_rad_s)
         theta += omega * _STEP_S
         c, s = math.cos(theta), math.sin(theta)
@@ -179,7 +175,7 @@ def watch_of(
     """
     total = 0.0
     for n in range(count):
-        off = abs(_wrapped(threats[n, 0] - heading)) - _IN_VIEW_RAD
+        off = abs(wrapped(threats[n, 0] - heading)) - _IN_VIEW_RAD
         total += threats[n, 1] * min(max(off, 0.0), _OUT_OF_VIEW_RAD)
     return total
 
@@ -222,13 +218,13 @@ def choose_motion(
     headings = np.empty(len(_ASIDE) + 4)
     for k in range(len(_ASIDE)):
         headings[k] = wanted[1] + _ASIDE[k]
-    near = min(max(_wrapped(gaze - wanted[1]), -_GAZE_RAD), _GAZE_RAD)
+    near = min(max(wrapped(gaze - wanted[1]), -_GAZE_RAD), _GAZE_RAD)
     headings[-4], headings[-3] = pose[2], wanted[2]
     headings[-2], headings[-1] = gaze, wanted[1] + near
     best, chosen = np.inf, (wanted[0], wanted[2])
     for heading in headings:
-        weaving = abs(_wrapped(heading - wanted[2]))
-        off = min(abs(_wrapped(heading - wanted[1])), weaving)
+        weaving = abs(wrapped(heading - wanted[2]))
+        off = min(abs(wrapped(heading - wanted[1])), weaving)
         base = _TURN_PRICE * weaving
         base += numbers.watch_gain * watch_of(threats, count, heading)
         for k in range(len(_SPEEDS) + 1):
@@ -238,7 +234,7 @@ def choose_motion(
             )
             if speed > numbers.top_speed_m_s or price >= best:
                 continue
-            ahead = abs(_wrapped(heading - pose[2])) < _HELD_RAD
+            ahead = abs(wrapped(heading - pose[2])) < _HELD_RAD
             if ahead and speed * held > 0.0:
                 continue
             risk = risk_of(bodies, count, pose, speed, heading, numbers)

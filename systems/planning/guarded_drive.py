@@ -1,4 +1,4 @@
-"""How the guarded law drives and looks: one tick of its four modes."""
+"""How the guarded law drives and looks: one tick of its five modes."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from systems.planning.carrot import find_carrot
 from systems.planning.evasion import EvasionNumbers, choose_motion
+from systems.planning.following import wanted_speed
 from systems.planning.hazards import (
     MOVED_S,
     Hazards,
@@ -20,14 +21,23 @@ from systems.planning.hazards import (
     pick_hazards,
     track_hazards,
 )
-from systems.planning.way import NEAR, TIGHT, Way, find_way, mark_blocked
+from systems.planning.turning import wrapped
+from systems.planning.way import NEAR, OCCUPIED, TIGHT, Way, find_way, mark_blocked
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
 
-__all__ = ["BACKING", "DRIVING", "LOOKING", "WAITING", "DriveNumbers", "drive_guarded"]
+__all__ = [
+    "BACKING",
+    "DRIVING",
+    "GIVING_UP",
+    "LOOKING",
+    "WAITING",
+    "DriveNumbers",
+    "drive_guarded",
+]
 
 #: What the robot does.
-WAITING, DRIVING, LOOKING, BACKING = range(4)
+WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
 #: Places in ``DriveNumbers.memory``; times in s, places in m, headings in rad.
 (
     AT_TICK,
@@ -51,8 +61,9 @@ WAITING, DRIVING, LOOKING, BACKING = range(4)
     BACKED_S,
     HELD,
     HELD_S,
+    PASSABLE_S,
     MEMORY,
-) = range(22)
+) = range(23)
 
 #: Half of the first look around, before the robot has moved, and of one at what blocks
 #: it, rad.
@@ -93,6 +104,8 @@ class DriveNumbers(NamedTuple):
     space: FreeSpace
     own: Any
     """``GuardedParameters``."""
+    following: Any
+    """``FollowingParameters``."""
     follow_distance_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
@@ -103,11 +116,6 @@ class DriveNumbers(NamedTuple):
     radius_m: float
     """Of the disc for which ways are sought, m."""
     tick_s: float
-
-
-@njit(cache=True)
-def _wrapped(angle: float) -> float:  # pragma: no cover  (compiled)
-    return (angle + math.pi) % math.tau - math.pi
 
 
 @njit(cache=True)
@@ -130,7 +138,7 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
     pose, report = inputs[3], inputs[4]
     m, own, time = numbers.memory, numbers.own, tick * numbers.tick_s
     if m[0, AT_TICK] < 0.0:
-        m[0, PLANNED_S], m[0, BLOCKED_S] = -np.inf, time
+        m[0, PLANNED_S], m[0, BLOCKED_S], m[0, PASSABLE_S] = -np.inf, time, time
         _stays(m, pose, time)
     m[0, AT_TICK] = tick
     _remember_held(m, report, time)
@@ -140,7 +148,7 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
     followed = x, y, own.source_radius_m
     _track(time, pose, (inputs[5], inputs[6], inputs[7]), followed, numbers)
     if valid < 0.5:
-        m[0, MODE], m[0, BLOCKED_S] = WAITING, time
+        m[0, MODE], m[0, BLOCKED_S], m[0, PASSABLE_S] = WAITING, time, time
         _stays(m, pose, time)
         _evade(time, pose, 0.0, 0.0, numbers)
         return
@@ -149,7 +157,12 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
         _stays(m, pose, time)
     if report[0] < TURNED or there or wanted <= 0.0:
         m[0, BLOCKED_S] = time
-    if m[0, MODE] == WAITING:
+    if time - m[0, PASSABLE_S] > own.search_way_s and not there:
+        m[0, MODE], m[0, BLOCKED_S] = GIVING_UP, time
+        _stays(m, pose, time)
+        _evade(time, pose, 0.0, 0.0, numbers)
+        return
+    if m[0, MODE] == WAITING or m[0, MODE] == GIVING_UP:
         m[0, MODE] = DRIVING
     if m[0, MODE] == DRIVING:
         _begin_look(time, pose, pose[2] + error, numbers)
@@ -161,7 +174,7 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
         mark_blocked(numbers.way, place, time + own.mark_s)
         m[0, MODE], m[0, BACKED_S], m[0, PLANNED_S] = BACKING, time, -np.inf
     if m[0, MODE] == BACKING:
-        m[0, SPEED] = -own.back_speed_m_s
+        m[0, SPEED] = -numbers.following.back_speed_m_s
         if time - m[0, BACKED_S] > _BACKING_S:
             m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
             _stays(m, pose, time)
@@ -190,11 +203,11 @@ def _track(time, pose, readings, followed, numbers):  # type: ignore[no-untyped-
 @register_jitable
 def _evade(time, pose, wanted, error, numbers):  # type: ignore[no-untyped-def]
     """Goes otherwise than wanted where a body may come near."""
-    m, own, hazards = numbers.memory, numbers.own, numbers.hazards
+    m, hazards = numbers.memory, numbers.hazards
     count = pick_hazards(hazards, time, pose, _NEAR_M)
     if count == 0:
         return
-    weaving = pose[2] + m[0, TURN] / own.turn_gain
+    weaving = pose[2] + m[0, TURN] / numbers.following.turn_gain
     way = wanted, pose[2] + error, weaving
     speed, heading, watched = choose_motion(
         hazards.picked, count, pose, way, m[0, HELD], numbers.evasion
@@ -204,8 +217,8 @@ def _evade(time, pose, wanted, error, numbers):  # type: ignore[no-untyped-def]
     if m[0, MODE] == LOOKING and m[0, HAS_LOOKED] > 0.5:
         m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
     m[0, SPEED] = speed
-    turn = own.turn_gain * _wrapped(heading - pose[2])
-    m[0, TURN] = _within(turn, own.turn_rate_rad_s)
+    turn = numbers.following.turn_gain * wrapped(heading - pose[2])
+    m[0, TURN] = _within(turn, numbers.following.turn_rate_rad_s)
 
 
 @njit(cache=True)
@@ -227,6 +240,8 @@ def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-unt
         radius = numbers.radius_m
         find_way(way, numbers.space, (x, y), goal, time, radius, clear[:count])
         m[0, PLANNED_S] = time
+        if way.facts[0, 2] < OCCUPIED:
+            m[0, PASSABLE_S] = time
     follow, offset = numbers.follow_distance_m, numbers.control_point_m
     dx = target[0] - x - offset * math.cos(theta)
     dy = target[1] - y - offset * math.sin(theta)
@@ -241,11 +256,10 @@ def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-unt
             carrot = target[0], target[1]
     bearing = math.atan2(carrot[1] - y, carrot[0] - x)
     along = velocity[0] * math.cos(bearing) + velocity[1] * math.sin(bearing)
-    wanted = own.approach_gain * (left - follow) + own.source_share * along
-    wanted = min(max(wanted, -own.back_speed_m_s), own.cruise_speed_m_s)
+    wanted = wanted_speed(left - follow, along, numbers.following)
     rests = math.hypot(velocity[0], velocity[1]) < _RESTS_M_S
     m[0, CARROT_X], m[0, CARROT_Y], m[0, WAY_LEFT] = carrot[0], carrot[1], left
-    return wanted, _wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
+    return wanted, wrapped(bearing - theta), rests and abs(left - follow) < _THERE_M
 
 
 @register_jitable
@@ -262,7 +276,7 @@ def _begin_look(time, pose, ahead, numbers):  # type: ignore[no-untyped-def]
         px, py = x + offset * math.cos(pose[2]), y + offset * math.sin(pose[2])
         ahead = math.atan2(block[1] - py, block[0] - px)
     left, right = ahead + half, ahead - half
-    if abs(_wrapped(left - pose[2])) > abs(_wrapped(right - pose[2])):
+    if abs(wrapped(left - pose[2])) > abs(wrapped(right - pose[2])):
         left, right = right, left
     m[0, FIRST_LOOK], m[0, SECOND_LOOK] = left, right
     m[0, LOOKS_DONE], m[0, MODE] = 0.0, LOOKING
@@ -274,8 +288,8 @@ def _look(time, pose, report, numbers):  # type: ignore[no-untyped-def]
     m, own = numbers.memory, numbers.own
     first = m[0, HAS_LOOKED] < 0.5
     heading = m[0, FIRST_LOOK] if m[0, LOOKS_DONE] < 0.5 else m[0, SECOND_LOOK]
-    to = _wrapped(heading - pose[2])
-    m[0, TURN] = _within(_LOOK_GAIN * to, own.turn_rate_rad_s)
+    to = wrapped(heading - pose[2])
+    m[0, TURN] = _within(_LOOK_GAIN * to, numbers.following.turn_rate_rad_s)
     if abs(to) < _LOOKED_RAD:
         m[0, LOOKS_DONE] += 1.0
     seen = not first and report[1] > _ROOM_M
@@ -309,7 +323,7 @@ def _drive(time, velocity, wanted, error, there, numbers):  # type: ignore[no-un
     """Towards the carrot, weaving, so that the sensors sweep what lies beside."""
     m, own = numbers.memory, numbers.own
     if there:
-        m[0, SPEED], m[0, TURN] = wanted, 0.5 * own.turn_gain * error
+        m[0, SPEED], m[0, TURN] = wanted, 0.5 * numbers.following.turn_gain * error
         return
     weave = 0.0
     if wanted > 0.0:
@@ -323,8 +337,8 @@ def _drive(time, velocity, wanted, error, there, numbers):  # type: ignore[no-un
             width = own.search_rad * (1.0 - own.search_less * part)
             period = own.search_period_s
         weave = width * math.sin(math.tau * time / period)
-    turn = own.turn_gain * _wrapped(error + weave)
-    m[0, TURN] = _within(turn, own.turn_rate_rad_s)
+    turn = numbers.following.turn_gain * wrapped(error + weave)
+    m[0, TURN] = _within(turn, numbers.following.turn_rate_rad_s)
     m[0, SPEED] = wanted
     if wanted > 0.0:
         m[0, SPEED] *= math.cos(error) if abs(error) < _TURN_FIRST_RAD else 0.0

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from systems.planning.turning import wrapped
 from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
 
 __all__ = [
@@ -257,11 +258,6 @@ def _forget(
 
 
 @njit(cache=True)
-def _wrapped(angle: float) -> float:  # pragma: no cover  (compiled)
-    return (angle + math.pi) % math.tau - math.pi
-
-
-@njit(cache=True)
 def _chance(memory: Any) -> float:  # pragma: no cover  (compiled)
     """The next of a fixed sequence of numbers from 0 to 1 (Park and Miller, 1988)."""
     memory[0, RANDOM] = (48271 * int(memory[0, RANDOM])) % 2147483647
@@ -300,7 +296,7 @@ def _seen_from(
 ) -> tuple[float, float]:  # pragma: no cover  (compiled)
     """Distance of a place, m, and angle off the sensor's axis, rad."""
     dx, dy = x - look[SX], y - look[SY]
-    return math.hypot(dx, dy), abs(_wrapped(math.atan2(dy, dx) - look[AXIS]))
+    return math.hypot(dx, dy), abs(wrapped(math.atan2(dy, dx) - look[AXIS]))
 
 
 @njit(cache=True)

@@ -103,7 +103,7 @@ def test_own_law_is_built_into_the_diagram(own_laws):
     [
         (
             "activ",
-            "use none, conventional, active, conventional2017, active2017, guarded, p",
+            "use none, conventional, active, conventional2017, active2017, guarded, s",
         ),
         (":inverse", "is not known"),
         ("own_laws_for_test:", "is not known"),
@@ -139,3 +139,38 @@ def test_laws_remember_a_round_of_the_sensors(sensing, firing, rounds):
         )
         context = make_controller(scenario).CreateDefaultContext()
         assert context.get_discrete_state(0).size() == 9 * rounds
+
+
+@pytest.mark.parametrize("law", ["stop_when_near", "dwa", "vfh_plus", "mppi"])
+def test_laws_that_read_ranges_need_them(law):
+    scenario = Scenario(law=law, hearing="ideal", obstacle_sensing="ideal")
+    with pytest.raises(InputError, match="set it to ultrasonic") as error:
+        build_sound_follower(scenario)
+    assert error.value.field == "obstacle_sensing"
+
+
+OWN_BLOCKS = """
+from systems import ActiveImpedanceController, StopWhenNearController
+
+
+class Anything(ActiveImpedanceController):
+    def __init__(self, **options):
+        super().__init__(**options)
+
+
+class Asking(StopWhenNearController):
+    asked = {}
+
+    def __init__(self, following, known, bodies, seed, tick_s):
+        Asking.asked = {"bodies": bodies, "seed": seed, "cell": known.cell_m}
+        super().__init__(following=following, tick_s=tick_s)
+"""
+
+
+def test_own_blocks_get_what_they_name(tmp_path):
+    """One that takes any keyword gets what laws of ours take, and no more."""
+    file = tmp_path / "own_blocks.py"
+    file.write_text(OWN_BLOCKS, encoding="utf-8")
+    make_controller(Scenario(law=f"{file}:Anything"))
+    block = make_controller(Scenario(law=f"{file}:Asking"), bodies=3, seed=7)
+    assert type(block).asked == {"bodies": 3, "seed": 7, "cell": 0.05}

@@ -63,6 +63,34 @@ def test_compiled_and_drake_agree(name, cause):
         np.testing.assert_allclose(compiled.columns[column], values, rtol=0, atol=atol)
 
 
+#: Places and sizes of four walls around a floor of 4 m x 4 m.
+WALLS = [
+    {"name": name, "waypoints_m": [place], "size_m": size}
+    for name, place, size in (
+        ("front", [2.0, 0.0], [0.1, 4.0]),
+        ("back", [-2.0, 0.0], [0.1, 4.0]),
+        ("left", [0.0, 2.0], [4.1, 0.1]),
+        ("right", [0.0, -2.0], [4.1, 0.1]),
+    )
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("door", [False, True])
+def test_where_there_is_no_way_it_says_so(door):
+    """In a closed room it looks round and gives up; where a side is open it goes."""
+    walls = [wall for wall in WALLS if not (door and wall["name"] == "left")]
+    scenario = load_scenario(
+        "two_static_obstacles",
+        ["hearing=ideal", "law=guarded", "duration_s=80", f"obstacles={walls}"],
+    )
+    run = simulate(scenario, engine="compiled")
+    assert run.cause == ("reached" if door else "no way found")
+    gives_up = run.columns["plan_mode"] == 4.0
+    assert gives_up[-1] != door
+    assert run.time[gives_up].min(initial=np.inf) > 20.0
+
+
 def test_the_law_brings_its_guard():
     scenario = load_scenario("default", ["law=guarded"])
     assert scenario.guard is None

@@ -18,11 +18,12 @@ pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope="module")
-def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    out = tmp_path_factory.mktemp("stability") / "out"
-    words = ["stability", "obstacle_free", "--law", "conventional", "--json"]
-    assert phonotaxis.main([*words, "--out", str(out)]) == 0
-    return out
+def report(made_once) -> Path:
+    def fill(folder: Path) -> None:
+        words = ["stability", "obstacle_free", "--law", "conventional", "--json"]
+        assert phonotaxis.main([*words, "--out", str(folder / "out")]) == 0
+
+    return made_once("stability_of_conventional", fill) / "out"
 
 
 @pytest.fixture(scope="module")

@@ -27,12 +27,13 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "WheelOdometry": {},
     "WheelSpeedCommand": {},
 }
-# What plans remembers more than numbers: its update is none of a discrete state.
+# What plans remembers more than numbers: its update is none of a discrete state; what
+# stops when something is near remembers nothing.
 LAWS = {
     name
     for name in systems.__all__
     if name.endswith("Controller") and inspect.isclass(getattr(systems, name))
-} - {"GuardedController"}
+} - {"GuardedController", "StopWhenNearController"}
 
 
 @pytest.mark.parametrize("name", sorted(SAMPLED.keys() | LAWS))

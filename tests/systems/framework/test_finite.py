@@ -49,6 +49,7 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
     ),
     "IdealObstacleSensor": ({"obstacle_count": 2},),
     "MicArray": ({}, {"others": ["radio"]}),
+    "ReciprocalAvoidanceController": ({"bodies": 2},),
     "UltrasonicArray": (
         {"obstacle_count": 2},
         {"obstacle_count": 2, "parameters": UltrasonicParameters(firing="sequential")},

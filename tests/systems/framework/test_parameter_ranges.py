@@ -23,6 +23,7 @@ KINDS = {
     "_microphones_m": (-1e3, 1e3),
     "_waypoints_m": (-1e3, 1e3),
     "_corner_m": (-1e3, 1e3),
+    "_clearance_m": (0.0, 1e3),
     "_start_s": (0.0, 86_400.0),
     "_start_time_s": (0.0, 86_400.0),
     "_n_s_m": (1e-9, 1e6),
@@ -38,6 +39,9 @@ KINDS = {
     "_v": (1e-9, 1e6),
     "_m": (1e-9, 1e3),
     "_s": (1e-9, 86_400.0),
+    # Weights of a sum, which may leave a part out, and what is held against it.
+    "_gain": (0.0, 1e6),
+    "_threshold": (0.0, 1e6),
 }
 ABOVE_0, BELOW_1 = math.nextafter(0.0, 1.0), math.nextafter(1.0, 0.0)
 #: Fields that are narrower or wider than their kind, or have no unit.
@@ -98,18 +102,21 @@ FIELDS = {
     "UltrasonicParameters.period_s": (1e-3, 1.0),
     "MicArrayParameters.sample_rate_hz": (1e3, 1e5),
     # A robot that never backs off, does not weave, or follows by distance alone.
-    "GuardedParameters.back_speed_m_s": (0.0, 100.0),
-    "GuardedParameters.approach_gain": (1e-9, 1e6),
-    "GuardedParameters.turn_gain": (1e-9, 1e6),
-    "GuardedParameters.turn_rate_rad_s": (ABOVE_0, 20.0),
-    "GuardedParameters.source_share": (0.0, 1.0),
+    "FollowingParameters.back_speed_m_s": (0.0, 100.0),
+    "FollowingParameters.approach_gain": (1e-9, 1e6),
+    "FollowingParameters.turn_gain": (1e-9, 1e6),
+    "FollowingParameters.turn_rate_rad_s": (ABOVE_0, 20.0),
+    "FollowingParameters.source_share": (0.0, 1.0),
     "GuardedParameters.weave_rad": (0.0, 1.5),
     "GuardedParameters.search_rad": (0.0, 1.5),
     "GuardedParameters.search_less": (0.0, 1.0),
-    "GuardedParameters.risk_gain": (0.0, 1e6),
-    "GuardedParameters.watch_gain": (0.0, 1e6),
-    "GuardedParameters.clearance_m": (0.0, 1e3),
-    "GuardedParameters.source_clearance_m": (0.0, 1e3),
+    "DynamicWindowParameters.turn_acceleration_rad_s2": (1e-9, 1e6),
+    "VectorFieldHistogramParameters.slow_density": (1e-9, 1e6),
+    "PathIntegralParameters.samples": (10, 5_000),
+    "PathIntegralParameters.steps": (2, 100),
+    "PathIntegralParameters.turn_spread_rad_s": (1e-9, 1e6),
+    "PathIntegralParameters.temperature": (1e-9, 1e6),
+    "PathIntegralParameters.collision_cost": (0.0, 1e6),
     # The room's response is worked out anew at most once a frame.
     "RoomParameters.update_period_s": (1e-3, 60.0),
     "RoomParameters.reverberation_time_s": (1e-3, 20.0),

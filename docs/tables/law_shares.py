@@ -1,0 +1,68 @@
+"""How often each law arrived, collided and followed, as a table.
+
+``python -m docs.tables.law_shares results/NUMBER`` prints, of a directory of
+``phonotaxis compare``, the tables of docs/baselines.md and docs/safety.md.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import pandas as pd
+
+from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.markdown import markdown_table
+from analysis.sweeps.store import load_results
+from diagrams.stop_rules import SUCCESSFUL
+
+__all__ = ["shares_table"]
+
+_HEAD = (
+    "scenario",
+    "law",
+    "layouts",
+    "success",
+    "collisions",
+    "robot's fault",
+    "time to the goal",
+    "in the band",
+)
+
+
+def shares_table(results: Path) -> str:
+    """Shares of all layouts in Markdown, with 95 % intervals.
+
+    Args:
+        results: Directory of a comparison, a folder a scenario in it.
+
+    Returns:
+        A row a scenario and law. The time is the median of the first entry into the
+        goal, of runs that succeed; in the band is the mean share of the time, of all
+        runs, in which the robot followed.
+    """
+    rows = []
+    for folder in sorted(path.parent for path in results.glob("*/runs.parquet")):
+        table = load_results(folder)
+        for law, runs in table.groupby("law", sort=False, observed=True):
+            rows.append([folder.name, str(law), *_row(runs)])
+    return markdown_table(list(_HEAD), rows)
+
+
+def _row(runs: pd.DataFrame) -> list[str]:
+    count, cause = len(runs), runs["cause"].astype("object")
+    good, hits = cause.isin(SUCCESSFUL), cause == "collision"
+    by_robot = hits & (runs["collision_fault"].astype("object") == "robot")
+    times = runs.loc[good & (cause == "reached"), "time_to_goal_s"]
+    shares = (_share(int(each.sum()), count) for each in (good, hits, by_robot))
+    time = "" if times.empty else f"{times.median():.1f} s"
+    return [str(count), *shares, time, f"{runs['following_fraction'].mean():.2f}"]
+
+
+def _share(part: int, count: int) -> str:
+    low, high = (100.0 * each for each in wilson_interval(part, count))
+    return f"{100.0 * part / count:.1f} % ({low:.1f}, {high:.1f})"
+
+
+if __name__ == "__main__":
+    sys.stdout.write(shares_table(Path(sys.argv[1])) + "\n")

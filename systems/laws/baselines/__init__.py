@@ -1,0 +1,1 @@
+"""Laws that people would try first, after their sources, to compare with."""

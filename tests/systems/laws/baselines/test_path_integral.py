@@ -1,0 +1,109 @@
+"""MPPI: distances against SciPy's, and means against NumPy's."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_edt
+
+from systems.base.robot import RobotParameters
+from systems.laws.baselines.path_integral import (
+    PathIntegralParameters,
+    _roll_numbers,
+    distance_field,
+    roll_out,
+)
+
+CELL_M = 0.05
+START = 0.0, 0.0, 0.0
+
+
+def test_distances_are_at_most_a_twelfth_too_long():
+    random = np.random.default_rng(1)
+    places = np.column_stack([random.uniform(-2.0, 2.0, (30, 2)), np.ones(30)])
+    field = distance_field(places, 0.0, 0.0, 2.0, CELL_M)
+    exact = distance_transform_edt(field > 0.0) * CELL_M
+    assert len(field) == 81
+    assert (field >= exact - 1e-9).all()
+    assert (field <= 1.083 * exact + 1e-9).all()
+
+
+def test_places_are_where_they_are():
+    field = distance_field(np.array([[3.5, -1.0, 1.0]]), 3.0, -1.0, 2.0, CELL_M)
+    assert np.argwhere(field == 0.0).tolist() == [[50, 40]]
+    assert (distance_field(np.empty((0, 3)), 0.0, 0.0, 1.0, CELL_M) > 1e5).all()
+
+
+def rolled(own, noise, goal, *, field=None, rounds=1):
+    """The plan after some rounds, each from the plan of the last."""
+    controls = np.zeros((own.steps, 2))
+    numbers = _roll_numbers(own, RobotParameters(), None)
+    if field is None:
+        field = distance_field(np.empty((0, 3)), 0.0, 0.0, 2.5, CELL_M)
+    for k in range(rounds):
+        first = k * own.samples
+        roll_out(controls, noise, first, START, goal, field, CELL_M, numbers)
+    return controls
+
+
+GAINS = {"control_gain": 0.0, "angle_gain": 0.0, "obstacle_gain": 0.0}
+
+
+def test_weights_are_those_of_the_costs():
+    """Straight ahead the cost is that of the distance: by hand for each sample."""
+    own = PathIntegralParameters(samples=10, steps=5, forward_gain=0.0, **GAINS)
+    random = np.random.default_rng(2)
+    noise = np.zeros((10, 5, 2))
+    noise[:, :, 0] = random.uniform(0.0, 3.0, (10, 1))
+    goal = (1.0, 0.0, 0.0, 0.0)
+    found = rolled(own, noise, goal)
+    speeds = np.minimum(own.speed_spread_m_s * noise[:, 0, 0], 0.62)
+    times = own.step_s * np.arange(1, 6)
+    ahead = RobotParameters().control_point_m
+    costs = own.goal_gain * np.mean(1.0 - ahead - np.outer(speeds, times), axis=1)
+    weights = np.exp(-costs / own.temperature)
+    expected = weights @ speeds / weights.sum()
+    np.testing.assert_allclose(found[:, 0], expected, rtol=1e-12)
+    np.testing.assert_allclose(found[:, 1], 0.0)
+
+
+def test_a_cold_choice_is_the_best_sample():
+    own = PathIntegralParameters(samples=10, steps=5, temperature=1e-6, **GAINS)
+    noise = np.zeros((10, 5, 2))
+    noise[:, :, 0] = np.linspace(-0.5, 2.0, 10)[:, None]
+    found = rolled(own, noise, (9.0, 0.0, 0.0, 0.0))
+    np.testing.assert_allclose(found[:, 0], 0.2 * 2.0, rtol=1e-9)
+
+
+def test_it_goes_to_where_the_goal_will_be():
+    """A goal that moves aside: the plan turns after it."""
+    own = PathIntegralParameters()
+    noise = np.random.default_rng(3).standard_normal((4 * own.samples, own.steps, 2))
+    left = rolled(own, noise, (1.0, 0.0, 0.0, 0.4))
+    right = rolled(own, noise, (1.0, 0.0, 0.0, -0.4))
+    assert left[:8, 1].mean() > 0.2
+    assert right[:8, 1].mean() < -0.2
+
+
+def test_it_does_not_drive_into_a_wall():
+    own = PathIntegralParameters(samples=400, temperature=0.02)
+    noise = np.random.default_rng(4).standard_normal((4_000, own.steps, 2))
+    wall = np.array([(0.6, 0.05 * k, 1.0) for k in range(-60, 61)])
+    field = distance_field(wall, 0.0, 0.0, 2.5, CELL_M)
+    goal = 2.0, 0.0, 0.0, 0.0
+    free = rolled(own, noise, goal, rounds=10)
+    stopped = rolled(own, noise, goal, field=field, rounds=10)
+    assert free[:, 0].sum() * own.step_s > 0.6
+    # The body reaches 0.175 m ahead, and is kept off by the discs' rounding.
+    assert stopped[:, 0].sum() * own.step_s < 0.6 - 0.175
+
+
+@pytest.mark.parametrize("width", [0.3, 0.82, 1.4])
+def test_discs_cover_the_body(width):
+    robot = RobotParameters(width_m=width)
+    own = PathIntegralParameters(clearance_m=0.0)
+    aside, radius = _roll_numbers(own, robot, None).discs
+    x, y = np.meshgrid(np.linspace(-0.175, 0.175, 9), np.linspace(-0.5, 0.5, 41))
+    y = y * width
+    near = [np.hypot(x, y - aside * k) <= radius + 1e-9 for k in (-1, 0, 1)]
+    assert np.logical_or.reduce(near).all()
