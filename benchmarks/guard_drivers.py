@@ -27,6 +27,7 @@ __all__ = [
     "contact_speeds",
     "draw_crossing",
     "draw_trial",
+    "drive_at_a_wall",
     "least_clearances",
     "run_trial",
 ]
@@ -409,6 +410,26 @@ def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
         body["waypoints_m"] = [tuple(begin.tolist()), tuple(end.tolist())]
         body["speed_m_s"] = speed
     return trial
+
+
+def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
+    """Drives at a wall straight ahead.
+
+    Args:
+        speed: That is commanded, m/s.
+        body_speed: Up to which the robot is guarded against bodies, m/s.
+
+    Returns:
+        The run, and where the wall's face is, x in m.
+    """
+    names, rows = ("wall", "straight", "no noise"), [[1e3, _TWIST, speed, 0.0, 0, 0]]
+    wall_m = 2.9
+    boxes = [_box(wall_m + 0.05, 0.0, 0.0, 0.1, 3.0)]
+    trial = make_trial(names, boxes, rows, 0.0, (8.0, 0.0), 1)
+    _NEXT[0] = trial.table
+    changes = {"guard": {"obstacle_speed_m_s": body_speed}, "duration_s": 20.0}
+    fields = _merged(trial.fields, changes)
+    return simulate(Scenario.model_validate(fields), engine="compiled"), wall_m
 
 
 def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float] | None:
