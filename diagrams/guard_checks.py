@@ -15,7 +15,7 @@ from systems.safety.free_space_map import body_radius, sensor_sectors
 from systems.safety.motion_guard import GuardParameters, stopping_way
 from systems.world.geometry import beyond_rectangle
 
-__all__ = ["check_guard", "guard_note"]
+__all__ = ["check_guard", "guard_note", "top_speed"]
 
 #: Instants at which paths are looked at for the speeds along them, s apart.
 _STEP_S = 0.05
@@ -110,7 +110,7 @@ def guard_note(
     guard = robot.own_guard
     if guard is None or not bodies:
         return ""
-    speeds = {each: _top_speed(body, duration_s) for each, body in bodies.items()}
+    speeds = {each: top_speed(body, duration_s) for each, body in bodies.items()}
     bound, fastest = guard.obstacle_speed_m_s, max(speeds, key=speeds.__getitem__)
     if speeds[fastest] <= bound:
         return ""
@@ -121,7 +121,16 @@ def guard_note(
     )
 
 
-def _top_speed(body: Body, duration_s: float) -> float:
+def top_speed(body: Body, duration_s: float) -> float:
+    """Of a body along its path.
+
+    Args:
+        body: Any.
+        duration_s: Of the run, s.
+
+    Returns:
+        m/s, over steps of 50 ms.
+    """
     if not body.path.moves:
         return 0.0
     times = np.arange(0.0, duration_s + _STEP_S, _STEP_S)

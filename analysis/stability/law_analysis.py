@@ -145,7 +145,7 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
             raise InputError(
                 "law",
                 f"{law!r} has no linear model, for it plans and decides; use "
-                f"{', '.join(every)}",
+                f"{', '.join(every)}, with --guard on for what a guard promises",
             )
     scenarios = [
         scenario_from_mapping({**scenario.model_dump(), "law": law})

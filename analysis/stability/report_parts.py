@@ -7,17 +7,22 @@ from analysis.stability.linear_parts import linear_parts
 from analysis.stability.margin_parts import margin_parts
 from analysis.stability.nonlinear_parts import extended_parts, nonlinear_parts
 from analysis.stability.robustness_parts import robustness_parts
+from analysis.stability.safety_parts import safety_parts
 from analysis.stability.sampling_parts import gain_parts, sampling_parts
 from analysis.stability.verdict_parts import verdict_parts
 
 __all__ = ["parts"]
 
 
-def parts(*, full: bool) -> tuple[Part, ...]:
+def parts(*, full: bool, guarded: bool = False) -> tuple[Part, ...]:
     """The parts of a report.
 
     Args:
         full: Also those that take minutes.
+        guarded: Also that of a robot's guard.
+
+    Returns:
+        In the report's order.
     """
     return (
         *linear_parts(full=full),
@@ -27,5 +32,6 @@ def parts(*, full: bool) -> tuple[Part, ...]:
         *robustness_parts(full=full),
         *(extended_parts() if full else ()),
         *gain_parts(),
+        *(safety_parts() if guarded else ()),
         *verdict_parts(),
     )

@@ -1,0 +1,78 @@
+"""Part of the stability report: what the guard promises, and with which margins."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from analysis.reporting.html_page import Cell, number, paragraph, table
+from analysis.safety.guarantees import Guarantees, guarantees
+from analysis.stability.law_analysis import Part
+
+__all__ = ["safety_parts"]
+
+
+def safety_parts() -> tuple[Part, ...]:
+    """The theorem that holds for a guarded robot, and its assumptions."""
+    return (
+        Part(
+            "safety",
+            "Safety of the guard",
+            lambda study: guarantees(study.scenario),
+            _render,
+            document=_document,
+        ),
+    )
+
+
+def _render(data: Guarantees, prefix: str) -> list[str]:
+    rows: list[list[Cell]] = [
+        [
+            each.name,
+            each.text,
+            _finite(each.value),
+            f"{'≥' if each.at_least else '≤'} {number(each.limit)} {each.unit}".strip(),
+            _finite(each.margin),
+            "holds" if each.holds else "broken",
+        ]
+        for each in data.assumptions
+    ]
+    gap = 360.0 - data.seen_angle_deg
+    return [
+        paragraph(f"What the guard promises here: {data.promise}."),
+        paragraph(
+            f"At top speed it needs {number(data.needed_way_m)} m of clear floor ahead "
+            f"of the axle; its sensors can see {number(data.seen_way_m)} m. They see "
+            f"{number(data.seen_angle_deg)} deg of the round, {number(gap)} deg less "
+            "than all."
+        ),
+        table(["assumption", "of", "value", "limit", "margin", ""], rows),
+        paragraph("Theorems, assumptions and their tests: docs/safety.md."),
+    ]
+
+
+def _finite(value: float) -> float | str:
+    return value if math.isfinite(value) else "no limit"
+
+
+def _document(data: Guarantees) -> dict[str, Any]:
+    return {
+        "safety": {
+            "promise": data.promise,
+            "obstacle_speed_m_s": data.obstacle_speed_m_s,
+            "seen_angle_deg": data.seen_angle_deg,
+            "seen_way_m": data.seen_way_m,
+            "needed_way_m": data.needed_way_m,
+            "assumptions": [
+                {
+                    "name": each.name,
+                    "text": each.text,
+                    "value": each.value if math.isfinite(each.value) else None,
+                    "limit": each.limit,
+                    "unit": each.unit,
+                    "holds": each.holds,
+                }
+                for each in data.assumptions
+            ],
+        }
+    }

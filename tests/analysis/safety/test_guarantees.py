@@ -1,0 +1,92 @@
+"""What a guard promises: by hand, and one broken assumption at a time."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from analysis.safety.guarantees import clear_way, guarantees, seen_angle_deg
+from diagrams import load_scenario
+from systems.framework.input_error import InputError
+from systems.ranging.ultrasonic_array import UltrasonicParameters
+
+
+def facts(name="two_static_obstacles", *settings):
+    return guarantees(load_scenario(name, ["guard={}", *settings]))
+
+
+def broken(*settings, name="two_static_obstacles"):
+    return {each.name for each in facts(name, *settings).assumptions if not each.holds}
+
+
+def test_by_default_nothing_that_rests_is_touched():
+    found = facts()
+    assert broken() == set()
+    assert found.promise == "static safety: it touches nothing that rests"
+    assert found.seen_angle_deg == pytest.approx(90.0, abs=0.6)
+
+
+@pytest.mark.parametrize(
+    ("settings", "name"),
+    [
+        (["ultrasonic.dropout_probability=0.1"], "A2"),
+        (["ultrasonic.assumed_sound_speed_m_s=400"], "A2"),
+        (["plant.slip=[0.01, -0.01]"], "A4"),
+        (["plant.friction=0.15"], "A5"),
+        (["ultrasonic.maximum_range_m=0.6"], "view"),
+    ],
+)
+def test_one_broken_assumption_is_named(settings, name):
+    assert broken(*settings) == {name}
+    assert facts("two_static_obstacles", *settings).promise.startswith(
+        f"nothing, for {name}"
+    )
+
+
+def test_bodies_may_be_as_fast_as_is_reckoned_with():
+    """One that drives at 0.3 m/s (its scenario)."""
+    assert broken(name="one_moving_obstacle") == {"A1"}
+    slow, fast = (f"guard.obstacle_speed_m_s={v}" for v in (0.2, 0.6))
+    assert broken(slow, name="one_moving_obstacle") == {"A1"}
+    assert broken(fast, name="one_moving_obstacle") == set()
+    promise = facts("one_moving_obstacle", fast).promise
+    assert "passive orientation safety against bodies of up to 0.6 m/s" in promise
+    ring = facts("one_moving_obstacle", fast, "ultrasonic.preset=ring_12").promise
+    assert "passive safety" in ring
+
+
+def test_a5_is_the_friction_that_the_braking_needs():
+    """1.5/9.81."""
+    limit = {each.name: each for each in facts().assumptions}["A5"].limit
+    assert limit == pytest.approx(0.1529, abs=1e-4)
+
+
+def test_the_clear_way_by_hand():
+    """R 0.446 and 12 mm, v^2/2a, lag and two ticks, margins of ranges, bodies' way."""
+    scenario = load_scenario("two_static_obstacles", ["guard={}"])
+    lag, error = (
+        scenario.plant.motor_lag_s,
+        scenario.free_space.range_error(scenario.ultrasonic),
+    )
+    disc = 0.5 * math.hypot(0.35, 0.82) + 0.012
+    way = 0.6**2 / 3.0 + 0.6 * (lag + 0.05) + error
+    time = 0.6 / 1.5 + 0.075 + 6.0 * lag
+    assert clear_way(scenario, 0.6, 0.5) == pytest.approx(disc + way + 0.5 * time)
+    cells = math.sqrt(2.0) * 0.05 + 0.06
+    assert clear_way(scenario, 0.6, 0.0) == pytest.approx(disc + way + cells)
+
+
+@pytest.mark.parametrize(
+    ("preset", "degrees"),
+    [("three", 90.0), ("six", 180.0), ("ring_12", 360.0), ("lidar", 360.0)],
+)
+def test_what_sensors_see_of_the_round(preset, degrees):
+    """Cones of 30 deg side by side: three, twice three, and rings without a gap."""
+    sensors = UltrasonicParameters.model_validate({"preset": preset})
+    assert seen_angle_deg(sensors, 0.175) == pytest.approx(degrees, abs=0.6)
+
+
+def test_without_a_guard_nothing_is_promised():
+    with pytest.raises(InputError, match="nothing is promised"):
+        guarantees(load_scenario("default"))
