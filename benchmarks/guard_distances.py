@@ -73,7 +73,9 @@ def main() -> None:
     for name in SENSOR_PRESETS:
         sensors = UltrasonicParameters.model_validate({"preset": name})
         share = seen_angle_deg(sensors, Scenario().robot.control_point_m)
-        kind = "passive" if share > 359.0 else "passive orientation"
+        kind = "passive orientation"
+        if share > 359.0:
+            kind += ", all round"
         rows.append([f"`{name}`", f"{share:.0f} deg", "yes", kind])
     names = ["sensors", "see", "static safety", "against what moves"]
     print(markdown_table(names, rows))

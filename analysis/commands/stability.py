@@ -44,7 +44,9 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     place = take(options.out)
     scenario = load_scenario(options.scenario, overrides(options))
     scenarios = chosen_laws(scenario, options.law or [])
-    work = parts(full=options.full, guarded=scenario.own_guard is not None)
+    work = parts(
+        full=options.full, guarded=any(each.own_guard is not None for each in scenarios)
+    )
 
     def run(progress: Progress) -> list[LawAnalysis]:
         analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]

@@ -78,7 +78,7 @@ class Guarantees:
             return "static safety: it touches nothing that rests"
         kind = "passive orientation safety"
         if self.seen_angle_deg > 360.0 - _GAP_DEG:
-            kind = "passive safety, but for the sensors' dead round,"
+            kind += " with a view all round"
         return (
             f"static safety, and {kind} against bodies of up to "
             f"{self.obstacle_speed_m_s:g} m/s"
@@ -106,13 +106,15 @@ def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
     known, tick_s = scenario.free_space, scenario.tick_s
     keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
     error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
+    # A sensor's reading is so old at most, and its rows of cells come by turns.
+    age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
     way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
     if body_speed == 0.0:
         # A cell counts as a whole, and rows of cells are entered by turns.
-        cells = math.sqrt(2.0) * known.cell_m + 4.0 * tick_s * speed
+        cells = math.sqrt(2.0) * known.cell_m + 4.0 * age * speed
         return keep + way + error + cells
     time = speed / guard.braking_m_s2 + 2.0 * tick_s + _LAGS * lag
-    return keep + way + error + body_speed * (tick_s + time)
+    return keep + way + error + body_speed * (age + time)
 
 
 def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
@@ -147,12 +149,15 @@ def guarantees(scenario: Scenario) -> Guarantees:
     Raises:
         InputError: The robot has no guard.
     """
-    guard, sensors, known = scenario.own_guard, scenario.ultrasonic, scenario.free_space
+    guard, sensors = scenario.own_guard, scenario.ultrasonic
     speed = 0.0 if guard is None else guard.obstacle_speed_m_s
     top = scenario.robot.top_speed_m_s
     needed = clear_way(scenario, top, speed)
     ahead = scenario.robot.control_point_m
-    seen = ahead + sensors.maximum_range_m - known.range_error(sensors)
+    axes, places, half_angle = sensors.beams
+    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
+    far = ahead + np.max(np.reshape(places, (-1, 2))[forward, 0], initial=-np.inf)
+    seen = float(far) + sensors.maximum_range_m
     return Guarantees(
         speed,
         seen_angle_deg(sensors, ahead),
@@ -221,7 +226,9 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
     """A4 and A5: wheels as believed, and tyres that hold."""
     guard, plant = scenario.own_guard, scenario.plant
     assert guard is not None
-    slip, grip = max(map(abs, plant.slip)), plant.friction
+    slip = max(map(abs, plant.slip))
+    grip = math.inf if plant.friction is None else plant.friction
+    hardest = scenario.robot.top_speed_m_s / max(plant.motor_lag_s, scenario.tick_s)
     return (
         Assumption(
             "A4",
@@ -233,8 +240,16 @@ def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
         Assumption(
             "A5",
             "friction, for the certified braking",
-            math.inf if grip is None else grip,
+            grip,
             guard.braking_m_s2 / GRAVITY_M_S2,
+            "",
+            at_least=True,
+        ),
+        Assumption(
+            "A5",
+            "friction, for a stop as hard as the lag allows",
+            grip,
+            hardest / GRAVITY_M_S2,
             "",
             at_least=True,
         ),

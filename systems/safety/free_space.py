@@ -31,7 +31,7 @@ NEVER = -1.0
 #: which share.
 _SLACK = 20
 _SLACK_SHARE = 8
-#: At a tick every so many-th row of cells is entered: the rest can wait.
+#: With a reading every so many-th row of cells is entered: the rest can wait.
 _ROWS = 4
 #: Hits of a cell at this distance count full, farther ones less: arcs are longer, m.
 _FULL_HIT_M = 0.6
@@ -285,7 +285,7 @@ def nearest_cell(
 def see(
     space: FreeSpace,
     time: float,
-    tick: int,
+    turn: int,
     pose: Any,
     sectors: Sectors,
     readings: Any,
@@ -296,7 +296,7 @@ def see(
     Args:
         space: Changed.
         time: s.
-        tick: Every fourth row of cells is entered, by turns.
+        turn: Of the rows: every fourth row of cells is entered, by turns.
         pose: (x, y, theta) of the robot by its odometry, m and rad.
         sectors: Directions that the sensors see.
         readings: (sensors, 2) of each sensor up to where it has seen free, m, 0: not
@@ -323,7 +323,7 @@ def see(
         high_j = min(
             math.floor(box[3] / cell), int(space.facts[0, FIRST_J]) + cells - 1
         )
-        for i in range(low_i + (tick - low_i) % _ROWS, high_i + 1, _ROWS):
+        for i in range(low_i + (turn - low_i) % _ROWS, high_i + 1, _ROWS):
             dx = (i + 0.5) * cell - sx
             for j in range(low_j, high_j + 1):
                 dy = (j + 0.5) * cell - sy

@@ -184,6 +184,8 @@ class MapNumbers(NamedTuple):
     bubble: float
     """Radius of what is free at the start, m."""
     tick_s: float
+    round_ticks: int
+    """From one reading of a sensor to its next."""
     was_at: NDArray[np.float64]
     """(1, 3) pose at the last tick, m and rad; changed."""
 
@@ -238,7 +240,9 @@ def map_step(
         place = numbers.places[k, 0], numbers.places[k, 1]
         direction = numbers.directions[k, 0], numbers.directions[k, 1]
         end_view(space, k, time, pose, place, direction, readings[k, 0])
-    see(space, time, tick, pose, numbers.sectors, readings, numbers.drift)
+    # Each sensor enters other rows with each of its readings.
+    turn_of_rows = tick // numbers.round_ticks
+    see(space, time, turn_of_rows, pose, numbers.sectors, readings, numbers.drift)
 
 
 class FreeSpaceMap(LeafSystem):
@@ -337,6 +341,7 @@ class FreeSpaceMap(LeafSystem):
             body_radius(robot),
             own.start_bubble_m,
             self._tick_s,
+            sensors.round_ticks(self._tick_s),
             np.zeros((1, 3)),
         )
 

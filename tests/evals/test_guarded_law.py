@@ -91,6 +91,22 @@ def test_where_there_is_no_way_it_says_so(door):
     assert run.time[gives_up].min(initial=np.inf) > 20.0
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "slower",
+    [
+        "ultrasonic.period_s=0.05",
+        "ultrasonic.period_s=0.1",
+        "ultrasonic.firing=sequential",
+    ],
+)
+def test_slower_sensors_enter_all_of_the_map(slower):
+    """Rows of cells come by turns with the readings, not with the ticks."""
+    fields = ["hearing=ideal", "law=guarded", f"ultrasonic.{slower}"]
+    run = simulate(load_scenario("two_static_obstacles", fields), engine="compiled")
+    assert run.cause == "reached"
+
+
 def test_the_law_brings_its_guard():
     scenario = load_scenario("default", ["law=guarded"])
     assert scenario.guard is None
