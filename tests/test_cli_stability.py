@@ -10,6 +10,7 @@ import phonotaxis
 from analysis.reporting.html_page import paragraph
 from analysis.stability import report_parts as stability_parts
 from analysis.stability.law_analysis import Part
+from analysis.stability.safety_parts import safety_parts
 from analysis.stability.verdicts import Criterion, judge
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
@@ -17,7 +18,7 @@ from systems.framework.input_error import InputError
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
 
 
-def quick_parts(*, full: bool) -> tuple[Part, ...]:
+def quick_parts(*, full: bool, guarded: bool = False) -> tuple[Part, ...]:
     """Stand-ins for analyses that take their time."""
 
     def verdicts(study):
@@ -29,10 +30,11 @@ def quick_parts(*, full: bool) -> tuple[Part, ...]:
     def render(data, name):
         return [paragraph(f"{len(data)} verdicts")]
 
-    return (
+    quick = (
         Part("verdicts", "Verdicts", verdicts, render),
         Part("impossible", "Impossible", impossible, render),
     )[: 2 if full else 1]
+    return (*quick, *(safety_parts() if guarded else ()))
 
 
 @pytest.fixture
@@ -63,7 +65,7 @@ def test_a_part_that_fails_is_no_success(capsys, tmp_path, monkeypatch):
             "after", "After", lambda study: [1, 2], lambda data, name: ["<p>last</p>"]
         ),
     )
-    monkeypatch.setattr(stability_parts, "parts", lambda *, full: parts)
+    monkeypatch.setattr(stability_parts, "parts", lambda **_: parts)
     out = tmp_path / "out"
     status, printed, complaint = run(capsys, "--out", str(out))
     assert status == 1
@@ -155,9 +157,23 @@ def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(
         stability_parts,
         "parts",
-        lambda *, full: (Part("bad", "Bad", demand, lambda data, name: []),),
+        lambda **_: (Part("bad", "Bad", demand, lambda data, name: []),),
     )
     status, printed, complaint = run(capsys, "--out", str(tmp_path / "out"))
     assert (status, printed) == (1, "")
     assert "the command was ended from within" in complaint
     assert not (tmp_path / "out").exists()
+
+
+def test_what_a_guard_promises_is_in_the_report(quick, capsys, tmp_path):
+    words = ["two_static_obstacles", "--law", "active", "--json", "--out"]
+    documents = {}
+    for guard in ("on", "off"):
+        out = tmp_path / guard
+        status, printed, _ = run(capsys, *words, str(out), "--guard", guard)
+        assert status == 0
+        documents[guard] = json.loads(printed)
+        page = (out / "report.html").read_text("utf-8")
+        assert ("Safety of the guard" in page) == (guard == "on")
+    assert documents["on"]["safety"]["promise"].startswith("static safety")
+    assert "safety" not in documents["off"]

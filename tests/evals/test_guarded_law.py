@@ -94,11 +94,7 @@ def test_where_there_is_no_way_it_says_so(door):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "slower",
-    [
-        "ultrasonic.period_s=0.05",
-        "ultrasonic.period_s=0.1",
-        "ultrasonic.firing=sequential",
-    ],
+    ["period_s=0.05", "period_s=0.1", "firing=sequential"],
 )
 def test_slower_sensors_enter_all_of_the_map(slower):
     """Rows of cells come by turns with the readings, not with the ticks."""
