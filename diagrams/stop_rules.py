@@ -203,10 +203,10 @@ class _View:
         self._pose = parts.port("plant", "pose_WB")
         self._velocity = parts.port("plant", "velocity_WB")
         self._valid = parts.port("tracker", "target_valid")
-        controller = parts.blocks["controller"]
-        if controller.HasOutputPort(GIVES_UP):
-            self._blocks += (controller,)
-            self._gives_up = controller.GetOutputPort(GIVES_UP)
+        for block in parts.blocks.values():
+            if block.HasOutputPort(GIVES_UP):
+                self._blocks += (block,)
+                self._gives_up = block.GetOutputPort(GIVES_UP)
         self._root: Any = None
         self._contexts: list[Any] = []
 
@@ -214,12 +214,12 @@ class _View:
         if context is not self._root:
             self._root = context
             self._contexts = [b.GetMyContextFromRoot(context) for b in self._blocks]
-        plant, tracker, *controller = self._contexts
+        plant, tracker, *law = self._contexts
         return Seen(
             self._pose.Eval(plant).tolist(),
             self._velocity.Eval(plant).tolist(),
             self._valid.Eval(tracker)[0] > 0.5,
-            any(self._gives_up.Eval(each)[0] > 0.5 for each in controller),
+            any(self._gives_up.Eval(each)[0] > 0.5 for each in law),
         )
 
 

@@ -21,7 +21,7 @@ from systems.planning.hazards import (
     pick_hazards,
     track_hazards,
 )
-from systems.planning.turning import wrapped
+from systems.planning.turning import turn_towards, wrapped
 from systems.planning.way import NEAR, OCCUPIED, TIGHT, Way, find_way, mark_blocked
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
@@ -217,8 +217,7 @@ def _evade(time, pose, wanted, error, numbers):  # type: ignore[no-untyped-def]
     if m[0, MODE] == LOOKING and m[0, HAS_LOOKED] > 0.5:
         m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
     m[0, SPEED] = speed
-    turn = numbers.following.turn_gain * wrapped(heading - pose[2])
-    m[0, TURN] = _within(turn, numbers.following.turn_rate_rad_s)
+    m[0, TURN] = turn_towards(0.0, heading, pose[2], numbers.following)[1]
 
 
 @njit(cache=True)

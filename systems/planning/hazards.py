@@ -15,7 +15,7 @@ from numba import njit
 from numpy.typing import NDArray
 
 from systems.planning.turning import wrapped
-from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
+from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
 
 __all__ = [
     "AGE_S",
@@ -396,7 +396,8 @@ def _came_from_free(
             di, dj = i - space.facts[0, FIRST_I], j - space.facts[0, FIRST_J]
             if not (0 <= di < cells and 0 <= dj < cells):
                 return False
-            if space.free_until[i % cells, j % cells] < 0.0:
+            # Of a cell that is forgotten nobody knows any more where it is.
+            if space.free_until[i % cells, j % cells] < space.facts[0, ROLLED]:
                 return False
     return True
 
