@@ -66,9 +66,9 @@ def simulate(
             never frees blocks written in Python, so many runs in one process
             should share a build. Compiled runs do by themselves.
         progress: Called with the simulated time, s, once a simulated second.
-        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop, which
-            is compiled for some 15 s when a kind of scenario is first run, and kept on
-            the disk; none: that of the scenario, Drake's if that is ``auto``.
+        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop; they
+            are compiled for up to 15 s when they are first used, and kept on the disk.
+            None: that of the scenario, Drake's if that is ``auto``.
 
     Returns:
         ``RunResult``.

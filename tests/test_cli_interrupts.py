@@ -14,11 +14,17 @@ import pytest
 import phonotaxis
 
 ROOT = Path(phonotaxis.__file__).parent
-#: Says when its first line runs: what is before, is Python's own start.
+#: Says when ``main`` began to load: what is before, is Python's own start. A shell's
+#: background job begins with Ctrl-C ignored, which would be inherited.
 CODE = """
+import signal
 import sys
 import phonotaxis
-print("started", flush=True)
+signal.signal(signal.SIGINT, signal.default_int_handler)
+def loads(event, arguments):
+    if event == "import" and arguments[0] == "analysis.commands.interrupts":
+        print("started", flush=True)
+sys.addaudithook(loads)
 sys.exit(phonotaxis.main())
 """
 

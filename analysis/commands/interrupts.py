@@ -38,12 +38,14 @@ class Interrupts:
 
     def __init__(self, *, last: bool = False) -> None:
         self._last = last
-        self._held = False
+        self._held = True
         self._struck = False
 
     def __enter__(self) -> Interrupts:
         self._before = {each: signal.signal(each, self._strike) for each in _SIGNALS}
         self._hook, sys.unraisablehook = sys.unraisablehook, self._swallowed
+        # Only now: one that strikes again needs the handler of the alarm.
+        self.release()
         return self
 
     def __exit__(self, *exception: object) -> None:

@@ -1,9 +1,9 @@
-"""Generated source, compiled by numba once for all processes.
+"""Generated source of parts of a loop, compiled by numba once for all processes.
 
 numba keeps compiled code for functions of files, by the types of their arguments. So
 the source is written into a file beside that code, whose name tells all that the code
 depends on; and what numbers cannot be, functions and named tuples, stands in it as
-names, while all numbers come as a few arrays.
+names, while all numbers come by the address of a few arrays.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import logging
 import sys
 import time
 from collections import namedtuple
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cache, cached_property
 from itertools import count
@@ -26,15 +26,15 @@ import numba
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
+from numpy.typing import NDArray
 
+from diagrams.compiled.parts import ARRAYS
 from diagrams.own_code import OURS, files_of
 from systems.framework.compiling import cache_folder
+from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
 
-__all__ = ["PACKED", "Packing", "compiled_from"]
-
-#: Arguments by which a generated function takes the values of a ``Packing``.
-PACKED = "floats, ints, flags, vectors, others"
+__all__ = ["Part", "address_of", "compiled_part"]
 
 #: Generated files that were not used for so long are removed, s.
 _KEPT_S = 30 * 86_400.0
@@ -43,57 +43,69 @@ _LOGGER = logging.getLogger("phonotaxis")
 _COUNT = count()
 
 
-class Packing:
-    """Values as a generated function gets them."""
+class Part:
+    """A function of the tick, as source and the values that it takes.
+
+    Values get into the source by ``expression``, names by ``name``.
+    """
 
     def __init__(self) -> None:
         self.names: dict[str, Any] = {}
         """Functions and named tuples, by their names in the source."""
-        self._lists: dict[str, list[Any]] = {name: [] for name in PACKED.split(", ")}
-        self._arrays: dict[int, tuple[Any, str]] = {}
+        self._floats: list[float] = []
+        self._words = [0, 0]
+        self._arrays: dict[int, str] = {}
+        self._kept: list[Any] = []
 
-    @property
-    def values(self) -> tuple[Any, ...]:
-        """What ``PACKED`` stands for."""
-        floats, ints, flags, vectors, others = self._lists.values()
-        return (
-            np.array(floats, dtype=float),
-            np.array(ints, dtype=np.int64),
-            np.array(flags, dtype=bool),
-            np.array(vectors, dtype=float),
-            tuple(others),
-        )
+    def source(self, lines: Sequence[str]) -> str:
+        """The source of a function of ``tick``, which returns 0 if it returns nothing.
+
+        Args:
+            lines: Of the function.
+        """
+        words = f"{self.name(ARRAYS[np.dtype(np.int64)])}(address, (1,))"
+        floats = f"{self.name(ARRAYS[np.dtype(np.float64)])}(words[0], (words[1],))"
+        body = [f"words = {words}", f"floats = {floats}", *lines, "return 0"]
+        return "\n".join(["def part(tick, address):", *_indented(body), ""])
+
+    def words(self) -> NDArray[np.int64]:
+        """What the function is called with the address of; to be kept with the part."""
+        floats = np.array(self._floats)
+        self._kept.append(floats)
+        self._words[:2] = floats.ctypes.data, floats.size
+        return np.array(self._words, dtype=np.int64)
 
     def expression(self, value: Any) -> str:
         """A value as source text.
 
         Args:
-            value: A number, an array, a function, a tuple of values, or parameters,
-                which become a named tuple of their fields and of what they derive from
-                them; lists become arrays (an empty one is of pairs), what is unset
-                becomes 0.
+            value: A number, text, an array, a function, a tuple of values, or
+                parameters, which become a named tuple of their fields and of what they
+                derive from them; lists become arrays (an empty one is of pairs), what
+                is unset becomes 0.
+
+        Raises:
+            InputError: It is, or holds, anything else.
         """
         if isinstance(value, Parameters):
             kind = _tuple_type(type(value))
             return self._call(kind, [getattr(value, name) for name in kind._fields])
         if isinstance(value, tuple):
             return self._call(type(value), value)
-        if callable(value):
-            return self.name(getattr(value, "py_func", value))
-        if isinstance(value, list):
-            value = np.array(value) if value else np.empty((0, 2))
-        for kind, place in ((bool, "flags"), (int, "ints"), (float, "floats")):
-            if type(value) is kind:
-                return self._place(place, value)
-        if value is None:
-            return self._place("floats", 0.0)
+        if isinstance(value, str) or callable(value):
+            return repr(value) if isinstance(value, str) else self.name(value)
+        if value is None or isinstance(value, float):
+            self._floats.append(0.0 if value is None else value)
+            return f"floats[{len(self._floats) - 1}]"
+        if isinstance(value, int):
+            word = self._word(value)
+            return f"({word} != 0)" if isinstance(value, bool) else word
         return self._array(value)
 
     def name(self, function: Any) -> str:
-        """Name of a function or class; a function is compiled for the loop."""
-        known = (
-            _compilable(function) if isinstance(function, FunctionType) else function
-        )
+        """Name of a function or class; a function is compiled for the part."""
+        plain = getattr(function, "py_func", function)
+        known = _compilable(plain) if isinstance(plain, FunctionType) else plain
         for name, value in self.names.items():
             if value is known:
                 return name
@@ -106,30 +118,33 @@ class Packing:
         text = "".join(f"{self.expression(value)}, " for value in values)
         return f"{self.name(kind)}({text})" if hasattr(kind, "_fields") else f"({text})"
 
-    def _place(self, place: str, value: Any) -> str:
-        self._lists[place].append(value)
-        return f"{place}[{len(self._lists[place]) - 1}]"
+    def _word(self, value: int) -> str:
+        self._words.append(int(value))
+        return f"words[{len(self._words) - 1}]"
 
     def _array(self, value: Any) -> str:
-        """An array stands there once; vectors of floats all in one.
-
-        Each array would come as seven arguments, hundreds of which take numba minutes.
-        """
+        """By its address; its shape is no part of the source: it serves all layouts."""
         if id(value) not in self._arrays:
-            if (
-                isinstance(value, np.ndarray)
-                and value.ndim == 1
-                and value.dtype == float
-            ):
-                # Its length is no part of the source: one serves all layouts.
-                vectors = self._lists["vectors"]
-                begin = self._place("ints", len(vectors))
-                vectors += value.tolist()
-                text = f"vectors[{begin}:{self._place('ints', len(vectors))}]"
-            else:
-                text = self._place("others", value)
-            self._arrays[id(value)] = value, text
-        return self._arrays[id(value)][1]
+            # An empty list is one of pairs; scalars become arrays of one number.
+            empty = isinstance(value, list) and not value
+            whole = np.ascontiguousarray(np.empty((0, 2)) if empty else value)
+            if whole.dtype not in ARRAYS:
+                raise InputError(
+                    "engine",
+                    f"{shortened(repr(value), 60)} is nothing that compiled loops "
+                    "take; give blocks numbers or arrays, or run with engine drake",
+                )
+            self._kept += value, whole
+            at = self._word(whole.ctypes.data)
+            shape = "".join(f"{self._word(size)}, " for size in whole.shape)
+            text = f"{self.name(ARRAYS[whole.dtype])}({at}, ({shape}))"
+            scalar = isinstance(value, np.generic)
+            self._arrays[id(value)] = f"{text}[0]" if scalar else text
+        return self._arrays[id(value)]
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
 
 
 @cache
@@ -153,11 +168,11 @@ def _compilable(function: FunctionType) -> Any:
     return register_jitable(inspect.unwrap(function))
 
 
-def compiled_from(source: str, names: Mapping[str, Any]) -> Any:
-    """The function ``loop`` of generated source, compiled when it is first called.
+def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
+    """The function ``part`` of generated source, compiled or loaded.
 
     Args:
-        source: Defines ``loop``.
+        source: Of ``Part.source``.
         names: What its names stand for.
 
     Returns:
@@ -170,14 +185,33 @@ def compiled_from(source: str, names: Mapping[str, Any]) -> Any:
 def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
     file = _file(source, dict(named))
     if file is None or not any((file.parent / "__pycache__").glob(f"{file.stem}.*")):
-        _LOGGER.info("compiling this kind of scenario, for some 15 s ...")
-    # numba asks for the module of what it loads; loops without a file are not one.
-    name = file.stem if file else f"loop_{next(_COUNT)}"
+        _say_that_it_takes_time()
+    # numba asks for the module of what it loads; parts without a file are not one.
+    name = file.stem if file else f"part_{next(_COUNT)}"
     module = ModuleType(f"phonotaxis.{name}")
     sys.modules[module.__name__] = module
     vars(module).update(named)
-    exec(compile(source, str(file or "<loop>"), "exec"), vars(module))
-    return njit(cache=file is not None)(module.loop)
+    exec(compile(source, str(file or "<part>"), "exec"), vars(module))
+    return njit("int64(int64, int64)", cache=file is not None)(module.part)
+
+
+@cache
+def _say_that_it_takes_time() -> None:
+    _LOGGER.info("compiling what this kind of scenario needs, for up to 15 s ...")
+
+
+def address_of(part: Any) -> int:
+    """Where the code of a compiled part stands.
+
+    Args:
+        part: Of ``compiled_part``.
+
+    Returns:
+        By which ``run_parts`` calls it, as long as the part is kept.
+    """
+    (found,) = part.overloads.values()
+    address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    return address
 
 
 def _file(source: str, names: Mapping[str, Any]) -> Path | None:
@@ -191,8 +225,8 @@ def _file(source: str, names: Mapping[str, Any]) -> Path | None:
     if not origins:
         return None
     text = "".join([*(f"# {line}\n" for line in (*origins, _digest())), source])
-    folder = cache_folder() / "phonotaxis_loops"
-    file = folder / f"loop_{hashlib.sha256(text.encode()).hexdigest()[:24]}.source"
+    folder = cache_folder() / "phonotaxis_parts"
+    file = folder / f"part_{hashlib.sha256(text.encode()).hexdigest()[:24]}.source"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if file.exists():
@@ -247,7 +281,7 @@ def _digest() -> str:
 
 def _remove_unused(folder: Path) -> None:
     oldest = time.time() - _KEPT_S
-    for file in folder.glob("loop_*.source"):
+    for file in folder.glob("part_*.source"):
         with suppress(OSError):  # another process removes it, too
             if file.stat().st_mtime < oldest:
                 for code in (folder / "__pycache__").glob(f"{file.stem}.*"):

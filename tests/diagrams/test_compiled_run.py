@@ -104,7 +104,7 @@ def assert_same(name, *overrides):
     ],
 )
 def test_runs_are_those_of_drake(name, overrides):
-    """Seven scenarios are of one kind, which is compiled once."""
+    """All share the blocks that they have in common, each compiled once."""
     assert_same(name, *overrides)
 
 

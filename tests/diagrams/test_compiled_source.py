@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 
 from diagrams.compiled import source as compiled_source
-from diagrams.compiled.source import PACKED, Packing, compiled_from
+from diagrams.compiled.parts import run_parts
+from diagrams.compiled.source import Part, address_of, compiled_part
+from systems.framework.input_error import InputError
 from systems.laws.impedance import AttractionParameters
 
 
@@ -27,65 +29,129 @@ def doubled(x):
     return 2.0 * x
 
 
-SOURCE = f"def loop({PACKED}):\n    return doubled(floats[0])\n"
+def compiled(part, *lines):
+    return compiled_part(part.source(lines), part.names)
+
+
+def called(part, *lines, tick=0):
+    return compiled(part, *lines)(tick, part.words().ctypes.data)
+
+
+def made(function=doubled):
+    """A part that returns twice three, and its line."""
+    part = Part()
+    return part, f"return int({part.name(function)}({part.expression(3.0)}))"
 
 
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled_source, "cache_folder", lambda: tmp_path)
     compiled_source._loaded.cache_clear()
-    yield tmp_path / "phonotaxis_loops"
+    yield tmp_path / "phonotaxis_parts"
     compiled_source._loaded.cache_clear()
 
 
 def test_values_come_back_from_their_expression():
-    packing, array = Packing(), np.arange(6.0).reshape(2, 3)
-    vector = np.array([1.5, 2.5])
-    value = Numbers(
-        AttractionParameters(stiffness_n_m=3.5),
-        doubled,
-        (7, True, None, "text", [], [(1.0, 2.0)], array, vector, np.uint64(2**63)),
+    part, array, found = Part(), np.arange(6.0).reshape(2, 3), np.zeros(16)
+    vector, few = np.array([1.5, 2.5]), np.array([1.5], dtype=np.float32)
+    rest: Any = (
+        7,
+        True,
+        None,
+        [],
+        [(1.0, 2.0)],
+        array,
+        vector,
+        np.uint64(2**63),
+        -0.0,
+        few,
+        "it's",
     )
-    text = packing.expression(value)
-    names = {
-        **packing.names,
-        **dict(zip(PACKED.split(", "), packing.values, strict=True)),
-    }
-    found = eval(text, names)
-    assert type(found) is Numbers
-    assert found.attraction.stiffness_n_m == 3.5
-    assert found.function(4.0) == 8.0
-    whole, flag, unset, word, empty, pairs, same, floats, large = found.rest
-    assert (whole, flag, unset, word) == (7, True, 0.0, "text")
-    assert type(whole) is np.int64
-    assert empty.shape == (0, 2)
-    assert pairs.tolist() == [[1.0, 2.0]]
-    assert same is array
-    assert floats.tolist() == vector.tolist()
-    assert large == 2**63
+    value = Numbers(AttractionParameters(stiffness_n_m=3.5), doubled, rest)
+    lines = [
+        f"value, found = {part.expression(value)}, {part.expression(found)}",
+        "whole, flag, unset, empty, pairs, array = value.rest[:6]",
+        "vector, large, low, few, text = value.rest[6:]",
+        "found[0], found[1] = value.attraction.stiffness_n_m, value.function(4.0)",
+        "found[2], found[3], found[4] = whole // 2, 1.0 if flag else 2.0, unset",
+        "found[5], found[6] = empty.shape",
+        "found[7], found[8] = pairs.shape[0], pairs[0, 1]",
+        "found[9], found[10], found[11] = array[1, 2], vector[1], large / 2.0**60",
+        "found[12], found[13] = len(vector), few[0]",
+        "found[14], found[15] = low, len(text)",
+        "array[0, 0] = 99.0",
+    ]
+    assert called(part, *lines) == 0
+    expected = [3.5, 8.0, 3, 1, 0, 0, 2, 1, 2.0, 5.0, 2.5, 8.0, 2, 1.5, 0.0, 4]
+    assert found.tolist() == expected
+    assert np.signbit(found[14])
+    # It works on the array itself.
+    assert array[0, 0] == 99.0
 
 
-def test_vectors_share_memory_where_they_are_one():
-    """A port that one block writes is the one that another reads."""
-    packing, port = Packing(), np.zeros(2)
-    assert packing.expression(port) == packing.expression(port)
-    assert packing.expression(port) != packing.expression(np.zeros(2))
+@pytest.mark.parametrize("value", [b"text", np.zeros(2, dtype=complex), {1: 2}])
+def test_what_is_no_number_is_refused(value):
+    with pytest.raises(InputError, match="nothing that compiled loops take"):
+        Part().expression((1.0, value))
+
+
+def test_arrays_stand_there_once():
+    part, port = Part(), np.zeros(2)
+    assert part.expression(port) == part.expression(port)
+    assert part.expression(port) != part.expression(np.zeros(2))
+
+
+def test_parts_are_called_in_order_and_end_the_run():
+    """Before the log, the judge, and after: counted and logged."""
+    counts, seen = np.zeros(3), np.zeros(3)
+
+    def adding(to):
+        part = Part()
+        line = f"{part.expression(counts)}[{to}] += 1.0 if tick >= 0 else 100.0"
+        return part, compiled(part, line)
+
+    judge = Part()
+    ends = f"if {judge.expression(counts)}[0] > 3.5:"
+    parts = [adding(0), (judge, compiled(judge, ends, "    return 1")), adding(1)]
+    words = [part.words() for part, _ in parts]
+    calls = np.array(
+        [
+            (address_of(function), each.ctypes.data)
+            for (_, function), each in zip(parts, words, strict=True)
+        ]
+    )
+    log = np.zeros((9, 3))
+    logged = np.array([(counts.ctypes.data, 3)])
+    plan = np.array([2]), np.array([0]), 1, np.array([(2, 0), (2, 1)])
+    assert run_parts(0, 2, log, logged, calls, plan) == (2, False)
+    seen[:] = 2.0, 302.0, 0.0
+    assert counts.tolist() == seen.tolist()
+    assert run_parts(2, 9, log, logged, calls, plan) == (4, True)
+    assert log[:5, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 0.0]
+    assert log[:4, 1].tolist() == [100.0, 201.0, 302.0, 403.0]
+
+
+def test_what_a_part_raises_ends_the_loop():
+    part = Part()
+    function, words = compiled(part, "1 // (tick - 1)"), part.words()
+    calls = np.array([(address_of(function), words.ctypes.data)])
+    none, logged = np.empty(0, dtype=np.int64), np.empty((0, 2), dtype=np.int64)
+    plan = none, np.array([0]), 0, np.empty((0, 2), dtype=np.int64)
+    with pytest.raises(ZeroDivisionError):
+        run_parts(0, 3, np.zeros((3, 0)), logged, calls, plan)
 
 
 def test_compiled_code_is_kept(folder):
-    packing = Packing()
-    packing.expression(3.0)
-    name = packing.name(doubled)
-    source = SOURCE.replace("doubled", name)
-    function = compiled_from(source, packing.names)
-    assert function(*packing.values) == 6.0
-    assert compiled_from(source, packing.names) is function
+    part, line = made()
+    function = compiled(part, line)
+    assert called(part, line) == 6
+    assert compiled(part, line) is function
     (file,) = folder.glob("*.source")
-    assert source in file.read_text()
+    assert line in file.read_text()
     assert list((folder / "__pycache__").glob(f"{file.stem}*.nbc"))
     compiled_source._loaded.cache_clear()
-    again = compiled_from(source, packing.names)
-    assert again(*packing.values) == 6.0
+    again = compiled(part, line)
+    assert called(part, line) == 6
     assert sum(again.stats.cache_hits.values()) == 1
 
 
@@ -94,10 +160,7 @@ def test_what_a_closure_holds_is_never_taken_from_the_disk(folder):
         return lambda x: x + term
 
     for term in (1.0, 2.0):
-        packing = Packing()
-        added = packing.expression(adding(term))
-        source = f"def loop({PACKED}):\n    return {added}(1.0)\n"
-        assert compiled_from(source, packing.names)(*packing.values) == 1.0 + term
+        assert called(*made(adding(term))) == 3.0 + term
     assert not folder.exists()
 
 
@@ -110,24 +173,21 @@ def test_another_text_of_a_users_file_is_another_loop(folder, tmp_path, monkeypa
         module.__file__ = str(file)
         monkeypatch.setitem(sys.modules, "factors", module)
         exec(compile(file.read_text(), str(file), "exec"), vars(module))
-        compiled_from(SOURCE, {"doubled": module.own})
+        compiled(*made(module.own))
         names.append({path.name for path in folder.glob("*.source")})
     assert len(names[1] - names[0]) == 1
 
 
 def test_files_that_nobody_uses_are_removed(folder):
-    packing = Packing()
-    packing.expression(3.0)
-    source = SOURCE.replace("doubled", packing.name(doubled))
     (folder / "__pycache__").mkdir(parents=True)
     old, code = (
-        folder / "loop_old.source",
-        folder / "__pycache__" / "loop_old.loop-1.nbi",
+        folder / "part_old.source",
+        folder / "__pycache__" / "part_old.part-1.nbi",
     )
     for file in (old, code):
         file.write_text("")
     os.utime(old, (time.time() - 40 * 86_400.0,) * 2)
-    compiled_from(source, packing.names)
+    compiled(*made())
     assert not old.exists()
     assert not code.exists()
 
@@ -137,7 +197,4 @@ def test_without_a_folder_nothing_is_kept(folder, monkeypatch):
         raise OSError("no space left")
 
     monkeypatch.setattr(Path, "mkdir", refuse)
-    packing = Packing()
-    packing.expression(3.0)
-    source = SOURCE.replace("doubled", packing.name(doubled))
-    assert compiled_from(source, packing.names)(*packing.values) == 6.0
+    assert called(*made()) == 6
