@@ -30,10 +30,14 @@ _STALE_S, _UNSURE_M_S, _LEAST_NEED, _MOST_NEED = 0.8, 0.1, 0.1, 2.0
 #: A threat that is no farther off the heading is in view, rad; at most so much counts.
 _IN_VIEW_RAD, _OUT_OF_VIEW_RAD = 0.55, 1.0
 #: Speeds that are tried besides the wanted one, m/s.
-_SPEEDS = (-0.4, -0.2, 0.0, 0.15, 0.3, 0.45, 0.62)
+_SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, 0.62)
 #: Headings that are tried around the wanted one, rad, and limit of a gaze around it.
 _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
 _GAZE_RAD = 0.8
+#: A guard that reckons with moving bodies lets a robot move on beside one within this
+#: of its rim, m, only if it gets away by this share of its way; else it may turn
+#: slowly, rad/s. So much of a body counts as one.
+_BESIDE_M, _WITHDRAWS, _SLOW_RAD_S, _BODY_SHARE = 0.3, 0.2, 0.3, 0.3
 #: Price of a heading that is not the wanted one, m/s a rad.
 _TURN_PRICE = 0.1
 #: The guard lets the robot not go on to within this of its heading, rad.
@@ -65,6 +69,26 @@ def _between(
 
 
 @njit(cache=True)
+def _is_held(
+    bodies: Any, count: int, pose: Any, motion: Any, time: float, numbers: Any
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a guard lets the robot not move so, beside bodies as they are by then."""
+    x, y, theta = pose
+    speed, omega = motion
+    c, s = math.cos(theta), math.sin(theta)
+    radius = math.hypot(numbers.half_size[0], numbers.half_size[1])
+    near, moved = 0.0, _WITHDRAWS * max(abs(speed), radius * abs(omega))
+    for n in range(count):
+        dx = bodies[n, X] + time * bodies[n, VX] - x
+        dy = bodies[n, Y] + time * bodies[n, VY] - y
+        distance = math.hypot(dx, dy)
+        withdraws = -speed * (c * dx + s * dy) >= moved * distance
+        if distance < radius + _BESIDE_M and not withdraws:
+            near += bodies[n, WEIGHT]
+    return near > _BODY_SHARE
+
+
+@njit(cache=True)
 def risk_of(
     bodies: Any,
     count: int,
@@ -73,7 +97,7 @@ def risk_of(
     heading: float,
     numbers: EvasionNumbers,
 ) -> float:  # pragma: no cover  (compiled)
-    """How many bodies come near the robot if it goes on so.
+    """How many bodies come near the robot if it goes on so, or where a guard holds it.
 
     Args:
         bodies: (n, 7) from ``pick_hazards``.
@@ -86,17 +110,44 @@ def risk_of(
     Returns:
         Bodies: those within 15 cm of its sides full, up to 43 cm less and less.
     """
-    steps, total = math.ceil(_AHEAD_S / _STEP_S), 0.0
+    let, held = _risk_along(bodies, count, pose, speed, heading, numbers, np.inf)
+    if held:
+        stopped, _ = _risk_along(
+            bodies, count, pose, speed, heading, numbers, _SLOW_RAD_S
+        )
+        return max(let, stopped)
+    return let
+
+
+@njit(cache=True)
+def _risk_along(
+    bodies: Any,
+    count: int,
+    pose: Any,
+    speed: float,
+    heading: float,
+    numbers: EvasionNumbers,
+    held_rad_s: float,
+) -> tuple[float, bool]:  # pragma: no cover  (compiled)
+    """``risk_of``, and whether a guard would hold the robot; to which turn, if any."""
+    steps, total, held = math.ceil(_AHEAD_S / _STEP_S), 0.0, False
     x, y, theta = pose[0], pose[1], pose[2]
     worst = np.zeros(count)
     for k in range(steps):
         omega = numbers.turn_gain * wrapped(heading - theta)
         omega = min(max(omega, -numbers.turn_rate_rad_s), numbers.turn_rate_rad_s)
+        v, now, time = speed, k * _STEP_S, (k + 1) * _STEP_S
+        guarded = held_rad_s < np.inf
+        if (guarded or not held) and _is_held(
+            bodies, count, (x, y, theta), (speed, omega), now, numbers
+        ):
+            held = True
+            if guarded:
+                v, omega = 0.0, min(max(omega, -held_rad_s), held_rad_s)
         theta += omega * _STEP_S
         c, s = math.cos(theta), math.sin(theta)
-        x += speed * _STEP_S * c
-        y += speed * _STEP_S * s
-        time = (k + 1) * _STEP_S
+        x += v * _STEP_S * c
+        y += v * _STEP_S * s
         for n in range(count):
             dx = bodies[n, X] + time * bodies[n, VX] - x
             dy = bodies[n, Y] + time * bodies[n, VY] - y
@@ -108,7 +159,7 @@ def risk_of(
             worst[n] = max(worst[n], near * (1.0 - _LATER * time / _AHEAD_S))
     for n in range(count):
         total += bodies[n, WEIGHT] * worst[n]
-    return total
+    return total, held
 
 
 @njit(cache=True)

@@ -42,6 +42,9 @@ _REST_M = 2e-4
 #: lag leaves it no longer way ahead, m.
 _IN_PLACE_M_S = 1e-6
 _IN_PLACE_M = 5e-5
+#: It withdraws from what is in view where it gets away by this share of its way: more,
+#: and it may not go on past what comes from behind.
+_WITHDRAWS = 0.2
 #: Where a robot is nearer than it should be, it may come so much nearer in a tick, m.
 _SLACK_M = 5e-4
 
@@ -239,7 +242,7 @@ def _keeps_off_moving(
     if _nearest_view(danger, x, y, ahead_s, speed) >= numbers.keep_m:
         return True
     withdrawn = _nearest_view(danger, x, y, 0.0, 0.0) - danger.view_distance_m
-    return moved > 0.0 and withdrawn >= 0.5 * moved
+    return moved > 0.0 and withdrawn >= _WITHDRAWS * moved
 
 
 @njit(cache=True)

@@ -63,6 +63,17 @@ def test_what_would_be_hit_is_evaded(x, y, vx, vy):
     assert clearance(bodies, speed, heading) > 0.15
 
 
+def test_beside_a_body_only_getting_away_counts():
+    """A guard stops a robot that turns beside a body, which then comes up to it."""
+    behind = body(-0.65, 0.1, 0.35, 0.0)
+    assert risk_of(behind, 1, HERE, 0.6, 0.0, NUMBERS) < 0.2
+    turning = risk_of(behind, 1, HERE, 0.6, 2.0, NUMBERS)
+    assert turning > 0.5
+    # Far from it the same turn leads away.
+    far = body(-1.6, 0.1, 0.35, 0.0)
+    assert risk_of(far, 1, HERE, 0.6, 2.0, NUMBERS) < 0.2
+
+
 def test_risk_counts_bodies_that_are_hit():
     ahead = body(0.9, 0.0, 0.0, 0.0)
     assert risk_of(ahead, 1, HERE, 0.45, 0.0, NUMBERS) == pytest.approx(0.9, abs=0.1)
