@@ -25,6 +25,7 @@ from systems import (
     IdealSourceSensor,
     MicArray,
     MotionGuard,
+    SensingMonitor,
     SoundEmitter,
     SourceRobot,
     SourceTracker,
@@ -448,6 +449,11 @@ def _obstacle_sensing(
             tick_s=scenario.tick_s,
         )
         sensing.append(known)
+    if scenario.own_guard is not None:
+        monitor = SensingMonitor(
+            sensors=scenario.ultrasonic, robot=scenario.robot, tick_s=scenario.tick_s
+        )
+        sensing.append(monitor)
     return sensing
 
 

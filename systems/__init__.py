@@ -50,6 +50,7 @@ from systems.ranging.ideal_obstacle_sensor import (
 from systems.ranging.ultrasonic_array import UltrasonicArray
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.sensing_monitor import SensingMonitor
 from systems.sound.mic_array import MicArray
 from systems.sound.sound_emitter import SoundEmitter
 from systems.world.obstacles import Obstacles, Obstacles_
@@ -82,6 +83,7 @@ __all__ = [
     "RadialLawController",
     "RadialLawController_",
     "ReciprocalAvoidanceController",
+    "SensingMonitor",
     "SoundEmitter",
     "SourceRobot",
     "SourceRobot_",

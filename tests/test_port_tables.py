@@ -28,6 +28,7 @@ BLOCKS = {
     "IdealSourceSensor",
     "MicArray",
     "MotionGuard",
+    "SensingMonitor",
     "Obstacles",
     "PathIntegralController",
     "ReciprocalAvoidanceController",

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from diagrams import RunResult
 from systems.safety.braking import BrakingNumbers, braked, roll_on
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.sensing_monitor import SENSING_FAULTS
 
-__all__ = ["GUARD_ACTIONS", "GuardedMotion", "guarded_motion"]
+__all__ = ["GUARD_ACTIONS", "GuardedMotion", "Halt", "guarded_motion", "halts_of"]
 
 #: What a guard does with a command, by its number in a run's table.
-GUARD_ACTIONS = ("passed", "slowed", "turned", "braked")
+GUARD_ACTIONS = ("passed", "slowed", "turned", "braked", "halted")
 #: Braking ends once the rims are so slow, m/s; the motors' lag leaves no way then.
 _REST_M_S = 1e-4
 
@@ -62,6 +63,47 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
         _resting_poses(poses, commands, braking),
         braking.keep_m,
     )
+
+
+@dataclass(frozen=True)
+class Halt:
+    """Why and when a guard has halted a robot whose sensing it could not trust."""
+
+    fault: str
+    """One of ``SENSING_FAULTS``."""
+    sensor: int
+    """Its number, from the left, from 1; 0: the odometry."""
+    start_s: float
+    """When it was first found."""
+    duration_s: float
+    """For how long in all."""
+
+    def __str__(self) -> str:
+        who = f"sensor {self.sensor} {self.fault}" if self.sensor else self.fault
+        return f"{who} from {self.start_s:.3g} s, for {self.duration_s:.3g} s"
+
+
+def halts_of(result: RunResult) -> list[Halt]:
+    """What was wrong with a guarded robot's sensing, by its beginning.
+
+    Args:
+        result: The run of one robot.
+
+    Returns:
+        One for each fault of each sensor; none where nothing was found.
+    """
+    columns, found = result.columns, []
+    if "sensing_fault" not in columns:
+        return []
+    kinds = np.rint(columns["sensing_fault"]).astype(np.int64)
+    sensors = np.rint(columns["faulty_sensor"]).astype(np.int64)
+    for kind, sensor in {*zip(kinds.tolist(), sensors.tolist(), strict=True)}:
+        if kind > 0:
+            ticks = np.flatnonzero((kinds == kind) & (sensors == sensor))
+            duration_s = ticks.size * result.scenario.tick_s
+            start_s = float(result.time[ticks[0]])
+            found.append(Halt(SENSING_FAULTS[kind], sensor, start_s, duration_s))
+    return sorted(found, key=lambda halt: halt.start_s)
 
 
 @njit(cache=True)

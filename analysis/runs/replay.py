@@ -32,7 +32,7 @@ from analysis.runs.scene import (
 from analysis.runs.tracked_bodies import tracked_bodies
 from diagrams import RunResult, Scenario
 from diagrams.bodies import RecordedPath
-from systems.safety.braking import BRAKED, PASSED, SLOWED, TURNED
+from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.sound.waveforms import SoundParameters
 
 __all__ = ["known_times", "record_run", "ring_at", "wheel_angles", "write_replay"]
@@ -351,7 +351,7 @@ def _record_guard(
 _EDGES = (
     ("passed", "empty", (PASSED,)),
     ("lessened", "echo", (SLOWED, TURNED)),
-    ("braked", "source", (BRAKED,)),
+    ("braked", "source", (BRAKED, HALTED)),
 )
 
 

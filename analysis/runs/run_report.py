@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.runs.guarded_motion import halts_of
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
@@ -53,7 +55,8 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
 def _outcome(result: RunResult) -> dict[str, Any]:
     hit = result.collision
     collision = hit and {"object": hit.object, "fault": hit.fault, "time_s": hit.time}
-    return {"cause": result.cause, "collision": collision}
+    halts = [asdict(halt) for halt in halts_of(result)]
+    return {"cause": result.cause, "collision": collision, "halts": halts}
 
 
 def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
@@ -154,6 +157,8 @@ def _robot_rows(
         + " at 95 %",
         "path length": _metres(metric("path_length_m")),
     }
+    if halts := halts_of(result):
+        rows["halted by the guard"] = "; ".join(map(str, halts))
     return {f"{prefix}{name}": value for name, value in rows.items()}
 
 

@@ -49,43 +49,43 @@ _flag_pointer = _pointing_at(types.boolean)
 
 
 @register_jitable
-def float_array(address: int, shape: Any) -> Any:
+def _float_array(address: int, shape: Any) -> Any:
     return carray(_float_pointer(address), shape)
 
 
 @register_jitable
-def single_array(address: int, shape: Any) -> Any:
+def _single_array(address: int, shape: Any) -> Any:
     return carray(_single_pointer(address), shape)
 
 
 @register_jitable
-def whole_array(address: int, shape: Any) -> Any:
+def _whole_array(address: int, shape: Any) -> Any:
     return carray(_whole_pointer(address), shape)
 
 
 @register_jitable
-def small_array(address: int, shape: Any) -> Any:
+def _small_array(address: int, shape: Any) -> Any:
     return carray(_small_pointer(address), shape)
 
 
 @register_jitable
-def large_array(address: int, shape: Any) -> Any:
+def _large_array(address: int, shape: Any) -> Any:
     return carray(_large_pointer(address), shape)
 
 
 @register_jitable
-def flag_array(address: int, shape: Any) -> Any:
+def _flag_array(address: int, shape: Any) -> Any:
     return carray(_flag_pointer(address), shape)
 
 
 #: For each type of number what makes an array of an address and a shape.
 ARRAYS: dict[Any, Callable[[int, Any], Any]] = {
-    np.dtype(np.float64): float_array,
-    np.dtype(np.float32): single_array,
-    np.dtype(np.int64): whole_array,
-    np.dtype(np.int32): small_array,
-    np.dtype(np.uint64): large_array,
-    np.dtype(np.bool_): flag_array,
+    np.dtype(np.float64): _float_array,
+    np.dtype(np.float32): _single_array,
+    np.dtype(np.int64): _whole_array,
+    np.dtype(np.int32): _small_array,
+    np.dtype(np.uint64): _large_array,
+    np.dtype(np.bool_): _flag_array,
 }
 
 
@@ -143,7 +143,7 @@ def run_parts(
             _called(parts[part, 0], tick, parts[part, 1])
         column = 0
         for k in range(len(logged)):
-            values = float_array(logged[k, 0], (logged[k, 1],))
+            values = _float_array(logged[k, 0], (logged[k, 1],))
             for j in range(len(values)):
                 log[tick, column] = values[j]
                 column += 1

@@ -14,7 +14,7 @@ from diagrams.bodies import Surroundings
 from diagrams.compiled.judge import contacts_of, judge_all
 from diagrams.compiled.loop_blocks import LoopBlocks
 from diagrams.compiled.parts import PUBLISH
-from diagrams.compiled.source import Part, address_of, compiled_part
+from diagrams.compiled.source import LoopPart, address_of, compiled_part
 from diagrams.robot import seed_of
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import GIVES_UP, UNJUDGED, RunRules
@@ -77,7 +77,7 @@ class LoopPlan:
         """Of each robot what its judge said, and whether it has touched a body."""
         self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
         """Of each robot the judge's state."""
-        self._parts: list[tuple[Part, str]] = []
+        self._parts: list[tuple[LoopPart, str]] = []
         self._judge = 0
         self._filled: list[int] = []
         self._early: list[int] = []
@@ -99,7 +99,12 @@ class LoopPlan:
                 (self._plants if part == "plant" else self._late).append(number)
 
     def remember(self, name: str, function: HostFunction) -> None:
-        """Shows a robot's motion to a Python function at the begin of every tick."""
+        """Shows a robot's motion to a Python function at the begin of every tick.
+
+        Args:
+            name: Of the robot.
+            function: Takes its pose and velocity.
+        """
         motion = tuple(map(self._robots[name].view, ("pose_WB", "velocity_WB")))
         step = host_step(function, sum(map(len, motion)), 0, 1)
         self._filled.append(self._step(step, motion, ()))
@@ -110,7 +115,7 @@ class LoopPlan:
         """The part of a block."""
         if step.host is not None:
             self.hosts.append(step.host)
-        part, state = Part(), np.array(step.state, dtype=float)
+        part, state = LoopPart(), np.array(step.state, dtype=float)
         values = {"state": state, "inputs": inputs, "outputs": outputs}
         values["numbers"] = step.numbers
         lines = [f"{name} = {part.expression(it)}" for name, it in values.items()]
@@ -123,7 +128,12 @@ class LoopPlan:
         return self._add(part, lines)
 
     def surround(self, name: str, around: Surroundings) -> None:
-        """What a robot takes from the world in every tick."""
+        """What a robot takes from the world in every tick.
+
+        Args:
+            name: Of the robot.
+            around: All that it can see and hit.
+        """
         robot, robots, times = self._robots[name], self._robots, self._times
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
@@ -144,13 +154,18 @@ class LoopPlan:
 
     def _fill_by(self, function: Any, *values: Any) -> None:
         """Fills a port by a function of values and the tick."""
-        part = Part()
+        part = LoopPart()
         arguments = ", ".join(map(part.expression, values))
         line = f"{part.name(function)}({arguments}, tick)"
         self._filled.append(self._add(part, [line]))
 
     def judge(self, rules: RunRules, tick_s: float) -> None:
-        """Judges all robots at the end of a tick."""
+        """Judges all robots at the end of a tick.
+
+        Args:
+            rules: When the run ends.
+            tick_s: s.
+        """
         robots = self._robots
         watched = tuple(
             (*map(robot.view, _WATCHED), np.array(robot.facts.initial_pose))
@@ -160,12 +175,12 @@ class LoopPlan:
             contacts_of(rules.robots[name], [*robots], self._times) for name in robots
         )
         values = tick_s, watched, contacts, self.judged, self.ended
-        part = Part()
+        part = LoopPart()
         arguments = ", ".join(map(part.expression, values))
         lines = [f"if {part.name(judge_all)}(tick, {arguments}):", "    return 1"]
         self._judge = self._add(part, lines)
 
-    def _add(self, part: Part, lines: Sequence[str]) -> int:
+    def _add(self, part: LoopPart, lines: Sequence[str]) -> int:
         self._parts.append((part, part.source(lines)))
         return len(self._parts) - 1
 

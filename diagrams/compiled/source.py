@@ -34,7 +34,7 @@ from systems.framework.compiling import cache_folder
 from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
 
-__all__ = ["Part", "address_of", "compiled_part"]
+__all__ = ["LoopPart", "address_of", "compiled_part"]
 
 #: Generated files that were not used for so long are removed, s.
 _KEPT_S = 30 * 86_400.0
@@ -43,7 +43,7 @@ _LOGGER = logging.getLogger("phonotaxis")
 _COUNT = count()
 
 
-class Part:
+class LoopPart:
     """A function of the tick, as source and the values that it takes.
 
     Values get into the source by ``expression``, names by ``name``.
@@ -172,7 +172,7 @@ def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
     """The function ``part`` of generated source, compiled or loaded.
 
     Args:
-        source: Of ``Part.source``.
+        source: Of ``LoopPart.source``.
         names: What its names stand for.
 
     Returns:

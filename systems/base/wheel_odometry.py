@@ -14,7 +14,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Parameters
+from systems.framework.parameters import Duration, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
@@ -36,6 +36,8 @@ class OdometryParameters(Parameters):
     """Encoder pulses a wheel revolution."""
     rounding: bool = True
     """Angles in whole pulses; off: exact angles, as linearisation needs."""
+    lost_at_s: Duration | None = None
+    """A fault: then it begins anew, at (0, 0, 0), s; none: never."""
 
 
 @register_jitable
@@ -82,13 +84,15 @@ class OdometryNumbers(NamedTuple):
     pulses: int
     """A revolution; 0 where angles are not rounded."""
     tick_s: float
+    lost_tick: int = -1
+    """At which the pose is lost; -1: never."""
 
 
 def odometry_step(tick, state, inputs, outputs, numbers):
     """Pose and velocity of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
-        tick: Not used.
+        tick: Its number.
         state: Pose, m and rad, and left and right encoder angle, rad, at the last tick.
         inputs: As the input ports.
         outputs: As the output ports.
@@ -99,6 +103,8 @@ def odometry_step(tick, state, inputs, outputs, numbers):
         left = encoder_angle(left, numbers.pulses)
         right = encoder_angle(right, numbers.pulses)
     then = state[0], state[1], state[2]
+    if tick == numbers.lost_tick:
+        then = 0.0 * then[0], 0.0 * then[1], 0.0 * then[2]
     turned = left - state[3], right - state[4]
     now = advance_pose(then, turned, numbers.robot)
     pose, velocity = outputs
@@ -177,7 +183,9 @@ def WheelOdometry_(T):
             pulses = 0
             if self._odometry.rounding:
                 pulses = self._odometry.pulses_per_revolution
-            numbers = OdometryNumbers(self._robot, pulses, tick_s)
+            lost_s = self._odometry.lost_at_s
+            lost_tick = -1 if lost_s is None else round(lost_s / tick_s)
+            numbers = OdometryNumbers(self._robot, pulses, tick_s, lost_tick)
             self.declare_step(
                 T,
                 Step(odometry_step, numbers, [*self._initial_pose, 0.0, 0.0]),

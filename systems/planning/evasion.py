@@ -14,7 +14,7 @@ from systems.planning.turning import wrapped
 __all__ = ["EvasionNumbers", "choose_motion", "find_threats", "risk_of", "watch_of"]
 
 #: What is looked ahead, s, and in which steps.
-_AHEAD_S, _STEP_S = 3.0, 0.15
+_AHEAD_S, _STEP_S = 4.0, 0.2
 #: Nearer to the body than the first a particle counts full, up to the second less, m.
 _HIT_M, _NEAR_M = 0.15, 0.43
 #: What is far ahead counts less, by this share at the end.
@@ -35,9 +35,11 @@ _SPEEDS = (-0.6, -0.4, -0.2, 0.0, 0.15, 0.3, 0.45, 0.62)
 _ASIDE = (0.0, 0.5, -0.5, 1.0, -1.0)
 _GAZE_RAD = 0.8
 #: A guard that reckons with moving bodies lets a robot move on beside one within this
-#: of its rim, m, only if it gets away by this share of its way; else it may turn
-#: slowly, rad/s. So much of a body counts as one.
-_BESIDE_M, _WITHDRAWS, _SLOW_RAD_S, _BODY_SHARE = 0.3, 0.2, 0.3, 0.3
+#: of its rim, m, and of what it goes in so long, s, a turn taken for so much of a way,
+#: m, only if it gets away by this share of its way.
+_BESIDE_M, _BESIDE_S, _BESIDE_TURN_M, _WITHDRAWS = 0.09, 0.4, 0.2, 0.2
+#: Else it may turn slowly, rad/s. So much of a body counts as one.
+_SLOW_RAD_S, _BODY_SHARE = 0.3, 0.3
 #: Price of a heading that is not the wanted one, m/s a rad.
 _TURN_PRICE = 0.1
 #: The guard lets the robot not go on to within this of its heading, rad.
@@ -78,12 +80,14 @@ def _is_held(
     c, s = math.cos(theta), math.sin(theta)
     radius = math.hypot(numbers.half_size[0], numbers.half_size[1])
     near, moved = 0.0, _WITHDRAWS * max(abs(speed), radius * abs(omega))
+    beside = radius + _BESIDE_M
+    beside += _BESIDE_S * (abs(speed) + _BESIDE_TURN_M * abs(omega))
     for n in range(count):
         dx = bodies[n, X] + time * bodies[n, VX] - x
         dy = bodies[n, Y] + time * bodies[n, VY] - y
         distance = math.hypot(dx, dy)
         withdraws = -speed * (c * dx + s * dy) >= moved * distance
-        if distance < radius + _BESIDE_M and not withdraws:
+        if distance < beside and not withdraws:
             near += bodies[n, WEIGHT]
     return near > _BODY_SHARE
 
@@ -242,7 +246,7 @@ def choose_motion(
 ) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """The speed and heading of the least price.
 
-    The price is that of not going as wanted, of what comes near within 3 s, and of what
+    The price is that of not going as wanted, of what comes near within 4 s, and of what
     has to be watched and is not.
 
     Args:

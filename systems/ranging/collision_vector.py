@@ -317,7 +317,8 @@ def collision_step(tick, state, inputs, outputs, numbers):
         for k in range(len(points)):
             ticks = round(float_of(ages[k]) / numbers.tick_s)
             if ticks > 0:
-                at = 3 * (ticks - 1)
+                # A sensor that has failed is older than all poses that are kept.
+                at = min(3 * (ticks - 1), len(state) - 3)
                 then = state[at], state[at + 1], state[at + 2]
                 now = pose[0], pose[1], pose[2]
                 points[k] = carried_point(points[k], then, now, numbers.control_point_m)

@@ -35,6 +35,13 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import TICK_S, whole
 from systems.framework.step_block import RunFacts, Step
+from systems.ranging.sensor_faults import (
+    BLIND,
+    FROZEN,
+    NOISY,
+    SILENT,
+    SensorFaultParameters,
+)
 from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
@@ -53,6 +60,11 @@ NEIGHBOURS_DEG = 90.0
 
 _Axes = Annotated[tuple[Angle, ...], Strict(False), Field(min_length=1, max_length=360)]
 _Places = Annotated[tuple[Point, ...], Strict(False), Field(max_length=360)]
+_Faults = Annotated[
+    tuple[SensorFaultParameters, ...], Strict(False), Field(max_length=360)
+]
+#: Standard deviation of what a noisy sensor's ranges are off besides, m.
+_NOISY_M = 0.3
 
 
 class UltrasonicParameters(Parameters):
@@ -81,6 +93,8 @@ class UltrasonicParameters(Parameters):
     """All sensors at once, or one after the other, a period each."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
     """Speed by which the sensors turn time into range, m/s; none: the true one."""
+    faults: _Faults = ()
+    """Sensors that fail."""
 
     @model_validator(mode="before")
     @classmethod
@@ -110,6 +124,12 @@ class UltrasonicParameters(Parameters):
                 f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or more; "
                 "end before the first direction comes again",
             )
+        for number, fault in enumerate(self.faults):
+            if fault.sensor > self.count:
+                raise InputError(
+                    f"faults.{number}.sensor",
+                    f"{fault.sensor} is none of {self.count} sensors; lower it",
+                )
         if len(self.positions_m) not in (0, 1, self.count):
             raise InputError(
                 "positions_m",
@@ -199,6 +219,14 @@ class UltrasonicParameters(Parameters):
         stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
         limits = self.minimum_range_m, self.maximum_range_m
         return stretch, self.noise_m, self.least_luck, *limits
+
+    def fault_ticks(self, tick_s: float) -> NDArray[np.int64]:
+        """(n, 2) kind of each sensor's fault, 0 none, and tick of its begin."""
+        ticks = np.zeros((self.count, 2), dtype=np.int64)
+        for fault in self.faults:
+            begin = round(fault.start_s / tick_s)
+            ticks[fault.sensor - 1] = fault.number, begin
+        return ticks
 
     @cached_property
     def least_luck(self) -> float:
@@ -323,6 +351,8 @@ class UltrasonicNumbers(NamedTuple):
     round: int
     """Ticks of a round."""
     tick_s: float
+    faults: NDArray[np.int64]
+    """As of ``UltrasonicParameters.fault_ticks``."""
 
 
 # Not compiled by itself: a cached function does not notice changes in other files.
@@ -349,7 +379,18 @@ def ultrasonic_step(
     new_ranges, new_echo = _measured_ranges(true, normals, *numbers.errors)
     for k in range(count):
         age = (tick - numbers.turns[k]) % numbers.round
-        if age == 0:
+        kind, begin = numbers.faults[k]
+        late = tick - begin if kind > 0 else -1
+        if late >= 0 and kind == SILENT:
+            # As old as its last reading before.
+            age = late + 1 + (begin - 1 - numbers.turns[k]) % numbers.round
+        elif late >= 0 and kind == BLIND:
+            new_ranges[k], new_echo[k] = numbers.errors[4], 0.0
+        elif late >= 0 and kind == NOISY:
+            low, high = numbers.errors[3], numbers.errors[4]
+            range_ = new_ranges[k] + _NOISY_M * float(normals[0, k])
+            new_ranges[k] = min(max(range_, low), high)
+        if age == 0 and (late < 0 or kind != FROZEN):
             state[k], state[count + k] = new_ranges[k], new_echo[k]
         ranges[k], echo[k] = state[k], state[count + k]
         ages[k] = age * numbers.tick_s
@@ -463,6 +504,7 @@ class UltrasonicArray(LeafSystem):
             sensors.turns(self._tick_s),
             self._round,
             self._tick_s,
+            sensors.fault_ticks(self._tick_s),
         )
 
     def step_for(self, run: RunFacts) -> Step:

@@ -4,6 +4,7 @@ from systems.safety.braking import can_be_braked
 from systems.safety.free_space import FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap, FreeSpaceParameters
 from systems.safety.motion_guard import GuardParameters, MotionGuard
+from systems.safety.sensing_monitor import SensingMonitor
 
 __all__ = [
     "FreeSpace",
@@ -11,5 +12,6 @@ __all__ = [
     "FreeSpaceParameters",
     "GuardParameters",
     "MotionGuard",
+    "SensingMonitor",
     "can_be_braked",
 ]

@@ -19,6 +19,7 @@ from systems.safety.free_space import (
 
 __all__ = [
     "BRAKED",
+    "HALTED",
     "PASSED",
     "SLOWED",
     "TURNED",
@@ -32,7 +33,7 @@ __all__ = [
 ]
 
 #: What was done with a wish.
-PASSED, SLOWED, TURNED, BRAKED = range(4)
+PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
 #: Shares of a wish that are tried, from all of it on.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 

@@ -31,6 +31,7 @@ from systems.framework.parameters import (
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.safety.braking import (
+    HALTED,
     PASSED,
     BrakingNumbers,
     chosen,
@@ -95,7 +96,8 @@ def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untype
         tick: Number of the tick.
         state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; what
             was done; modelled wheel speeds, rad/s.
-        inputs: What the law commands, and the pose by the odometry.
+        inputs: What the law commands, the pose by the odometry, and what is wrong with
+            the sensing.
         outputs: Left as they are: they are state.
         numbers: ``GuardNumbers``.
     """
@@ -105,11 +107,14 @@ def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untype
     before = state[0], state[1]
     v_WP = numbers.velocity(before, command, theta, robot, tick_s)
     v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
-    wish = limited_wheel_speeds(v, omega, robot)
+    trusted = inputs[2][0] < 0.5
+    wish = limited_wheel_speeds(v, omega, robot) if trusted else (0.0, 0.0)
     here = pose[0], pose[1], pose[2]
     speeds = state[8], state[9]
     danger = danger_of(space, tick * tick_s, here, numbers.reach, braking)
     done, wheels = chosen(here, speeds, wish, (state[2], state[3]), danger, braking)
+    if not trusted:
+        done = HALTED
     if done != PASSED:
         radius, separation = robot.wheel_radius_m, robot.wheel_separation_m
         v = 0.5 * radius * (wheels[0] + wheels[1])
@@ -146,6 +151,7 @@ class MotionGuard(LeafSystem):
         input_ports:
         - acceleration_W [m/s^2]
         - pose_WB_estimated [m, m, rad]
+        - sensing_fault [number of what is wrong, and of the sensor, from 1]
         - free_space [FreeSpace]
         output_ports:
         - wheel_speeds [rad/s, left and right]
@@ -162,9 +168,13 @@ class MotionGuard(LeafSystem):
     With ``obstacle_speed_m_s`` the same holds of what is in the sensors' view now and
     may come nearer at that speed, unless the robot withdraws from it.
 
-    ``guard_report``: what was done, 0 passed, 1 slowed, 2 turned, 3 braked; by how
-    much the disc is farther from what is not free than it has to be; the way in which
-    the robot can stop; and the first of these for what is in view.
+    While something is wrong with the sensing, it brakes to rest, whatever the law
+    commands.
+
+    ``guard_report``: what was done, 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted
+    for a fault of the sensing; by how much the disc is farther from what is not free
+    than it has to be; the way in which the robot can stop; and the first of these for
+    what is in view.
 
     Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
     speeds that follow by the motors' lag, a group each. Rate and latency are those of
@@ -227,7 +237,11 @@ class MotionGuard(LeafSystem):
         )
         self._inputs = [
             self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in ((command, 2), ("pose_WB_estimated", 3))
+            for name, size in (
+                (command, 2),
+                ("pose_WB_estimated", 3),
+                ("sensing_fault", 2),
+            )
         ]
         self._free_space = self.DeclareAbstractInputPort(
             name="free_space", model_value=Value(object())

@@ -14,7 +14,7 @@ import pytest
 
 from diagrams.compiled import source as compiled_source
 from diagrams.compiled.parts import run_parts
-from diagrams.compiled.source import Part, address_of, compiled_part
+from diagrams.compiled.source import LoopPart, address_of, compiled_part
 from systems.framework.input_error import InputError
 from systems.laws.impedance import AttractionParameters
 
@@ -39,7 +39,7 @@ def called(part, *lines, tick=0):
 
 def made(function=doubled):
     """A part that returns twice three, and its line."""
-    part = Part()
+    part = LoopPart()
     return part, f"return int({part.name(function)}({part.expression(3.0)}))"
 
 
@@ -52,7 +52,7 @@ def folder(tmp_path, monkeypatch):
 
 
 def test_values_come_back_from_their_expression():
-    part, array, found = Part(), np.arange(6.0).reshape(2, 3), np.zeros(16)
+    part, array, found = LoopPart(), np.arange(6.0).reshape(2, 3), np.zeros(16)
     vector, few = np.array([1.5, 2.5]), np.array([1.5], dtype=np.float32)
     rest: Any = (
         7,
@@ -92,11 +92,11 @@ def test_values_come_back_from_their_expression():
 @pytest.mark.parametrize("value", [b"text", np.zeros(2, dtype=complex), {1: 2}])
 def test_what_is_no_number_is_refused(value):
     with pytest.raises(InputError, match="nothing that compiled loops take"):
-        Part().expression((1.0, value))
+        LoopPart().expression((1.0, value))
 
 
 def test_arrays_stand_there_once():
-    part, port = Part(), np.zeros(2)
+    part, port = LoopPart(), np.zeros(2)
     assert part.expression(port) == part.expression(port)
     assert part.expression(port) != part.expression(np.zeros(2))
 
@@ -106,11 +106,11 @@ def test_parts_are_called_in_order_and_end_the_run():
     counts, seen = np.zeros(3), np.zeros(3)
 
     def adding(to):
-        part = Part()
+        part = LoopPart()
         line = f"{part.expression(counts)}[{to}] += 1.0 if tick >= 0 else 100.0"
         return part, compiled(part, line)
 
-    judge = Part()
+    judge = LoopPart()
     ends = f"if {judge.expression(counts)}[0] > 3.5:"
     parts = [adding(0), (judge, compiled(judge, ends, "    return 1")), adding(1)]
     words = [part.words() for part, _ in parts]
@@ -132,7 +132,7 @@ def test_parts_are_called_in_order_and_end_the_run():
 
 
 def test_what_a_part_raises_ends_the_loop():
-    part = Part()
+    part = LoopPart()
     function, words = compiled(part, "1 // (tick - 1)"), part.words()
     calls = np.array([(address_of(function), words.ctypes.data)])
     none, logged = np.empty(0, dtype=np.int64), np.empty((0, 2), dtype=np.int64)

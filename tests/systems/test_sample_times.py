@@ -18,6 +18,7 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "IdealSourceSensor": {},
     "MicArray": {},
     "MotionGuard": {},
+    "SensingMonitor": {},
     "SoundEmitter": {},
     "SourceTracker": {},
     "TDOAEstimator": {},

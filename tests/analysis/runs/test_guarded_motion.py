@@ -9,6 +9,7 @@ import pytest
 
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
 from analysis.runs.known_space import known_space
+from systems.safety.braking import HALTED
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +25,8 @@ def test_the_disc_holds_the_body_and_the_margin(motion):
 
 def test_actions_are_those_of_the_table(guarded_run, motion):
     assert np.array_equal(motion.actions, guarded_run.columns["guard_action"])
-    assert set(motion.actions.tolist()) == set(range(len(GUARD_ACTIONS)))
+    assert set(motion.actions.tolist()) == set(range(HALTED))
+    assert GUARD_ACTIONS[HALTED] == "halted"
 
 
 def test_a_robot_that_rests_stays(guarded_run, motion):

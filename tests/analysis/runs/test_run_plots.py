@@ -291,7 +291,7 @@ def test_panels_of_a_guard_show_its_columns(guarded_run):
         done = guarded_run.time[columns["guard_action"] == number]
         assert np.allclose(sorted(ends), done)
     named = [text.get_text() for text in actions.get_yticklabels()]
-    assert named == ["passed", "slowed", "turned", "braked"]
+    assert named == ["passed", "slowed", "turned", "braked", "halted"]
     spare = _line(distances, "to spare").get_ydata()
     assert np.array_equal(spare, columns["guard_distance"])
     way = _line(distances, "needed to stop").get_ydata()

@@ -122,6 +122,7 @@ FIELDS = {
     "RoomParameters.reverberation_time_s": (1e-3, 20.0),
     "RoomParameters.absorption": (ABOVE_0, 1.0),
     "RoomParameters.maximum_order": (1, 150),
+    "SensorFaultParameters.sensor": (1, 360),
 }
 #: Least and greatest length of texts and lists.
 LENGTHS = {
@@ -130,6 +131,7 @@ LENGTHS = {
     "Scenario.blocks": (None, 32),
     "UltrasonicParameters.axes_deg": (1, 360),
     "UltrasonicParameters.positions_m": (None, 360),
+    "UltrasonicParameters.faults": (None, 360),
     "Scenario.obstacles": (None, 100),
     "Scenario.robots": (None, 16),
     "Scenario.sources": (None, 16),
@@ -159,6 +161,9 @@ DEFAULTS = {
     "GuardParameters.margin_m": 0.012,
     "GuardParameters.least_margin_m": 0.009,
     "GuardParameters.slow_turn_rad_s": 0.3,
+    "SensorFaultParameters.sensor": 1,
+    "SensorFaultParameters.kind": "silent",
+    "SensorFaultParameters.start_s": 0.0,
 }
 
 

@@ -12,6 +12,7 @@ import pytest
 from diagrams import InputError, Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelSpeedCommand
 from systems.framework.step_block import RunFacts
+from systems.safety.braking import HALTED
 from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
 from systems.safety.free_space_map import FreeSpaceParameters, body_radius, map_step
 from systems.safety.motion_guard import GuardParameters
@@ -64,12 +65,19 @@ def known_space(radius: float = 3.0) -> Any:
     return space
 
 
-def guarded(bench: Any, space: Any, acceleration: Any, **fields: Any) -> Any:
+def guarded(
+    bench: Any, space: Any, acceleration: Any, fault: float = 0.0, **fields: Any
+) -> Any:
     """The guard's state after a tick: v_P, wheels, report, modelled wheels."""
     from pydrake.common.value import Value
 
     guard = MotionGuard(parameters=GuardParameters(**fields))
-    made = bench(guard, acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3])
+    made = bench(
+        guard,
+        acceleration_W=acceleration,
+        pose_WB_estimated=[0, 0, 0.3],
+        sensing_fault=[fault, 0.0],
+    )
     guard.GetInputPort("free_space").FixValue(made.context, Value[object](space))
     return made.updated()
 
@@ -96,6 +104,11 @@ def test_what_it_reports(bench):
     # At 0.4 m/s of the faster wheel it stops within v^2/2a + v (lag + tick).
     state = guarded(bench, known_space(), (16.0 * math.cos(0.3), 16.0 * math.sin(0.3)))
     assert state[6] == pytest.approx(0.4**2 / 3.0 + 0.4 * 0.075)
+
+
+def test_what_is_wrong_with_the_sensing_halts_it(bench):
+    state = guarded(bench, known_space(), (4.0, 1.0), fault=2.0)
+    np.testing.assert_array_equal(state[:5], [0.0, 0.0, 0.0, 0.0, HALTED])
 
 
 def test_what_it_changes_the_virtual_mass_moves_by(bench):
