@@ -174,8 +174,9 @@ def can_be_braked(
 
     It may if on the way to rest, braking after that tick, the axle keeps off by
     ``keep_m`` what is not free. Where it is nearer now, it may not come nearer (but for
-    ``_SLACK_M``, so that it can drive along an edge), nor below ``least_m``; where it
-    is nearer than that, the way has to lead away.
+    ``_SLACK_M``, so that it can drive along an edge), nor below ``least_m``. Where it
+    is nearer than that, as where cells beside it are forgotten, the way has to lead
+    away, and no point of a cell so near may come nearer.
 
     Of what is in view the same holds after each time t with ``obstacle_speed_m_s`` t
     more; or the robot withdraws from it.
@@ -192,7 +193,8 @@ def can_be_braked(
     """
     radius, lag = numbers.wheel_radius_m, numbers.motor_lag_s
     now, keep, least = danger.distance_m, numbers.keep_m, numbers.least_m
-    need = max(min(keep, now - _SLACK_M), least) if now >= least else now
+    near = now < least
+    need = now if near else max(min(keep, now - _SLACK_M), least)
     # A robot that turns in its place stays within its disc.
     in_place = (
         _ahead(commanded, radius) < _IN_PLACE_M_S
@@ -203,28 +205,61 @@ def can_be_braked(
     turn = abs(commanded[1] - commanded[0]) * radius / numbers.wheel_separation_m
     slow = in_place and turn <= numbers.slow_turn_rad_s
     moving = numbers.obstacle_speed_m_s > 0.0 and not slow
-    begin_x, begin_y, begin_theta = pose[0], pose[1], pose[2]
+    begin = pose
     part_s = numbers.tick_s / numbers.parts
     parts = 0
     while True:
         pose, speeds = roll_on(pose, speeds, commanded, part_s, numbers)
         parts += 1
         x, y = pose[0], pose[1]
-        way = math.hypot(x - begin_x, y - begin_y)
+        way = math.hypot(x - begin[0], y - begin[1])
         reached = nearest_cell(danger.corners, danger.corner_count, danger.cell_m, x, y)
-        if reached < need and not in_place:
+        if not in_place and (
+            reached < need or (near and _enters(begin, pose, danger, least))
+        ):
             return False
         # Of the axle, or of the disc's rim by the turn.
-        moved = max(way, keep * abs(pose[2] - begin_theta))
+        moved = max(way, keep * abs(pose[2] - begin[2]))
         if moving and not _keeps_off_moving(
             (x, y), parts * part_s, moved, danger, numbers
         ):
             return False
         fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
         if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest * lag < _REST_M:
-            return in_place or now >= least or reached >= now + 0.05 * way
+            return in_place or not near or reached >= now + 0.05 * way
         if parts % numbers.parts == 0:
             commanded = braked(commanded, numbers)
+
+
+@njit(cache=True)
+def _enters(
+    begin: Any, pose: Any, danger: Danger, radius: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a disc has come nearer to a point of a cell that is not free.
+
+    What the disc holds at the begin is free of obstacles, whatever is remembered of it;
+    so are points farther from its middle now than then: those on one side of a line. A
+    cell is, if its corners are.
+
+    Args:
+        begin: (x, y) of its middle at the begin, m.
+        pose: The same now.
+        danger: Has the cells.
+        radius: Of the disc, m.
+    """
+    x, y, cell = pose[0], pose[1], danger.cell_m
+    back_x, back_y = begin[0] - x, begin[1] - y
+    line = 0.5 * (back_x * back_x + back_y * back_y)
+    for k in range(danger.corner_count):
+        u, v = danger.corners[k, 0] - x, danger.corners[k, 1] - y
+        du, dv = max(u, 0.0, -u - cell), max(v, 0.0, -v - cell)
+        if du * du + dv * dv < radius * radius:
+            # The corner that is farthest ahead.
+            ahead = back_x * (u + (cell if back_x < 0.0 else 0.0))
+            ahead += back_y * (v + (cell if back_y < 0.0 else 0.0))
+            if ahead < line - 1e-12:
+                return True
+    return False
 
 
 @njit(cache=True)

@@ -214,6 +214,16 @@ def test_a4_broken_by_wheels_that_are_not_as_large_as_is_believed():
     assert not collides(37, slip | known)
 
 
+@pytest.mark.slow
+def test_a4_what_is_forgotten_beside_it_is_not_driven_into():
+    """A falsification's find: ways led away from the nearest forgotten cell, and on."""
+    trial = draw_trial(11, 2154)
+    assert trial.variant == "slip apart"
+    outcome = run_trial(trial)
+    assert not outcome.collided
+    assert outcome.disc_m > 0.03
+
+
 # A5: braking is never weaker than modelled.
 
 

@@ -229,6 +229,41 @@ def test_the_three_zones(beyond_keep, way, may):
     assert can_be_braked(*args) == may
 
 
+def test_away_from_one_cell_it_may_not_go_towards_another():
+    """What is forgotten beside it is no leave to drive to what is ahead."""
+    behind, ahead = (-0.45, -0.02), (0.43, -0.02)
+    here, rest, wish = (0.0, 0.0, 0.0), (0.0, 0.0), straight(0.03)
+    assert can_be_braked(here, rest, wish, danger([behind]), NUMBERS)
+    both = danger([behind, ahead])
+    assert not can_be_braked(here, rest, wish, both, NUMBERS)
+
+
+def test_where_cells_are_too_near_no_point_of_one_comes_nearer():
+    """Against points of the cells, and places in steps of a tick."""
+    draw, passed = np.random.default_rng(3), 0
+    grid = np.stack(np.meshgrid(*2 * [np.linspace(0.0, 0.05, 6)]), axis=-1)
+    for _ in range(2_000):
+        far, bearing = draw.uniform(0.36, 0.6, 4), draw.uniform(0.0, math.tau, 4)
+        corners = np.stack([far * np.cos(bearing), far * np.sin(bearing)], axis=1)
+        at_hand = danger(corners)
+        wish = draw.uniform(-8.0, 8.0, 2)
+        rest: Any = (0.0, 0.0)
+        if at_hand.distance_m >= NUMBERS.least_m or not can_be_braked(
+            (0.0, 0.0, 0.0), rest, tuple(wish), at_hand, NUMBERS
+        ):
+            continue
+        passed += 1
+        points = (corners[:, None, None] + grid).reshape(-1, 2)
+        pose, speeds, commanded = (0.0, 0.0, 0.0), rest, tuple(wish)
+        for _ in range(60):
+            pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
+            commanded = braked(commanded, NUMBERS)
+            now = np.hypot(*(points - pose[:2]).T)
+            nearer = now < np.hypot(*points.T) - 2e-4
+            assert not np.any(nearer & (now < NUMBERS.least_m - 2e-4))
+    assert passed > 100
+
+
 def test_turning_in_place_always_passes():
     for beyond in (0.1, 0.0, -0.002, -0.01, -0.4):
         at_hand = wall_at(NUMBERS.keep_m + beyond)
