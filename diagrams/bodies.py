@@ -120,11 +120,16 @@ class Surroundings:
     bodies: Mapping[str, Body]
     """By name: obstacles, other robots, other sources, and last what it follows."""
     target: str
-    """Name of the source, or of the robot with a loudspeaker, that it follows."""
+    """Name of the source, or of the robot with a loudspeaker, that it follows; or of
+    its goal."""
+    goal: Path | None = None
+    """A place that it drives to in the place of following a body."""
 
     @property
     def followed(self) -> Body:
-        """What is followed."""
+        """What is followed; a goal has no extent, and cannot be hit."""
+        if self.goal is not None:
+            return Body(self.goal, (0.0, 0.0))
         return self.bodies[self.target]
 
     @cached_property

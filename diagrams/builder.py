@@ -56,7 +56,8 @@ class SoundFollower:
         """By part: the only robot's, those of its source, and ``obstacles``."""
         robot = self.only
         target = self.scenario.target(next(iter(self.robots)))
-        world = {**self.sources[target].blocks, "obstacles": self.obstacles}
+        sources = self.sources[target].blocks if target in self.sources else {}
+        world = {**sources, "obstacles": self.obstacles}
         return {**world, **robot.blocks}
 
     @property
@@ -102,7 +103,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
     """
     builder = DiagramBuilder()
     robots, audible = scenario.all_robots, set()
-    if any(robot.hearing == "audio" for robot in robots.values()):
+    if any(robot.listens for robot in robots.values()):
         audible = set(scenario.sounds())
     sources = {
         name: make_source(scenario, name, source, audible=name in audible)
@@ -116,6 +117,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
             _own(scenario, name, audible=name in audible),
             name,
             bodies=len(scenario.surroundings(name).obstacles),
+            robots=scenario.robots_seen(name),
             others=[each for each in scenario.sounds() if each != target],
             listeners_frame_s=scenario.longest_frame_s,
             log=log,

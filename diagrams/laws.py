@@ -10,6 +10,7 @@ from pydrake.systems.framework import LeafSystem
 
 from diagrams.own_code import asked_for, import_own, made
 from diagrams.own_laws import checked_law, try_law
+from diagrams.routed_robot import make_trajectory_controller
 from diagrams.scenario import Scenario
 from systems import (
     RadialLawController,
@@ -76,6 +77,8 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "seed": seed,
     }
     name = scenario.law
+    if name in LAWS and LAWS[name].on_route:
+        return make_trajectory_controller(scenario)
     if name in LAWS:
         law = LAWS[name]
         if law.controller is not None and law.plans:

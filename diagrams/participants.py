@@ -21,7 +21,9 @@ from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowingParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
+from systems.ranging.ideal_object_sensor import ObjectSensorParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.routes.global_planner import RouteParameters
 from systems.safety.free_space_map import FreeSpaceParameters
 from systems.safety.motion_guard import GuardParameters
 from systems.sound.adc import MicArrayParameters, channel_skew
@@ -80,6 +82,9 @@ class FollowerParameters(Parameters):
     robot: RobotParameters = RobotParameters()
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
+    route: RouteParameters | None = None
+    """A goal to drive to on a planned way, in the place of a sound to follow."""
+    objects: ObjectSensorParameters = ObjectSensorParameters()
     guard: GuardParameters | None = None
     """Keeps the robot in space that its sensors have seen free, whatever the law; null:
     nothing does, unless the law is ``guarded``."""
@@ -96,6 +101,16 @@ class FollowerParameters(Parameters):
         if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
             return GuardParameters(obstacle_speed_m_s=0.6)
         return self.guard
+
+    @property
+    def listens(self) -> bool:
+        """Whether it hears sound waves."""
+        return self.hearing == "audio" and self.route is None
+
+    @property
+    def follow_distance_m(self) -> float:
+        """Of P from what it follows, m; a goal is driven to."""
+        return self.attraction.follow_distance_m if self.route is None else 0.0
 
     @property
     def size(self) -> tuple[float, float]:

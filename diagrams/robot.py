@@ -16,6 +16,7 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSi
 from diagrams.laws import commanded, make_command, make_controller
 from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
+from diagrams.routed_robot import routed_blocks, trajectory_command
 from diagrams.scenario import ROBOT, SOURCE, Scenario
 from systems import (
     CollisionVector,
@@ -147,6 +148,7 @@ def robot_blocks(
     name: str = ROBOT,
     *,
     bodies: int = 0,
+    robots: Sequence[int] = (),
     others: Sequence[str] = (),
 ) -> dict[str, Any]:
     """The blocks of a robot by part, a user's own among them.
@@ -155,6 +157,7 @@ def robot_blocks(
         scenario: Of this robot alone, see ``Scenario.of_robot``.
         name: Of the robot; its random numbers depend on it.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        robots: Numbers of those that are robots.
         others: Names of the sources that are not followed.
 
     Returns:
@@ -165,8 +168,15 @@ def robot_blocks(
     """
     seed = seed_of(scenario, "controller", name)
     controller = make_controller(scenario, bodies=bodies, seed=seed)
-    _check_sensing(scenario, controller)
-    mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
+    if scenario.route is None:
+        sensing = _sound_and_ranges(scenario, name, controller, bodies, others)
+    else:
+        sensing = routed_blocks(
+            scenario,
+            bodies=bodies,
+            robots=robots,
+            seed=seed_of(scenario, "ideal_object_sensor", name),
+        )
     ours = [
         DiffDrivePlant(
             robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
@@ -177,9 +187,7 @@ def robot_blocks(
             initial_pose=scenario.start.pose,
             tick_s=scenario.tick_s,
         ),
-        *_hearing(scenario, name, others),
-        _tracker(scenario),
-        *_obstacle_sensing(scenario, name, bodies, mapped=mapped),
+        *sensing,
         controller,
         _driving(scenario, controller),
     ]
@@ -201,6 +209,7 @@ def make_robot(
     name: str = ROBOT,
     *,
     bodies: int = 0,
+    robots: Sequence[int] = (),
     others: Sequence[str] = (),
     listeners_frame_s: float = TICK_S,
     log: bool = False,
@@ -221,6 +230,7 @@ def make_robot(
         scenario: Of this robot alone, see ``Scenario.of_robot``.
         name: Of the robot; its random numbers depend on it.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        robots: Numbers of those that are robots.
         others: Names of the sources that are not followed.
         listeners_frame_s: Longest frame of those that hear its loudspeaker, s.
         log: Whether to log what its blocks name columns for, at every tick.
@@ -231,7 +241,7 @@ def make_robot(
     Raises:
         InputError: The law is not known, or a sound file cannot be played.
     """
-    by_part = robot_blocks(scenario, name, bodies=bodies, others=others)
+    by_part = robot_blocks(scenario, name, bodies=bodies, robots=robots, others=others)
     blocks, plant = [*by_part.values()], by_part["plant"]
     builder = DiagramBuilder()
     for block in blocks:
@@ -337,6 +347,23 @@ def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> Non
     for output, entry in (("pose_WB", "pose_WS"), ("velocity_WB", "v_WS")):
         builder.Connect(plant.GetOutputPort(output), emitter.GetInputPort(entry))
     builder.ExportOutput(emitter.GetOutputPort("emission"), "own_emission")
+
+
+def _sound_and_ranges(
+    scenario: Scenario,
+    name: str,
+    controller: Any,
+    bodies: int,
+    others: Sequence[str],
+) -> list[Any]:
+    """What a robot that follows a sound senses by."""
+    _check_sensing(scenario, controller)
+    mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
+    return [
+        *_hearing(scenario, name, others),
+        _tracker(scenario),
+        *_obstacle_sensing(scenario, name, bodies, mapped=mapped),
+    ]
 
 
 def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
@@ -459,6 +486,10 @@ def _obstacle_sensing(
 
 def _driving(scenario: Scenario, controller: Any) -> Any:
     """What drives the wheels as the law commands, as far as a guard lets it."""
+    if scenario.route is not None:
+        filtering = trajectory_command(scenario)
+        if filtering is not None:
+            return filtering
     if scenario.own_guard is None:
         return make_command(controller, scenario.robot, scenario.tick_s)
     return MotionGuard(

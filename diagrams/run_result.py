@@ -210,6 +210,8 @@ def _completed(
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
     columns["source_range_true"] = np.sqrt(dx * dx + dy * dy)
     columns["source_bearing_true"] = np.arctan2(left, ahead)
+    if "detected" not in columns:  # it drives to a goal
+        return columns
     x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
     heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5
     columns["source_bearing"] = np.where(heard, np.arctan2(y, x), np.nan)

@@ -11,6 +11,8 @@ from functools import cached_property
 from itertools import combinations
 from typing import Any, TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError, model_validator
 
 from diagrams.bodies import (
@@ -29,13 +31,17 @@ from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
+from systems.laws.catalogue import LAWS
 from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import rectangle_clearance
+from systems.world.paths import WaypointPath
 
-__all__ = ["ROBOT", "SOURCE", "Scenario"]
+__all__ = ["GOAL", "ROBOT", "SOURCE", "Scenario"]
 
 #: Names of the robot and of the source where there is one of each.
 ROBOT, SOURCE = "robot", "source"
+#: Name of what a robot with a route drives to.
+GOAL = "goal"
 
 _P = TypeVar("_P", bound=Parameters)
 
@@ -65,6 +71,8 @@ class Scenario(FollowerParameters, RunParameters):
     @cached_property
     def all_sources(self) -> dict[str, SourceParameters]:
         """Each source with all that it has, by name."""
+        if not self.sources and all(map(_has_goal, self.all_robots.values())):
+            return {}
         base = self.source.model_dump() | {"sound": self.sound.model_dump()}
         return {
             name: _validated(SourceParameters, joined(base, own), f"sources.{name}")
@@ -85,7 +93,9 @@ class Scenario(FollowerParameters, RunParameters):
         return max(robot.microphones.frame_s for robot in self.all_robots.values())
 
     def target(self, robot: str) -> str:
-        """Name of what a robot follows."""
+        """Name of what a robot follows, or of its goal."""
+        if _has_goal(self.all_robots[robot]):
+            return GOAL
         return self.all_robots[robot].follows or next(iter(self.all_sources))
 
     def of_robot(self, name: str) -> Scenario:
@@ -97,6 +107,8 @@ class Scenario(FollowerParameters, RunParameters):
             return self
         robot, target = self.all_robots[name], self.target(name)
         own = {key: getattr(robot, key) for key in FollowerParameters.model_fields}
+        if _has_goal(robot):
+            return self.model_copy(update=own | {"robots": {}, "sources": {}})
         if target in self.all_sources:
             fields = SourceRobotParameters.model_fields
             data = self.all_sources[target].model_dump(include=set(fields))
@@ -172,12 +184,29 @@ class Scenario(FollowerParameters, RunParameters):
         for name, source in self.all_sources.items():
             if source.body:
                 bodies[name] = Body(source.path(), (source.length_m, source.width_m))
+        route = self.all_robots[robot].route
+        if route is not None:
+            return Surroundings(bodies, GOAL, WaypointPath((route.goal_m,), speed=0.0))
         bodies[target] = bodies.pop(target)
         return Surroundings(bodies, target)
 
     def bodies(self) -> dict[str, Body]:
         """All that the first robot can hit, by name; what it follows is last."""
         return dict(self.surroundings().bodies)
+
+    def robots_seen(self, robot: str) -> tuple[int, ...]:
+        """Which of the bodies that a robot can see are robots, by their numbers."""
+        names = enumerate(self.surroundings(robot).obstacles)
+        return tuple(number for number, name in names if name in self.all_robots)
+
+    def mapped(self) -> NDArray[np.float64]:
+        """(n, 5) rectangles of what rests and is on the map, m and rad."""
+        still = [
+            Body(obstacle.path(), obstacle.size_m).rectangle(0.0)
+            for obstacle in self.obstacles
+            if obstacle.known and not obstacle.path().moves
+        ]
+        return np.reshape(still, (-1, 5))
 
     def guard_notes(self) -> list[str]:
         """What a user should know of what guards do not promise, a line a robot."""
@@ -204,7 +233,7 @@ class Scenario(FollowerParameters, RunParameters):
             moves: Whether that moves: the goal is as wide as the following band then.
         """
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
-        return self.attraction.follow_distance_m + margin
+        return self.follow_distance_m + margin
 
     @model_validator(mode="after")
     def _check_names(self) -> Scenario:
@@ -227,6 +256,8 @@ class Scenario(FollowerParameters, RunParameters):
     def _check_targets(self) -> Scenario:
         played, sources = self.sounds(), self.all_sources
         for name, robot in self.all_robots.items():
+            if _has_goal(robot):
+                continue
             field = f"robots.{name}.follows" if self.robots else "follows"
             target = self.target(name)
             if target not in played or target == name:
@@ -242,14 +273,14 @@ class Scenario(FollowerParameters, RunParameters):
                     f"is off, but robot {name!r} follows it; what is followed has a "
                     "body: set it to true",
                 )
-            if robot.tdoa.schedule_known and robot.hearing == "audio":
+            if robot.tdoa.schedule_known and robot.listens:
                 _check_schedule(field, target, played)
         self._check_heard(played)
         return self
 
     def _check_heard(self, played: Mapping[str, SoundParameters]) -> None:
         robots = self.all_robots
-        if any(robot.hearing == "audio" for robot in robots.values()):
+        if any(robot.listens for robot in robots.values()):
             return
         followed = {self.target(name) for name in robots}
         # The one source that is always there may be a body alone.
@@ -262,6 +293,26 @@ class Scenario(FollowerParameters, RunParameters):
                     "nobody hears its sound: no robot follows it, and none has hearing "
                     "'audio'; let one, or make it an obstacle",
                 )
+
+    @model_validator(mode="after")
+    def _check_goals(self) -> Scenario:
+        for prefix, robot in self._robot_fields():
+            law = LAWS.get(robot.law)
+            if _has_goal(robot):
+                if law is not None and not law.on_route:
+                    can = [name for name, each in LAWS.items() if each.on_route]
+                    raise InputError(
+                        f"{prefix}law",
+                        f"is {robot.law!r}, which follows a sound, but the robot has a "
+                        f"route; use {', '.join(can)}, or leave route out",
+                    )
+            elif law is not None and law.on_route:
+                raise InputError(
+                    f"{prefix}route",
+                    f"is missing, and law {robot.law!r} drives on one; set "
+                    f"{prefix}route.goal_m",
+                )
+        return self
 
     @model_validator(mode="after")
     def _check_rates(self) -> Scenario:
@@ -278,7 +329,7 @@ class Scenario(FollowerParameters, RunParameters):
                 (f"{prefix}microphones.frame_s", robot.microphones.frame_s),
                 (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
             ]
-            if self.room and robot.hearing == "audio":
+            if self.room and robot.listens:
                 self.room.update_frames(robot.microphones.frame_s)
         for field, period in periods:
             if not whole(period / tick):
@@ -374,6 +425,10 @@ class Scenario(FollowerParameters, RunParameters):
         """Each robot, with what its fields begin with in a message."""
         for name, robot in self.all_robots.items():
             yield (f"robots.{name}." if self.robots else ""), robot
+
+
+def _has_goal(robot: FollowerParameters) -> bool:
+    return robot.route is not None
 
 
 def _check_schedule(

@@ -118,7 +118,7 @@ def prepared_loop(scenario: Scenario) -> CompiledLoop:
     """
     loop = compile_loop(scenario, shared_blocks(scenario), RunRules(scenario))
     loop.prepare()
-    audio = any(robot.hearing == "audio" for robot in scenario.all_robots.values())
+    audio = any(robot.listens for robot in scenario.all_robots.values())
     kind = "compiled", *_kind(scenario)
     if audio and kind not in _LOADED:
         # What it calls in Python is compiled, too; errors are the run's to raise.

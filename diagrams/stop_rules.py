@@ -345,7 +345,7 @@ class RobotRules:
         self.numbers = RuleNumbers(
             scenario.stop,
             scenario.robot.control_point_m,
-            scenario.attraction.follow_distance_m,
+            scenario.follow_distance_m,
             scenario.goal_radius(moves=not self._source_rests),
             self._source_rests,
         )
@@ -376,7 +376,7 @@ class RobotRules:
                 self._state,
                 seen.pose,
                 seen.velocity,
-                places[self.surroundings.target],
+                self.surroundings.followed.path.pose(time),
                 self._valid,
                 seen.gives_up,
                 self.numbers,

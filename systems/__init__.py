@@ -42,12 +42,22 @@ from systems.laws.conventional_impedance_controller import (
 )
 from systems.laws.guarded_controller import GuardedController
 from systems.laws.radial_law_controller import RadialLawController, RadialLawController_
+from systems.laws.trajectory.impedance_adaptation import ImpedanceAdaptation
+from systems.laws.trajectory.reference_model import ReferenceModel
+from systems.laws.trajectory.trajectory_impedance_controller import (
+    TrajectoryImpedanceController,
+    TrajectoryImpedanceController_,
+)
+from systems.planning.safety_filter import SafetyFilter
 from systems.ranging.collision_vector import CollisionVector, CollisionVector_
+from systems.ranging.ideal_object_sensor import IdealObjectSensor
 from systems.ranging.ideal_obstacle_sensor import (
     IdealObstacleSensor,
     IdealObstacleSensor_,
 )
 from systems.ranging.ultrasonic_array import UltrasonicArray
+from systems.routes.global_planner import GlobalPlanner
+from systems.routes.path_target import PathTarget
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.sensing_monitor import SensingMonitor
@@ -70,19 +80,25 @@ __all__ = [
     "DiffDrivePlant_",
     "DynamicWindowController",
     "FreeSpaceMap",
+    "GlobalPlanner",
     "GuardedController",
+    "IdealObjectSensor",
     "IdealObstacleSensor",
     "IdealObstacleSensor_",
     "IdealSourceSensor",
     "IdealSourceSensor_",
+    "ImpedanceAdaptation",
     "MicArray",
     "MotionGuard",
     "Obstacles",
     "Obstacles_",
     "PathIntegralController",
+    "PathTarget",
     "RadialLawController",
     "RadialLawController_",
     "ReciprocalAvoidanceController",
+    "ReferenceModel",
+    "SafetyFilter",
     "SensingMonitor",
     "SoundEmitter",
     "SourceRobot",
@@ -91,6 +107,8 @@ __all__ = [
     "SourceTracker_",
     "StopWhenNearController",
     "TDOAEstimator",
+    "TrajectoryImpedanceController",
+    "TrajectoryImpedanceController_",
     "TwistWheelCommand",
     "TwistWheelCommand_",
     "UltrasonicArray",

@@ -61,23 +61,24 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
         **_odometry_metrics(result),
         "reaction_distance_m": _reaction_distance(proximity),
         **collision_warning(result),
-        **_hearing_metrics(result),
+        **(_hearing_metrics(result) if "detected" in result.columns else {}),
     }
 
 
 def following_error(result: RunResult) -> NDArray[np.float64]:
     """Distance of P from the source, less the follow distance, (n,) m."""
     distance = result.columns["source_range_true"]
-    return distance - result.scenario.attraction.follow_distance_m
+    return distance - result.scenario.follow_distance_m
 
 
 def _proximity_metrics(proximity: Proximity) -> dict[str, float | None]:
     """The source counts as a body, but not as an obstacle."""
-    least, contact = proximity.least, proximity.least_time_to_contact
+    least, contact = proximity.least.tolist(), proximity.least_time_to_contact
+    others = len(proximity.result.surroundings.obstacles)
     return {
-        "minimum_clearance_m": float(np.min(least)),
-        "minimum_obstacle_clearance_m": min(least[:-1].tolist(), default=None),
-        "clearance_p05_m": _quantile(proximity.clearance, 0.05),
+        "minimum_clearance_m": min(least, default=None),
+        "minimum_obstacle_clearance_m": min(least[:others], default=None),
+        "clearance_p05_m": _quantile(proximity.clearance, 0.05) if least else None,
         "minimum_time_to_contact_s": contact if np.isfinite(contact) else None,
     }
 
@@ -256,7 +257,8 @@ def _odometry_metrics(result: RunResult) -> dict[str, float | None]:
 def _reaction_distance(proximity: Proximity) -> float | None:
     """From P to the nearest obstacle when the law first pushes back from it."""
     result, columns = proximity.result, proximity.result.columns
-    if len(result.surroundings.bodies) < 2 or "repulsion_x" not in columns:
+    known = {"repulsion_x", "feature_1"}.issubset(columns)
+    if not result.surroundings.obstacles or not known:
         return None
     echoes = [
         [columns[f"feature_{k}"], *result.vector(f"collision_{k}_B")] for k in (1, 2, 3)

@@ -41,9 +41,11 @@ class Proximity:
     def bodies(self) -> NDArray[np.float64]:
         """(m, n, 5) the bodies' rectangles at the ticks, what is followed last."""
         around, time = self.result.surroundings, self.result.time
-        followed = rectangles_at(self.result.poses("WS"), around.followed.size)
-        obstacles = around.obstacles.values()
-        return np.stack([*(body.rectangles(time) for body in obstacles), followed])
+        bodies = [body.rectangles(time) for body in around.obstacles.values()]
+        if around.goal is None:
+            size = around.followed.size
+            bodies.append(rectangles_at(self.result.poses("WS"), size))
+        return np.reshape(bodies, (-1, len(time), 5))
 
     @property
     def clearance(self) -> NDArray[np.float64]:
@@ -71,7 +73,9 @@ class Proximity:
         between = poses[ticks, None] + part[:, None] * step[:, None]
         robot = rectangles_at(between.reshape(-1, 3), self.result.scenario.size)
         paths = self.result.surroundings.bodies.values()
-        bodies = np.stack([body.rectangles(times) for body in paths])
+        bodies = np.reshape(
+            [body.rectangles(times) for body in paths], (-1, len(times), 5)
+        )
         return np.minimum(least, least_clearances(robot, bodies)[1])
 
     @cached_property

@@ -273,6 +273,8 @@ def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
 
 def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
     """The ball jumps when a frame is heard and rests in between."""
+    if "p_WS_estimated_x" not in result.columns:
+        return
     valid = result.columns["target_valid"] > 0.5
     _record_switch(meshcat, path, result.time, valid)
     height = replay_scene.SOURCE_HEIGHT_M + 0.12

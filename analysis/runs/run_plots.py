@@ -118,9 +118,11 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
-    panels = [_range, _bearing, _speeds, _turning]
+    hears = result.scenario.route is None
+    panels = [_range, _bearing] if hears else [_goal]
     if "attraction_x" in result.columns:  # a law may tell no forces
-        panels.insert(2, _forces)
+        panels.append(_forces)
+    panels += [_speeds, _turning]
     if guarded_motion(result) is not None:
         panels += [_guard_actions, _guard_distances]
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
@@ -137,7 +139,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
         panel(axes, result)
     if distance is not None:
         _clearance(all_axes[-1], result, distance)
-    bursts = sound_bursts(result.scenario.sound, result.simulated_s)
+    bursts = sound_bursts(result.scenario.sound, result.simulated_s) if hears else []
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
@@ -150,7 +152,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             handlelength=1.5,
         )
     all_axes[-1].set(
-        xlabel="time (s), shaded while the source sounds",
+        xlabel="time (s)" + (", shaded while the source sounds" if hears else ""),
         xlim=(0.0, max(result.simulated_s, 1e-3)),
     )
     figure.suptitle(_title(result), fontsize=11)
@@ -178,14 +180,29 @@ def _heard(axes: Axes, result: RunResult, values: NDArray[np.float64]) -> None:
 
 def _range(axes: Axes, result: RunResult) -> None:
     columns = result.columns
-    follow = result.scenario.attraction.follow_distance_m
+    follow = result.scenario.follow_distance_m
     colour = COLOURS["source"]
     axes.plot(result.time, columns["source_range_true"], color=colour, label="true")
-    _heard(axes, result, columns["source_range"])
+    if "source_range" in columns:
+        _heard(axes, result, columns["source_range"])
     axes.axhline(follow, color="black", ls="--", lw=1.0, label="follow distance")
     axes.set_ylabel("range of\nsource (m)")
     # A wild estimate must not squeeze the rest into a line.
     axes.set_ylim(0.0, 1.3 * max(follow, float(np.max(columns["source_range_true"]))))
+
+
+def _goal(axes: Axes, result: RunResult) -> None:
+    columns = result.columns
+    away = columns["source_range_true"]
+    axes.plot(result.time, away, color=COLOURS["source"], label="to the goal")
+    off = np.hypot(*(result.vector("target") - result.vector("p_WP")))
+    axes.plot(result.time, off, color=COLOURS["robot"], label="to the target")
+    replans = np.flatnonzero(np.diff(columns["replans"]))
+    for count, tick in enumerate(replans.tolist()):
+        label = None if count else "new way"
+        axes.axvline(result.time[tick + 1], color="black", ls=":", lw=1.0, label=label)
+    axes.set_ylabel("distance of P\n(m)")
+    axes.set_ylim(bottom=0.0)
 
 
 def _bearing(axes: Axes, result: RunResult) -> None:
@@ -193,7 +210,8 @@ def _bearing(axes: Axes, result: RunResult) -> None:
     # Else a line would cross the whole panel where the bearing wraps.
     true[1:][np.abs(np.diff(true)) > 180.0] = np.nan
     axes.plot(result.time, true, color=COLOURS["source"], label="true")
-    _heard(axes, result, np.degrees(result.columns["source_bearing"]))
+    if "source_bearing" in result.columns:
+        _heard(axes, result, np.degrees(result.columns["source_bearing"]))
     axes.set_ylabel("bearing of\nsource (deg)")
 
 

@@ -144,19 +144,22 @@ def _robot_rows(
     rows = {
         "least clearance": _metres(metric("minimum_clearance_m")),
         "distance at the end": _metres(metric("final_distance_m")),
-        "follow distance": _metres(attraction.follow_distance_m),
-        "following": _percent(metric("following_fraction"))
-        + f" of the time within {stop.following_band_m:.2f} m of it",
-        "following error": _metres(metric("following_error_rms_m")) + " rms",
-        "frames heard": f"{metric('frames_with_sound_heard')} of "
-        f"{metric('frames_with_sound')} with sound; "
-        f"{metric('detections_with_range')} of {metric('detections')} with a range",
-        "position error": _metres(metric("source_error_median_m"))
-        + " median, "
-        + _metres(metric("source_error_p95_m"))
-        + " at 95 %",
         "path length": _metres(metric("path_length_m")),
     }
+    if result.scenario.route is None:
+        rows |= {
+            "follow distance": _metres(attraction.follow_distance_m),
+            "following": _percent(metric("following_fraction"))
+            + f" of the time within {stop.following_band_m:.2f} m of it",
+            "following error": _metres(metric("following_error_rms_m")) + " rms",
+            "frames heard": f"{metric('frames_with_sound_heard')} of "
+            f"{metric('frames_with_sound')} with sound; "
+            f"{metric('detections_with_range')} of {metric('detections')} with a range",
+            "position error": _metres(metric("source_error_median_m"))
+            + " median, "
+            + _metres(metric("source_error_p95_m"))
+            + " at 95 %",
+        }
     if halts := halts_of(result):
         rows["halted by the guard"] = "; ".join(map(str, halts))
     return {f"{prefix}{name}": value for name, value in rows.items()}

@@ -90,7 +90,9 @@ class Look(NamedTuple):
 def looks(result: RunResult) -> list[Look]:
     """Each robot of a run, in colours of its own where there are several."""
     if not result.several:
-        return [Look(result, COLOURS["robot"], COLOURS["estimate"])]
+        look = Look(result, COLOURS["robot"], COLOURS["estimate"])
+        deaf = result.scenario.route is not None
+        return [look._replace(body_label="robot") if deaf else look]
     colours = cycle(ROBOT_COLOURS)
     return [
         Look(
@@ -98,7 +100,7 @@ def looks(result: RunResult) -> list[Look]:
             colour,
             colour,
             f"path of {name}'s P",
-            f"{name} with its microphones",
+            name if own.scenario.route else f"{name} with its microphones",
             f"{name}'s estimates, faint: early",
             colour,
             colour,

@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
-from systems.world.geometry import beyond, beyond_rectangle
+from systems.world.geometry import beyond_rectangle, segment_clearance
 
 __all__ = ["shortest_path_length"]
 
@@ -131,40 +131,6 @@ def _free(
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether a leg keeps its distances from all boxes."""
     for k in range(len(boxes)):
-        if _leg_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
+        if segment_clearance(start, end, boxes[k]) < radii[k] - GRAZE_M:
             return False
     return True
-
-
-@njit(cache=True)
-def _leg_clearance(
-    start: NDArray[np.float64], end: NDArray[np.float64], box: NDArray[np.float64]
-) -> float:  # pragma: no cover  (compiled)
-    """Distance of a leg from a box, m; 0 if they meet."""
-    c, s = math.cos(box[2]), math.sin(box[2])
-    dx, dy = start[0] - box[0], start[1] - box[1]
-    x, y = c * dx + s * dy, c * dy - s * dx
-    dx, dy = end[0] - start[0], end[1] - start[1]
-    along_x, along_y = c * dx + s * dy, c * dy - s * dx
-    half_x, half_y = box[3] / 2.0, box[4] / 2.0
-    # They meet if the leg crosses both of the box's slabs at one time.
-    enter, leave = 0.0, 1.0
-    for at, along, half in ((x, along_x, half_x), (y, along_y, half_y)):
-        safe = along if abs(along) >= 1e-12 else 1e-12
-        one, other = (-half - at) / safe, (half - at) / safe
-        enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
-    if enter <= leave:
-        return 0.0
-    nearest = min(
-        math.hypot(beyond(x, half_x), beyond(y, half_y)),
-        math.hypot(beyond(x + along_x, half_x), beyond(y + along_y, half_y)),
-    )
-    squared = max(along_x * along_x + along_y * along_y, 1e-18)
-    for corner_x in (half_x, -half_x):
-        for corner_y in (half_y, -half_y):
-            away_x, away_y = corner_x - x, corner_y - y
-            t = (away_x * along_x + away_y * along_y) / squared
-            t = min(max(t, 0.0), 1.0)
-            distance = math.hypot(away_x - t * along_x, away_y - t * along_y)
-            nearest = min(nearest, distance)
-    return nearest

@@ -83,6 +83,8 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
         label=look.path_label,
         zorder=4,
     )
+    if scenario.route is not None:
+        _draw_target(axes, look)
     for index, time in enumerate(times):
         pose = result.poses("WB")[tick_at(result, time)]
         _draw_body(
@@ -95,9 +97,34 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
             label=look.body_label if index == 0 else None,
             zorder=3,
         )
-        bar = microphones_W(pose, scenario.robot)
-        axes.plot(*bar.T, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
+        if scenario.route is None:
+            bar = microphones_W(pose, scenario.robot).T
+            axes.plot(*bar, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
         _write_time(axes, pose, -0.42, time, colour)
+
+
+def _draw_target(axes: Axes, look: Look) -> None:
+    """Where the target has been, and the goal."""
+    of = f" of {look.result.name}" if look.result.whole else ""
+    axes.plot(
+        *look.result.vector("target"),
+        ":",
+        color=look.colour,
+        linewidth=1.2,
+        label=f"path of the target{of}",
+        zorder=3.5,
+    )
+    route = look.result.scenario.route
+    assert route is not None
+    axes.plot(
+        *route.goal_m,
+        "*",
+        color=look.colour,
+        markersize=11,
+        linestyle="none",
+        label=f"goal{of}",
+        zorder=5,
+    )
 
 
 def _draw_body(axes: Axes, rectangle: ArrayLike, **style: Any) -> None:
@@ -178,6 +205,8 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         look: The robot's run, colours and labels.
     """
     result, columns = look.result, look.result.columns
+    if "detected" not in columns:
+        return
     heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
     if not heard.any():
         return

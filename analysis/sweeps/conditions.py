@@ -92,7 +92,7 @@ class Conditions(Parameters):
             return
         own = scenario.all_robots[robot]
         goal = around.followed.path.pose(scenario.duration_s)[:2]
-        reach = own.attraction.follow_distance_m + own.robot.control_point_m
+        reach = own.follow_distance_m + own.robot.control_point_m
         boxes = tuple(
             tuple(body.rectangle(0.0).tolist())
             for _, body in _resting(around.obstacles)

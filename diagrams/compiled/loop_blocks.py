@@ -119,12 +119,15 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         bodies = len(scenario.surroundings(name).obstacles)
         target = scenario.target(name)
         others = [sound for sound in scenario.sounds() if sound != target]
-        made = partial(robot_blocks, own, name, bodies=bodies, others=others)
+        robots = scenario.robots_seen(name)
+        made = partial(
+            robot_blocks, own, name, bodies=bodies, robots=robots, others=others
+        )
         if own.blocks:  # they may ask for the whole scenario
             blocks[name] = LoopBlocks(made())
             continue
-        made_from = own.model_dump_json(exclude=_NO_BLOCKS)
-        key = f"{name} {bodies} {others} {own.source_size} {made_from}"
+        made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
+        key = f"{name} {bodies} {robots} {others} {own.source_size} {made_from}"
         found = _SHARED.pop(key, None)
         if found is None:
             found = LoopBlocks(made())
@@ -132,3 +135,11 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
         if len(_SHARED) > _MOST_SHARED:
             del _SHARED[next(iter(_SHARED))]
     return blocks
+
+
+def _without_goal(own: Scenario) -> Scenario:
+    """Goals are the run's, see ``RunFacts``."""
+    if own.route is None:
+        return own
+    route = own.route.model_copy(update={"goal_m": (0.0, 0.0)})
+    return own.model_copy(update={"route": route})

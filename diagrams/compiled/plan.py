@@ -47,9 +47,11 @@ class LoopRobot:
             scenario.integrator.step_s,
             partial(seed_of, scenario, owner=name),
             {**heard},
+            scenario.mapped(),
+            own.route.goal_m if own.route is not None else None,
         )
         self.made, self.steps = made, made.steps(self.facts)
-        sizes = {GIVES_UP: 1, **made.sizes}
+        sizes = {GIVES_UP: 1, "pose_WS": 3, **made.sizes}
         self._views = {port: np.zeros(size) for port, size in sizes.items()}
 
     def view(self, port: str) -> NDArray[np.float64]:
@@ -135,12 +137,13 @@ class LoopPlan:
             around: All that it can see and hit.
         """
         robot, robots, times = self._robots[name], self._robots, self._times
+        everything = {**around.bodies, around.target: around.followed}
         wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
         for port, bodies in wanted.items():
-            if port in robot.made.outside:
+            if port == "pose_WS" or port in robot.made.outside:
                 into = robot.view(port)
                 known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
-                paths = [around.bodies[body].path for body in known.values()]
+                paths = [everything[body].path for body in known.values()]
                 at = times if any(path.moves for path in paths) else times[:1]
                 places = np.array([*known], dtype=np.int64)
                 poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))

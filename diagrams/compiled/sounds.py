@@ -45,7 +45,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
     """
     robots = scenario.all_robots
     sounds = Sounds({name: {} for name in robots}, {})
-    hearing = [name for name, own in robots.items() if own.hearing == "audio"]
+    hearing = [name for name, own in robots.items() if own.listens]
     ticks = history_ticks(
         microphone_reach(scenario.room, scenario.acoustics),
         scenario.acoustics.c,

@@ -5,12 +5,20 @@ from __future__ import annotations
 import math
 from functools import cached_property
 from itertools import combinations
-from typing import Annotated
+from typing import Annotated, Any
 
 from pydantic import Field, Strict, model_validator
 
+from systems.base.robot_presets import ROBOT_PRESETS, RobotPreset
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Length, Mass, Parameters, Point, Speed
+from systems.framework.parameters import (
+    Length,
+    Mass,
+    Parameters,
+    Point,
+    Speed,
+    with_preset,
+)
 
 __all__ = ["LEAST_SPACING_M", "RobotParameters"]
 
@@ -25,6 +33,8 @@ class RobotParameters(Parameters):
     a microphone row of 800 mm, so that 820 mm can only be the lateral size.
     """
 
+    preset: RobotPreset = "han2019"
+    """A named robot: defaults of the other fields; of these, what is given wins."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82
@@ -48,6 +58,11 @@ class RobotParameters(Parameters):
     """Virtual mass M at P, kg: the mass of the robot."""
     top_speed_m_s: Speed = 0.72
     """Limit of |v_P| and of each wheel's rim speed, m/s (Han 2019, 5.3)."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill(cls, data: Any) -> Any:
+        return with_preset(data, ROBOT_PRESETS)
 
     @model_validator(mode="after")
     def _check_microphones(self) -> RobotParameters:

@@ -37,6 +37,7 @@ __all__ = [
     "Stiffness",
     "Time",
     "Waypoints",
+    "with_preset",
 ]
 
 # Every quantity has a range that a robot on a floor can have, with decades to spare:
@@ -101,3 +102,19 @@ class Parameters(BaseModel):
         for name in copied.__dict__.keys() - type(self).model_fields.keys():
             del copied.__dict__[name]
         return copied
+
+
+def with_preset(data: Any, presets: Mapping[str, Mapping[str, Any]]) -> Any:
+    """Input of a model that has a field ``preset``, filled up from that preset.
+
+    Args:
+        data: As pydantic gives it to a validator before all others.
+        presets: Fields by the preset's name.
+
+    Returns:
+        The input, in which what was given wins.
+    """
+    name = data.get("preset") if isinstance(data, Mapping) else None
+    if isinstance(name, str):  # of any other type it is refused later
+        return {**presets.get(name, {}), **data}
+    return data

@@ -57,6 +57,10 @@ class RunFacts(NamedTuple):
     carried: dict[str, Callable[[int], Any]]
     """What abstract ports carry at a tick, by name: those from outside are there from
     the start, a block adds its own."""
+    mapped: Any = ()
+    """(n, 5) x, y, theta, length, width of what the robot's map has, m and rad."""
+    goal: tuple[float, float] | None = None
+    """Where it drives to, m, if it has a goal."""
 
 
 class StepBlock:

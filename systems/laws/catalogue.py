@@ -16,6 +16,11 @@ from systems.laws.conventional_impedance_controller import CONVENTIONAL
 from systems.laws.guarded_controller import GUARDED
 from systems.laws.law import Law
 from systems.laws.no_avoidance import NONE
+from systems.laws.trajectory.trajectory_laws import (
+    TRAJECTORY_ADAPTIVE,
+    TRAJECTORY_CONVENTIONAL,
+    TRAJECTORY_FILTERED,
+)
 
 __all__ = ["FORCE_LAWS", "LAWS", "law_title"]
 
@@ -34,6 +39,9 @@ LAWS: Mapping[str, Law] = {
         VFH_PLUS,
         MPPI,
         ORCA,
+        TRAJECTORY_CONVENTIONAL,
+        TRAJECTORY_ADAPTIVE,
+        TRAJECTORY_FILTERED,
     )
 }
 

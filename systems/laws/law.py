@@ -76,6 +76,9 @@ class Law:
     """Whether its block decides on a motion in the place of a force: it may ask for
     ``following``, ``known``, the map's parameters, ``bodies``, how many there are, and
     ``seed``, too, and has no linear model."""
+    on_route: bool = False
+    """Whether it drives to a goal on a planned way, in the place of following a
+    sound; it then ``plans``, too."""
     guarded: bool = False
     """Whether its robot is always guarded."""
     colour: str | None = None

@@ -18,19 +18,29 @@ _HALVINGS = 40
 
 @njit(cache=True)
 def _obeys(
-    planes: Any, x: float, y: float, top: float, slack: float
+    planes: Any, x: float, y: float, top: float, slack: float, hard: int
 ) -> bool:  # pragma: no cover  (compiled)
     if x * x + y * y > (top + _ROUNDING) ** 2:
         return False
     for k in range(len(planes)):
-        if planes[k, 0] * x + planes[k, 1] * y < planes[k, 2] - slack - _ROUNDING:
+        offset = _offset(planes, k, slack, hard) - _ROUNDING
+        if planes[k, 0] * x + planes[k, 1] * y < offset:
             return False
     return True
 
 
 @njit(cache=True)
+def _offset(
+    planes: Any, k: int, slack: float, hard: int
+) -> float:  # pragma: no cover  (compiled)
+    """Of a plane, moved back by a slack unless it is one of the last, hard ones."""
+    soft = k < len(planes) - hard
+    return planes[k, 2] - slack if soft else planes[k, 2]
+
+
+@njit(cache=True)
 def _nearest(
-    planes: Any, wanted: Any, top: float, slack: float
+    planes: Any, wanted: Any, top: float, slack: float, hard: int
 ) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
     """The nearest one with planes moved back by a slack, and whether there is one.
 
@@ -53,7 +63,8 @@ def _nearest(
                 candidates[0, 0], candidates[0, 1] = part * wanted[0], part * wanted[1]
                 tried = 1
             elif i == count:
-                n0, n1, b = planes[j, 0], planes[j, 1], planes[j, 2] - slack
+                n0, n1 = planes[j, 0], planes[j, 1]
+                b = _offset(planes, j, slack, hard)
                 if abs(b) <= top:
                     along = math.sqrt(top * top - b * b)
                     for sign in (1.0, -1.0):
@@ -61,7 +72,8 @@ def _nearest(
                         candidates[tried, 1] = n1 * b + sign * n0 * along
                         tried += 1
             elif j < 0:
-                n0, n1, b = planes[i, 0], planes[i, 1], planes[i, 2] - slack
+                n0, n1 = planes[i, 0], planes[i, 1]
+                b = _offset(planes, i, slack, hard)
                 to = b - n0 * wanted[0] - n1 * wanted[1]
                 candidates[0, 0] = wanted[0] + to * n0
                 candidates[0, 1] = wanted[1] + to * n1
@@ -69,47 +81,49 @@ def _nearest(
             else:
                 cross = planes[i, 0] * planes[j, 1] - planes[i, 1] * planes[j, 0]
                 if abs(cross) > 1e-9:
-                    b, d = planes[i, 2] - slack, planes[j, 2] - slack
+                    b = _offset(planes, i, slack, hard)
+                    d = _offset(planes, j, slack, hard)
                     candidates[0, 0] = (b * planes[j, 1] - d * planes[i, 1]) / cross
                     candidates[0, 1] = (d * planes[i, 0] - b * planes[j, 0]) / cross
                     tried = 1
             for k in range(tried):
                 x, y = candidates[k, 0], candidates[k, 1]
                 far = math.hypot(x - wanted[0], y - wanted[1])
-                if far < least and _obeys(planes, x, y, top, slack):
+                if far < least and _obeys(planes, x, y, top, slack, hard):
                     least, found = far, (x, y, True)
     return found
 
 
 @njit(cache=True)
 def nearest_velocity(
-    planes: Any, wanted: Any, top: float
-) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    planes: Any, wanted: Any, top: float, hard: int
+) -> tuple[float, float, float]:  # pragma: no cover  (compiled)
     """The velocity nearest to a wanted one that obeys all half planes.
 
-    Where none does, all planes are moved back by the least distance with which one
-    does: the worst is broken by least.
+    Where none does, planes are moved back by the least distance with which one does:
+    the worst is broken by least.
 
     Args:
         planes: (n, 3) unit normal x, y and offset, m/s, of n . v >= offset.
         wanted: (x, y) m/s.
         top: Largest speed, m/s.
+        hard: So many of the last planes are never moved; rest obeys them.
 
     Returns:
-        (x, y) m/s.
+        x, y, m/s, and how far planes were moved, m/s.
     """
-    x, y, obeys = _nearest(planes, wanted, top, 0.0)
+    x, y, obeys = _nearest(planes, wanted, top, 0.0, hard)
     if obeys:
-        return x, y
+        return x, y, 0.0
     low, high = 0.0, top
     for k in range(len(planes)):
         high = max(high, planes[k, 2] + top)
     for _ in range(_HALVINGS):
         slack = 0.5 * (low + high)
-        x, y, obeys = _nearest(planes, wanted, top, slack)
+        x, y, obeys = _nearest(planes, wanted, top, slack, hard)
         if obeys:
             high = slack
         else:
             low = slack
-    x, y, obeys = _nearest(planes, wanted, top, high)
-    return x, y
+    x, y, obeys = _nearest(planes, wanted, top, high, hard)
+    return x, y, high

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 __all__ = ["SENSOR_PRESETS", "SensorPreset"]
 
-SensorPreset = Literal["three", "six", "ring_8", "ring_12", "lidar"]
+SensorPreset = Literal["three", "six", "ring_8", "ring_12", "lidar", "scan_7"]
 
 #: A mast over the axle: a ring there has no body of the robot in its view.
 _MAST = {"positions_m": ((-0.175, 0.0),)}
@@ -29,5 +29,12 @@ SENSOR_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "beam_half_angle_deg": 2.5,
         "maximum_range_m": 5.0,
         "noise_m": 0.01,
+    },
+    # Engelbrecht, Steyn and Djouani 2021, table 1: a half plane ahead, 30 deg apart,
+    # R = 2 m. How wide a beam is they do not print: these are as good as rays.
+    "scan_7": {
+        "axes_deg": (90.0, 60.0, 30.0, 0.0, -30.0, -60.0, -90.0),
+        "beam_half_angle_deg": 0.5,
+        "maximum_range_m": 2.0,
     },
 }

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property, partial
 from itertools import pairwise
@@ -11,6 +10,7 @@ from typing import Annotated, Any, Literal, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 from pydantic import Field, Strict, field_validator, model_validator
 from pydrake.systems.framework import LeafSystem
@@ -32,6 +32,7 @@ from systems.framework.parameters import (
     Point,
     Size,
     SoundSpeed,
+    with_preset,
 )
 from systems.framework.signals import TICK_S, whole
 from systems.framework.step_block import RunFacts, Step
@@ -49,6 +50,7 @@ from systems.world.geometry import fan_ranges
 __all__ = [
     "UltrasonicArray",
     "UltrasonicParameters",
+    "body_rectangles",
     "cone_ranges",
     "measured_ranges",
     "world_rectangles",
@@ -99,10 +101,7 @@ class UltrasonicParameters(Parameters):
     @model_validator(mode="before")
     @classmethod
     def _fill(cls, data: Any) -> Any:
-        name = data.get("preset") if isinstance(data, Mapping) else None
-        if isinstance(name, str):  # of any other type it is refused below
-            return {**SENSOR_PRESETS.get(name, {}), **data}
-        return data
+        return with_preset(data, SENSOR_PRESETS)
 
     @model_validator(mode="after")
     def _check(self) -> UltrasonicParameters:
@@ -235,6 +234,31 @@ class UltrasonicParameters(Parameters):
 
 
 @njit(cache=True)
+def body_rectangles(
+    poses_WO: NDArray[np.float64], sizes: NDArray[np.float64], more: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Bodies that can be seen or hit, with room for more.
+
+    Args:
+        poses_WO: (3 n,) x, y, theta of each, m and rad.
+        sizes: (2 n,) length and width of each, m.
+        more: Rows that are left to be filled.
+
+    Returns:
+        (n + more, 5) x, y, theta, length, width in W, m and rad.
+    """
+    count = len(sizes) // 2
+    rectangles = np.empty((count + more, 5))
+    for k in range(count):
+        # An assignment to a slice compiles words about shapes too: seconds of it.
+        for i in range(3):
+            rectangles[k, i] = poses_WO[3 * k + i]
+        for i in range(2):
+            rectangles[k, 3 + i] = sizes[2 * k + i]
+    return rectangles
+
+
+@njit(cache=True)
 def world_rectangles(
     poses_WO: NDArray[np.float64],
     sizes: NDArray[np.float64],
@@ -252,14 +276,8 @@ def world_rectangles(
     Returns:
         (n + 1, 5) x, y, theta, length, width in W, m and rad.
     """
-    count = len(sizes) // 2
-    rectangles = np.empty((count + 1, 5))
-    for k in range(count):
-        # An assignment to a slice compiles words about shapes too: seconds of it.
-        for i in range(3):
-            rectangles[k, i] = poses_WO[3 * k + i]
-        for i in range(2):
-            rectangles[k, 3 + i] = sizes[2 * k + i]
+    rectangles = body_rectangles(poses_WO, sizes, 1)
+    count = len(rectangles) - 1
     for i in range(3):
         rectangles[count, i] = pose_WS[i]
     rectangles[count, 3], rectangles[count, 4] = source_size
@@ -355,7 +373,7 @@ class UltrasonicNumbers(NamedTuple):
     """As of ``UltrasonicParameters.fault_ticks``."""
 
 
-# Not compiled by itself: a cached function does not notice changes in other files.
+# Not compiled by themselves: a cached function does not notice changes in other files.
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
@@ -369,8 +387,37 @@ def ultrasonic_step(
         numbers: ``UltrasonicNumbers``.
     """
     pose_WB, poses_WO, sizes, pose_WS = inputs
-    ranges, echo, ages = outputs
     bodies = world_rectangles(poses_WO, sizes, pose_WS, numbers.source_size)
+    _read_ranges(tick, state, pose_WB, bodies, outputs, numbers)
+
+
+def sourceless_ultrasonic_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
+) -> None:
+    """``ultrasonic_step`` where there is no master robot.
+
+    Args:
+        tick: Number of the tick.
+        state: Ranges, m, and echoes, as they were last read.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``UltrasonicNumbers``.
+    """
+    pose_WB, poses_WO, sizes = inputs
+    bodies = body_rectangles(poses_WO, sizes, 0)
+    _read_ranges(tick, state, pose_WB, bodies, outputs, numbers)
+
+
+@register_jitable
+def _read_ranges(
+    tick: int,
+    state: Any,
+    pose_WB: Any,
+    bodies: Any,
+    outputs: Any,
+    numbers: UltrasonicNumbers,
+) -> None:
+    ranges, echo, ages = outputs
     beams = numbers.axes, numbers.places, numbers.half_angle
     true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
     count = len(true)
@@ -412,7 +459,8 @@ class UltrasonicArray(LeafSystem):
         - echo [0 or 1]
         - range_ages [s, since each sensor fired]
 
-    The master robot is a body like the obstacles. Surfaces beyond the maximum
+    The master robot is a body like the obstacles; without one there is no ``pose_WS``.
+    Surfaces beyond the maximum
     range give no echo; nearer than the minimum they read the minimum, for
     dropping the echo at contact would drop the force. A cone reports a range,
     not a direction.
@@ -428,7 +476,7 @@ class UltrasonicArray(LeafSystem):
         parameters: The sensors.
         robot: Place of P.
         acoustics: Speed of sound; the time of flight uses it.
-        source_size: Length and width of the master robot, m.
+        source_size: Length and width of the master robot, m; none: there is no such.
         obstacle_count: Number of boxes on the obstacle ports.
         seed: Seed of the noise.
         tick_s: Period of the robot, s.
@@ -445,7 +493,7 @@ class UltrasonicArray(LeafSystem):
         parameters: UltrasonicParameters | None = None,
         robot: RobotParameters | None = None,
         acoustics: AcousticParameters | None = None,
-        source_size: Size = (0.326, 0.352),
+        source_size: Size | None = (0.326, 0.352),
         obstacle_count: int = 0,
         seed: int = 0,
         tick_s: float = TICK_S,
@@ -454,10 +502,10 @@ class UltrasonicArray(LeafSystem):
         self._parameters = parameters or UltrasonicParameters()
         self._control_point = (robot or RobotParameters()).control_point_m
         self._sound_speed = (acoustics or AcousticParameters()).c
-        self._source_size = source_size
+        self._source_size = source_size or (0.0, 0.0)
         self._tick_s = tick_s
         self._round = self._parameters.round_ticks(tick_s)
-        check_finite("UltrasonicArray: source_size", source_size)
+        check_finite("UltrasonicArray: source_size", self._source_size)
         self.set_name("ultrasonic_array")
         count = self._parameters.count
         columns = {
@@ -473,11 +521,13 @@ class UltrasonicArray(LeafSystem):
                 ("sizes", 2 * obstacle_count),
                 ("pose_WS", 3),
             )
+            if name != "pose_WS" or source_size is not None
         ]
         farthest = np.full(count, self._parameters.maximum_range_m)
         held: Any = np.concatenate([farthest, np.zeros(count)])
         self.DeclareDiscreteState(held)
-        self.step = Step(ultrasonic_step, self._numbers(seed), held.tolist())
+        step = ultrasonic_step if source_size else sourceless_ultrasonic_step
+        self.step = Step(step, self._numbers(seed), held.tolist())
         if self._round > 1:
             self.DeclarePeriodicDiscreteUpdateEvent(
                 period_sec=tick_s, offset_sec=0.0, update=self._hold
@@ -518,7 +568,7 @@ class UltrasonicArray(LeafSystem):
         state = context.get_discrete_state(0).CopyToVector()
         outputs = tuple(np.zeros((3, self._parameters.count)))
         tick = round(context.get_time() / self._tick_s)
-        ultrasonic_step(tick, state, inputs, outputs, self.step.numbers)
+        self.step.step(tick, state, inputs, outputs, self.step.numbers)
         return outputs, state
 
     def _hold(self, context: Any, discrete_state: Any) -> None:

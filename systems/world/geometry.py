@@ -30,6 +30,7 @@ __all__ = [
     "rectangle_corners",
     "rotate",
     "safe_norm",
+    "segment_clearance",
 ]
 
 #: Keeps the norm's gradient finite at zero; far below any length that counts.
@@ -377,6 +378,49 @@ def rectangle_clearance(
         _nearest_corner(-ub, -vb, c, -s, half_a, half_b),
     )
     return math.sqrt(squared)
+
+
+@njit(cache=True)
+def segment_clearance(
+    start: Any, end: Any, box: Any
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a line segment from a filled rectangle.
+
+    Args:
+        start: (x, y), m.
+        end: (x, y), m.
+        box: (x, y, theta, length, width) in the same frame.
+
+    Returns:
+        m; 0 if they meet.
+    """
+    c, s = math.cos(box[2]), math.sin(box[2])
+    dx, dy = start[0] - box[0], start[1] - box[1]
+    x, y = c * dx + s * dy, c * dy - s * dx
+    dx, dy = end[0] - start[0], end[1] - start[1]
+    along_x, along_y = c * dx + s * dy, c * dy - s * dx
+    half_x, half_y = box[3] / 2.0, box[4] / 2.0
+    # They meet if the segment crosses both of the box's slabs at one time.
+    enter, leave = 0.0, 1.0
+    for at, along, half in ((x, along_x, half_x), (y, along_y, half_y)):
+        safe = along if abs(along) >= 1e-12 else 1e-12
+        one, other = (-half - at) / safe, (half - at) / safe
+        enter, leave = max(enter, min(one, other)), min(leave, max(one, other))
+    if enter <= leave:
+        return 0.0
+    nearest = min(
+        math.hypot(beyond(x, half_x), beyond(y, half_y)),
+        math.hypot(beyond(x + along_x, half_x), beyond(y + along_y, half_y)),
+    )
+    squared = max(along_x * along_x + along_y * along_y, 1e-18)
+    for corner_x in (half_x, -half_x):
+        for corner_y in (half_y, -half_y):
+            away_x, away_y = corner_x - x, corner_y - y
+            t = (away_x * along_x + away_y * along_y) / squared
+            t = min(max(t, 0.0), 1.0)
+            distance = math.hypot(away_x - t * along_x, away_y - t * along_y)
+            nearest = min(nearest, distance)
+    return nearest
 
 
 @njit(cache=True)

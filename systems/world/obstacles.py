@@ -44,6 +44,8 @@ class ObstacleParameters(Parameters):
     """It rests at its first waypoint until then, s."""
     at_end: AtEnd = "stop"
     """At the last waypoint: rest, or go back and forth."""
+    known: bool = True
+    """Whether the map has it that robots plan their ways on; only what rests counts."""
     corner_radius_m: Length = 0.05
     """Largest radius of the rounded corners, m."""
 

@@ -102,7 +102,15 @@ def test_one_of_everything_runs(tmp_path):
         for name in Scenario.model_fields
         if getattr(scenario, name) == Scenario.model_fields[name].default
     }
-    assert untouched == {"blocks", "engine", "sound", "microphones", "tdoa"}
+    assert untouched == {
+        "blocks",
+        "engine",
+        "objects",
+        "route",
+        "sound",
+        "microphones",
+        "tdoa",
+    }
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 
 

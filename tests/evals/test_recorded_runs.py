@@ -32,7 +32,8 @@ TOLERANCE = 1e-9
 
 def builds() -> list[tuple[str, ...]]:
     """Scenario and settings: each by ear and exactly, laws, models of sensors."""
-    names = [n for n in sorted(library_scenarios()) if not load_scenario(n).robots]
+    loaded = {name: load_scenario(name) for name in sorted(library_scenarios())}
+    names = [n for n, each in loaded.items() if not each.robots and not each.route]
     return [
         *((name,) for name in names),
         *((name, "hearing=ideal") for name in names),

@@ -15,9 +15,15 @@ from systems.sound.adc import MicArrayParameters
 IN_TURN = UltrasonicParameters(firing="sequential")
 SAMPLED: dict[str, dict[str, Any]] = {
     "CollisionVector": {"sensors": IN_TURN},
+    "GlobalPlanner": {},
+    "IdealObjectSensor": {},
     "IdealSourceSensor": {},
+    "ImpedanceAdaptation": {},
     "MicArray": {},
     "MotionGuard": {},
+    "PathTarget": {},
+    "ReferenceModel": {},
+    "SafetyFilter": {},
     "SensingMonitor": {},
     "SoundEmitter": {},
     "SourceTracker": {},
@@ -29,12 +35,16 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "WheelSpeedCommand": {},
 }
 # What plans remembers more than numbers: its update is none of a discrete state; what
-# stops when something is near remembers nothing.
+# stops when something is near, or is pulled and pushed, remembers nothing.
 LAWS = {
     name
     for name in systems.__all__
     if name.endswith("Controller") and inspect.isclass(getattr(systems, name))
-} - {"GuardedController", "StopWhenNearController"}
+} - {
+    "GuardedController",
+    "StopWhenNearController",
+    "TrajectoryImpedanceController",
+}
 
 
 @pytest.mark.parametrize("name", sorted(SAMPLED.keys() | LAWS))

@@ -216,8 +216,8 @@ def reciprocal_avoidance_step(
         planes[used, 2] = offset + nx * ux + ny * uy
         used += 1
     preferred = wanted * math.cos(bearing), wanted * math.sin(bearing)
-    vx, vy = nearest_velocity(
-        planes[:used], preferred, numbers.follow.own.cruise_speed_m_s
+    vx, vy, _ = nearest_velocity(
+        planes[:used], preferred, numbers.follow.own.cruise_speed_m_s, 0
     )
     state[0], state[1] = vx, vy
     turn = (c * vy - s * vx) / own.offset_m

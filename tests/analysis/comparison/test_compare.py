@@ -19,6 +19,7 @@ from analysis.comparison.report import (
     compare_text,
     write_comparison,
 )
+from analysis.sweeps.plan import load_sweep
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
@@ -31,7 +32,14 @@ def test_every_experiment_has_layouts():
 
 @pytest.mark.parametrize("name", library_layouts())
 def test_layouts_of_the_library_are_valid_and_differ(name):
-    plan = comparison_plan(name, laws=("none", "active"), runs=20)
+    plan = load_sweep(library_layouts()[name])
+    laws = ("none", "active")
+    if load_scenario(plan.scenario).route is not None:
+        laws = ("trajectory_conventional", "trajectory_filtered")
+    if load_scenario(plan.scenario).robots:
+        plan = plan.model_copy(update={"runs": 20})
+    else:
+        plan = comparison_plan(name, laws=laws, runs=20)
     points = plan.points()
     drawn = {json.dumps(p.fields | {"law": ""}) for p in points}
     assert len(drawn) == 20

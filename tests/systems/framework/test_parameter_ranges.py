@@ -64,6 +64,29 @@ FIELDS = {
     "FreeSpaceParameters.range_margin_m": (0.0, 1e3),
     "FreeSpaceParameters.wheel_error": (0.0, 1.0),
     "FreeSpaceParameters.place_error_m": (0.0, 1e3),
+    "RouteParameters.goal_m": (-1e3, 1e3),
+    **{
+        f"{kind}TrajectoryParameters.contact_{field}": (0.0, 1e6)
+        for kind in ("Conventional", "Adaptive", "Filtered")
+        for field in ("stiffness_n_m", "damping_n_s_m")
+    },
+    # Weights, rates and shares, which may be left out.
+    "AdaptationParameters.rate": (0.0, 1e6),
+    "AdaptationParameters.contact_rate": (0.0, 1e6),
+    "AdaptationParameters.penalty": (0.0, 1e6),
+    "AdaptationParameters.leakage": (0.0, 1e6),
+    "AdaptationParameters.velocity_weight_s": (0.0, 86_400.0),
+    "AdaptationParameters.normalisation": (1e-9, 1e6),
+    "ReferenceModelParameters.natural_frequency_rad_s": (1e-9, 1e6),
+    "ReferenceModelParameters.damping_ratio": (1e-9, 1e6),
+    "SafetyFilterParameters.margin_m": (0.0, 1e3),
+    "SafetyFilterParameters.approach_rate": (1e-3, 100.0),
+    "SafetyFilterParameters.horizon_s": (0.1, 60.0),
+    "ObjectSensorParameters.noise_m": (0.0, 1e3),
+    "ObjectSensorParameters.velocity_noise_m_s": (0.0, 100.0),
+    "ObjectSensorParameters.latency_s": (0.0, 86_400.0),
+    # A way along walls would graze them.
+    "RouteParameters.clearance_m": (1e-9, 1e3),
     "GuardParameters.obstacle_speed_m_s": (0.0, 100.0),
     "GuardParameters.margin_m": (0.0, 1e3),
     "GuardParameters.least_margin_m": (0.0, 1e3),

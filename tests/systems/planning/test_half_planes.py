@@ -58,8 +58,10 @@ def test_it_is_the_optimum(count):
     infeasible = 0
     for seed in range(25):
         planes, wanted = drawn(seed, count)
-        found = np.array(nearest_velocity(planes, wanted, TOP))
+        *xy, moved = nearest_velocity(planes, wanted, TOP, 0)
+        found = np.array(xy)
         best, least = solved(planes, wanted)
+        assert moved == pytest.approx(least, abs=1e-5)
         infeasible += least > 1e-6
         assert math.hypot(*found) <= TOP + 1e-6
         assert slack(planes, found) == pytest.approx(least, abs=1e-5)
@@ -71,7 +73,17 @@ def test_it_is_the_optimum(count):
 
 def test_nothing_in_the_way():
     nothing = np.empty((0, 3))
-    assert nearest_velocity(nothing, (0.3, -0.2), TOP) == (0.3, -0.2)
-    found = nearest_velocity(nothing, (3.0, -4.0), TOP)
+    assert nearest_velocity(nothing, (0.3, -0.2), TOP, 0) == (0.3, -0.2, 0.0)
+    found = nearest_velocity(nothing, (3.0, -4.0), TOP, 0)[:2]
     assert found == pytest.approx((0.36, -0.48))
-    assert nearest_velocity(nothing, (0.0, 0.0), TOP) == (0.0, 0.0)
+    assert nearest_velocity(nothing, (0.0, 0.0), TOP, 0) == (0.0, 0.0, 0.0)
+
+
+def test_hard_planes_are_not_moved():
+    """Away from a wall by 0.2 m/s at least, and no faster than 0.1 m/s along x."""
+    planes = np.array([[1.0, 0.0, 0.2], [-1.0, 0.0, -0.1], [1.0, 0.0, -0.1]])
+    x, y, moved = nearest_velocity(planes, (-0.4, 0.3), TOP, 2)
+    assert (x, y) == pytest.approx((0.1, 0.3), abs=1e-6)
+    assert moved == pytest.approx(0.1, abs=1e-6)
+    x, y, moved = nearest_velocity(planes, (-0.4, 0.3), TOP, 0)
+    assert (x, moved) == pytest.approx((0.15, 0.05), abs=1e-6)

@@ -83,6 +83,24 @@ def test_a_lidar_is_farther_and_noisier():
     assert (lidar.maximum_range_m, lidar.noise_m) == (5.0, 0.01)
 
 
+def test_a_scan_of_seven_is_a_half_plane_of_rays():
+    """A wall 1 m ahead of P: 1/cos of the axis, less what half a beam adds."""
+    scan = sensors("scan_7")
+    assert scan.axes_deg == tuple(90.0 - 30.0 * k for k in range(7))
+    assert scan.places == ((0.0, 0.0),) * 7
+    wall = np.array([[0.175 + 1.05, 0.0, 0.0, 0.1, 9.0]])
+    found = cone_ranges((0.0, 0.0, 0.0), wall, scan, CONTROL_POINT_M)
+    assert np.all(np.isinf(found[[0, 6]]))
+    for axis, range_ in zip(scan.axes_deg[1:6], found[1:6], strict=True):
+        nearest = math.radians(max(abs(axis) - 0.5, 0.0))
+        assert range_ == pytest.approx(1.0 / math.cos(nearest), rel=1e-9)
+    # Between two beams a post of 2 cm is not seen.
+    angle = math.radians(15.0)
+    post = [0.175 + math.cos(angle), math.sin(angle), 0.0, 0.02, 0.02]
+    found = cone_ranges((0.0, 0.0, 0.0), np.array([post]), scan, CONTROL_POINT_M)
+    assert np.all(np.isinf(found))
+
+
 def test_what_is_given_beside_a_preset_wins(tmp_path):
     text = "ultrasonic: {noise_m: 0.002, preset: lidar, maximum_range_m: 4}"
     found = chosen(tmp_path, text)

@@ -136,7 +136,7 @@ def test_a_ring_runs(firing):
         ({"axes_deg": (30.0, 30.0)}, "must fall from left to right"),
         ({"axes_deg": (180.0, 0.0, -180.0)}, "is a turn or more"),
         ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 places for 2"),
-        ({"preset": "five"}, "'three', 'six', 'ring_8', 'ring_12' or 'lidar'"),
+        ({"preset": "five"}, "'ring_8', 'ring_12', 'lidar' or 'scan_7'"),
         ({"preset": ["six"]}, "'three', 'six'"),
         ({"preset": "six", "axes_deg": 8}, "6 places for 8 sensors"),
     ],

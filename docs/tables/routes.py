@@ -1,0 +1,86 @@
+"""How robots on routes arrive and collide, by law, as a table.
+
+``python -m docs.tables.routes [RUNS]`` prints the table of docs/trajectory.md; RUNS
+layouts of each scenario, 200 unless told.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections import Counter
+
+from analysis.comparison.compare import library_layouts
+from analysis.reporting.intervals import wilson_interval
+from analysis.reporting.markdown import markdown_table
+from analysis.sweeps.plan import load_sweep
+from diagrams import simulate
+from systems.laws.catalogue import LAWS
+
+__all__ = ["SCENARIOS", "outcomes", "routes_table"]
+
+#: Of the library, those whose robots have routes.
+SCENARIOS = (
+    "unknown_block",
+    "crossing_obstacle",
+    "unknown_wall",
+    "unknown_u",
+    "known_u",
+    "mapped_room",
+    "head_on",
+    "robots_2",
+    "robots_3",
+    "robots_4",
+    "robots_8",
+)
+
+
+def outcomes(scenario: str, law: str, runs: int, seed: int = 2026) -> Counter[str]:
+    """How runs of random layouts ended.
+
+    Args:
+        scenario: Name in the library.
+        law: Of all robots.
+        runs: Layouts.
+        seed: Of all of them; the same layouts for each law.
+
+    Returns:
+        Causes and how often each was; of several robots that of the first which did
+        not do what it should.
+    """
+    plan = load_sweep(library_layouts()[scenario])
+    fields = {"set": {**plan.set, "law": law}, "runs": runs, "seed": seed}
+    plan = plan.model_copy(update=fields)
+    return Counter(
+        simulate(plan.scenario_of(point), engine="compiled").cause
+        for point in plan.points()
+    )
+
+
+def routes_table(runs: int) -> str:
+    """Collisions and goals reached, of all laws of robots on routes, in Markdown.
+
+    Args:
+        runs: Layouts of each scenario.
+
+    Returns:
+        A row a scenario: collisions, % with 95 % intervals, then goals reached, %.
+    """
+    laws = [name for name, law in LAWS.items() if law.on_route]
+    rows = []
+    for scenario in SCENARIOS:
+        found = [outcomes(scenario, law, runs) for law in laws]
+        rows.append([f"`{scenario}`", *(_cell(each, runs) for each in found)])
+    return markdown_table(["layouts", *(f"`{law}`" for law in laws)], rows)
+
+
+def _cell(causes: Counter[str], runs: int) -> str:
+    hits = wilson_interval(causes["collision"], runs)
+    low, high = 100.0 * hits.low, 100.0 * hits.high
+    reached = 100.0 * causes["reached"] / runs
+    share = 100.0 * causes["collision"] / runs
+    return f"{share:.1f} ({low:.1f} to {high:.1f}); {reached:.1f} %"
+
+
+if __name__ == "__main__":
+    runs = int(sys.argv[1]) if len(sys.argv) > 1 else 200
+    sys.stdout.write(routes_table(runs) + "\n")

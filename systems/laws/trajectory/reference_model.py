@@ -1,0 +1,160 @@
+"""The motion that adaptation wants: a second-order model behind the target."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from pydrake.systems.framework import LeafSystem
+from scipy.linalg import expm
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import Parameters, Positive
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
+
+__all__ = [
+    "ReferenceModel",
+    "ReferenceModelParameters",
+    "held_matrices",
+    "reference_step",
+]
+
+
+class ReferenceModelParameters(Parameters):
+    """Its poles; none: those of the nominal impedance, so that nothing is to adapt."""
+
+    natural_frequency_rad_s: Positive | None = None
+    """w_n, rad/s; not printed."""
+    damping_ratio: Positive | None = None
+    """xi; not printed."""
+
+    def poles(
+        self, mass: float, stiffness: float, damping: float
+    ) -> tuple[float, float]:
+        """w_n, rad/s, and xi, those of M, K and D where they are not given.
+
+        Args:
+            mass: M, kg.
+            stiffness: K, N/m, above 0.
+            damping: D, N s/m.
+
+        Returns:
+            Both.
+        """
+        frequency = self.natural_frequency_rad_s or math.sqrt(stiffness / mass)
+        ratio = self.damping_ratio or damping / (2.0 * math.sqrt(stiffness * mass))
+        return frequency, ratio
+
+
+class ReferenceNumbers(NamedTuple):
+    """Of x+ = A x + B u: rows of A, then of B."""
+
+    a: tuple[float, float, float, float]
+    b: tuple[float, float, float, float]
+
+
+def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
+    """Eq. 20 to 26 over a tick in which the target's state is held: exact.
+
+    Args:
+        frequency: w_n, rad/s.
+        ratio: xi.
+        tick_s: s.
+
+    Returns:
+        Rows one after the other.
+    """
+    stiff, damp = frequency**2, 2.0 * ratio * frequency
+    whole = np.zeros((4, 4))
+    whole[0, 1] = 1.0
+    whole[1] = -stiff, -damp, stiff, damp
+    moved = expm(tick_s * whole)[:2]
+    a, b = moved[:, :2].ravel().tolist(), moved[:, 2:].ravel().tolist()
+    return ReferenceNumbers(tuple(a), tuple(b))
+
+
+@register_jitable
+def reference_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: ReferenceNumbers
+) -> None:
+    """The reference of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Place, m, and velocity, m/s, x and y.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``ReferenceNumbers``.
+    """
+    target, a, b = inputs[0], numbers.a, numbers.b
+    if tick == 0:
+        for k in range(4):
+            state[k] = target[k]
+    for k in range(4):
+        outputs[0][k] = state[k]
+    for axis in range(2):
+        p, v = state[axis], state[2 + axis]
+        p_d, v_d = target[axis], target[2 + axis]
+        state[axis] = a[0] * p + a[1] * v + b[0] * p_d + b[1] * v_d
+        state[2 + axis] = a[2] * p + a[3] * v + b[2] * p_d + b[3] * v_d
+
+
+class ReferenceModel(LeafSystem, StepBlock):
+    """Moves as P should, after the target.
+
+    .. pydrake_system::
+
+        name: ReferenceModel
+        input_ports:
+        - target_state [m, m, m/s, m/s]
+        output_ports:
+        - reference_state [m, m, m/s, m/s]
+
+    It begins where the target is at the first tick. It knows of no contact: pushing an
+    obstacle back counts as an error.
+
+    Discrete state, every tick: place and velocity, exact for a target that is held over
+    the tick. A target counts from the next tick on.
+
+    Args:
+        frequency: w_n, rad/s.
+        ratio: xi.
+        tick_s: Period, s.
+
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 19 to 26 with the dots of eq.
+    19 where they belong.
+    """
+
+    FACTS = BlockFacts(
+        "reference_model",
+        "control",
+        columns={
+            "reference_state": (
+                "reference_x",
+                "reference_y",
+                "reference_vx",
+                "reference_vy",
+            )
+        },
+        states=("reference_x", "reference_y", "reference_vx", "reference_vy"),
+    )
+
+    def __init__(
+        self,
+        *,
+        frequency: float = math.sqrt(3.0),
+        ratio: float = 2.0 / math.sqrt(3.0),
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self.set_name("reference_model")
+        self.declare_step(
+            float,
+            Step(reference_step, held_matrices(frequency, ratio, tick_s), [0.0] * 4),
+            (("target_state", 4),),
+            (("reference_state", 4),),
+            tick_s,
+        )

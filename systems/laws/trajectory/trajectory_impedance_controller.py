@@ -1,0 +1,196 @@
+"""The law of a robot on a route: impedance to its target and to what is near it."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba.extending import register_jitable
+from pydrake.systems.framework import LeafSystem_
+
+from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import clamped_velocity
+from systems.framework.block_facts import BlockFacts
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
+from systems.laws.trajectory.trajectory_impedance import (
+    ContactNumbers,
+    TrajectoryImpedanceParameters,
+    contact_force,
+    contact_numbers,
+    contacts_of_objects,
+    target_force,
+)
+from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.world.geometry import control_point
+
+__all__ = [
+    "TrajectoryImpedanceController",
+    "TrajectoryImpedanceController_",
+    "trajectory_impedance_step",
+]
+
+
+class TrajectoryNumbers(NamedTuple):
+    """What the step of ``TrajectoryImpedanceController`` depends on."""
+
+    impedance: tuple[float, float, float]
+    """K, D and K_e, where nothing adapts."""
+    contact_damping: float
+    """D_e, N s/m."""
+    contacts: ContactNumbers
+    mass: float
+    acceleration_limit: float
+    """m/s^2."""
+    control_point_m: float
+
+
+@register_jitable
+def _command(
+    inputs: Any, impedance: Any, outputs: Any, numbers: TrajectoryNumbers
+) -> None:
+    target, objects, pose, v_WP = inputs[0], inputs[1], inputs[2], inputs[3]
+    p_WP = control_point(pose, numbers.control_point_m)
+    ux, uy = target_force(p_WP, v_WP, target, impedance[0], impedance[1])
+    found = contacts_of_objects(objects, v_WP, numbers.contacts)
+    fx, fy = contact_force(
+        found, impedance[2], numbers.contact_damping, numbers.contacts
+    )
+    ax, ay = (ux + fx) / numbers.mass, (uy + fy) / numbers.mass
+    ax, ay = clamped_velocity(ax, ay, numbers.acceleration_limit)
+    outputs[0][0], outputs[0][1] = ax, ay
+    outputs[1][0], outputs[1][1] = ux, uy
+    outputs[1][2], outputs[1][3] = fx, fy
+
+
+@register_jitable
+def trajectory_impedance_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
+) -> None:
+    """Acceleration of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: None.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``TrajectoryNumbers``.
+    """
+    _command(inputs, numbers.impedance, outputs, numbers)
+
+
+@register_jitable
+def adapted_impedance_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
+) -> None:
+    """The same with K, D and K_e of the last input.
+
+    Args:
+        tick: Not used.
+        state: None.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``TrajectoryNumbers``.
+    """
+    _command(inputs, inputs[4], outputs, numbers)
+
+
+@define_for_scalars("TrajectoryImpedanceController_", __name__)
+def TrajectoryImpedanceController_(T):
+    class Impl(LeafSystem_[T], StepBlock):
+        """Pulls P to a moving target, and off robots and obstacles.
+
+        .. pydrake_system::
+
+            name: TrajectoryImpedanceController
+            input_ports:
+            - target_state [m, m, m/s, m/s]
+            - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
+            - pose_WB_estimated [m, m, rad]
+            - v_WP [m/s, of the virtual mass]
+            output_ports:
+            - acceleration_W [m/s^2]
+            - forces_W [N, of the target then of contacts, x and y each]
+
+        M p'' = -K (p - p_d) - D (v - v_d) + sum of K_e (S - d) n - D_e (v - v_j), with
+        n from object j to P, where it is nearer than S. With ``adapts`` there is an
+        input port ``impedance``, K, D and K_e, which counts in the place of the
+        parameters'. A function of the present input: no state, no latency.
+
+        At most eight objects count. With D_e summed over contacts beyond 2M/T (80 N s/m
+        for 1 kg) the sampled loop is unstable: a scan is reduced to objects first.
+
+        Args:
+            parameters: ``TrajectoryImpedanceParameters``.
+            robot: Mass and place of P.
+            adapts: Whether there is the port ``impedance``.
+            tick_s: Period, s.
+
+        Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 5, with the signs
+        that their text asks for; docs/trajectory.md has the errata.
+        """
+
+        FACTS = BlockFacts(
+            "controller",
+            "control",
+            columns={
+                "forces_W": (
+                    "attraction_x",
+                    "attraction_y",
+                    "repulsion_x",
+                    "repulsion_y",
+                )
+            },
+        )
+
+        def _construct(
+            self,
+            *,
+            parameters=None,
+            robot=None,
+            adapts=False,
+            tick_s=TICK_S,
+            converter=None,
+        ):
+            super().__init__(converter=converter)
+            own = parameters or TrajectoryImpedanceParameters()
+            robot = robot or RobotParameters()
+            self._config = {
+                "parameters": own,
+                "robot": robot,
+                "adapts": adapts,
+                "tick_s": tick_s,
+            }
+            numbers = TrajectoryNumbers(
+                (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
+                own.contact_damping_n_s_m,
+                contact_numbers(own),
+                robot.mass_kg,
+                own.acceleration_limit_m_s2,
+                robot.control_point_m,
+            )
+            inputs = [
+                ("target_state", 4),
+                ("objects_W", OBJECT_SLOTS * OBJECT_SIZE),
+                ("pose_WB_estimated", 3),
+                ("v_WP", 2),
+            ]
+            if adapts:
+                inputs.append(("impedance", 3))
+            self.set_name("trajectory_impedance_controller")
+            step = adapted_impedance_step if adapts else trajectory_impedance_step
+            self.declare_step(
+                T,
+                Step(step, numbers),
+                inputs,
+                (("acceleration_W", 2), ("forces_W", 4)),
+                tick_s,
+            )
+
+        def _construct_copy(self, other, converter=None):
+            Impl._construct(self, **other._config, converter=converter)
+
+    return Impl
+
+
+TrajectoryImpedanceController = TrajectoryImpedanceController_[None]

@@ -1,0 +1,142 @@
+"""The shortest way from cell to cell of a grid."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["find_cells", "search_cells"]
+
+_DIAGONAL = math.sqrt(2.0)
+
+
+@njit(cache=True)
+def _bound(di: int, dj: int) -> float:  # pragma: no cover  (compiled)
+    """Octile distance: the cost where nothing is blocked."""
+    i, j = abs(di), abs(dj)
+    return max(i, j) + (_DIAGONAL - 1.0) * min(i, j)
+
+
+@njit(cache=True)
+def _push(
+    bounds: Any, cells: Any, count: int, bound: float, cell: int
+) -> None:  # pragma: no cover  (compiled)
+    """Adds an entry to a binary heap of so many, least bound first."""
+    k = count
+    while k > 0:
+        above = (k - 1) // 2
+        if bounds[above] <= bound:
+            break
+        bounds[k], cells[k] = bounds[above], cells[above]
+        k = above
+    bounds[k], cells[k] = bound, cell
+
+
+@njit(cache=True)
+def _pop(bounds: Any, cells: Any, count: int) -> int:  # pragma: no cover  (compiled)
+    """Takes the cell of least bound out of a heap of so many."""
+    least = cells[0]
+    last = count - 1
+    bound, cell = bounds[last], cells[last]
+    k = 0
+    while True:
+        below = 2 * k + 1
+        if below >= last:
+            break
+        if below + 1 < last and bounds[below + 1] < bounds[below]:
+            below += 1
+        if bounds[below] >= bound:
+            break
+        bounds[k], cells[k] = bounds[below], cells[below]
+        k = below
+    bounds[k], cells[k] = bound, cell
+    return int(least)
+
+
+@njit(cache=True)
+def search_cells(
+    blocked: Any, start: tuple[int, int], goal: tuple[int, int]
+) -> Any:  # pragma: no cover  (compiled)
+    """A* on 8 neighbours, for compiled code; see ``find_cells``.
+
+    Args:
+        blocked: (n, m) cells that cannot be entered.
+        start: Cell.
+        goal: Cell.
+
+    Returns:
+        (k, 2) cells from start to goal, none where there is no way.
+    """
+    n, m = blocked.shape
+    si, sj = start
+    gi, gj = goal
+    if blocked[si, sj] or blocked[gi, gj]:
+        return np.empty((0, 2), dtype=np.int64)
+    cost = np.full((n, m), np.inf)
+    before = np.full((n, m), -1, dtype=np.int32)
+    done = np.zeros((n, m), dtype=np.bool_)
+    cost[si, sj] = 0.0
+    # A cell is entered anew whenever it was found to be nearer, from 8 sides at most.
+    bounds, waiting = np.empty(8 * n * m + 1), np.empty(8 * n * m + 1, dtype=np.int32)
+    _push(bounds, waiting, 0, 0.0, si * m + sj)
+    count = 1
+    while count > 0:
+        cell = _pop(bounds, waiting, count)
+        count -= 1
+        i, j = cell // m, cell % m
+        if i == gi and j == gj:
+            break
+        if done[i, j]:
+            continue
+        done[i, j] = True
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                a, b = i + di, j + dj
+                if a < 0 or b < 0 or a >= n or b >= m or blocked[a, b] or done[a, b]:
+                    continue
+                # No corner is cut.
+                if blocked[a, j] or blocked[i, b]:
+                    continue
+                step = _DIAGONAL if di != 0 and dj != 0 else 1.0
+                new = cost[i, j] + step
+                if new < cost[a, b]:
+                    cost[a, b], before[a, b] = new, cell
+                    bound = new + _bound(gi - a, gj - b)
+                    _push(bounds, waiting, count, bound, a * m + b)
+                    count += 1
+    if cost[gi, gj] == np.inf:
+        return np.empty((0, 2), dtype=np.int64)
+    count, cell = 1, gi * m + gj
+    while cell != si * m + sj:
+        cell = before[cell // m, cell % m]
+        count += 1
+    cells = np.empty((count, 2), dtype=np.int64)
+    cell = gi * m + gj
+    for k in range(count - 1, -1, -1):
+        cells[k, 0], cells[k, 1] = cell // m, cell % m
+        cell = before[cell // m, cell % m]
+    return cells
+
+
+def find_cells(
+    blocked: NDArray[np.bool_], start: tuple[int, int], goal: tuple[int, int]
+) -> NDArray[np.int64] | None:
+    """A shortest way from cell to cell.
+
+    Steps lead to the 8 neighbours; one across a corner costs sqrt(2) of a straight one,
+    and needs both cells beside it free.
+
+    Args:
+        blocked: (n, m) cells that cannot be entered.
+        start: Cell, numbers along both axes.
+        goal: The same.
+
+    Returns:
+        (k, 2) cells from start to goal; none where one of them is blocked or walled in.
+    """
+    cells: NDArray[np.int64] = search_cells(blocked, start, goal)
+    return cells if len(cells) else None

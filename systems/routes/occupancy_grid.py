@@ -1,0 +1,204 @@
+"""Which cells of an arena a disc's centre may not be in."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from systems.framework.input_error import InputError
+from systems.world.geometry import beyond_rectangle, rectangle_corners
+
+__all__ = [
+    "Discs",
+    "OccupancyGrid",
+    "arena_about",
+    "block_discs",
+    "block_rectangles",
+    "cell_middle",
+    "cell_of",
+    "make_occupancy_grid",
+]
+
+#: Cells of a grid at most: a search among them takes 40 MB.
+_MOST_CELLS = 1_000_000
+#: Cells in the radius of the disc at least: then a step between two free cells comes
+#: nearer than the radius by less than 3 % of it.
+_LEAST_CELLS = 3.0
+
+#: (n, 3) places and radii of discs, m; compiled code has no type for it.
+Discs = Any
+
+
+class OccupancyGrid(NamedTuple):
+    """Square cells of a rectangle of floor, whose sides are those of W."""
+
+    blocked: NDArray[np.bool_]
+    """(n, m) cells along x and y whose middle is too near to an obstacle."""
+    low: tuple[float, float]
+    """Least x and y, m."""
+    cell_m: float
+    """Side of a cell, m."""
+
+
+def arena_about(
+    points: ArrayLike, rectangles: ArrayLike, margin_m: float
+) -> tuple[float, float, float, float]:
+    """The least rectangle of floor that holds all, and a margin about it.
+
+    Args:
+        points: (n, 2) m.
+        rectangles: (k, 5) obstacles, see ``systems.world.geometry``.
+        margin_m: m.
+
+    Returns:
+        Least x and y, and greatest x and y, m.
+    """
+    boxes = np.asarray(rectangles, dtype=float).reshape(-1, 5)
+    places = [np.asarray(points, dtype=float), *map(rectangle_corners, boxes)]
+    low = np.min([np.min(place, axis=0) for place in places], axis=0) - margin_m
+    high = np.max([np.max(place, axis=0) for place in places], axis=0) + margin_m
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def make_occupancy_grid(
+    arena: tuple[float, float, float, float], cell_m: float, radius_m: float
+) -> OccupancyGrid:
+    """A grid of free cells.
+
+    Args:
+        arena: Least x and y, and greatest x and y, m.
+        cell_m: Side of a cell, m.
+        radius_m: Obstacles are to be grown by it, m.
+
+    Returns:
+        The grid.
+
+    Raises:
+        InputError: The cells are too many, or too coarse for the radius.
+    """
+    if cell_m * _LEAST_CELLS > radius_m:
+        raise InputError(
+            "cell_m",
+            f"{cell_m:g} m is too coarse for a clearance of {radius_m:g} m; lower it "
+            f"to {radius_m / _LEAST_CELLS:.3g} or less",
+        )
+    low_x, low_y, high_x, high_y = arena
+    size = [
+        max(math.ceil(extent / cell_m - 1e-9), 1)
+        for extent in (high_x - low_x, high_y - low_y)
+    ]
+    if size[0] * size[1] > _MOST_CELLS:
+        least = math.sqrt((high_x - low_x) * (high_y - low_y) / _MOST_CELLS)
+        raise InputError(
+            "cell_m",
+            f"{cell_m:g} m makes {size[0]} x {size[1]} cells of the floor about start, "
+            f"goal and obstacles, more than {_MOST_CELLS}; raise it above "
+            f"{least:.3g}, or lower arena_margin_m",
+        )
+    return OccupancyGrid(np.zeros(size, dtype=np.bool_), (low_x, low_y), cell_m)
+
+
+@njit(cache=True)
+def cell_of(
+    grid: OccupancyGrid, x: float, y: float
+) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """The cell of a place.
+
+    Args:
+        grid: Any.
+        x: m.
+        y: m.
+
+    Returns:
+        Its numbers along x and y; (-1, -1) off the grid.
+    """
+    i = math.floor((x - grid.low[0]) / grid.cell_m)
+    j = math.floor((y - grid.low[1]) / grid.cell_m)
+    n, m = grid.blocked.shape
+    return (i, j) if 0 <= i < n and 0 <= j < m else (-1, -1)
+
+
+@njit(cache=True)
+def cell_middle(
+    grid: OccupancyGrid, i: int, j: int
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Place of the middle of a cell.
+
+    Args:
+        grid: Any.
+        i: Number of the cell along x.
+        j: The same along y.
+
+    Returns:
+        (x, y) m.
+    """
+    cell = grid.cell_m
+    return grid.low[0] + (i + 0.5) * cell, grid.low[1] + (j + 0.5) * cell
+
+
+@njit(cache=True)
+def _span(
+    low: float, high: float, first: float, cell: float, count: int
+) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """Cells whose middles may lie in an interval: the first, and one after the last."""
+    begin = math.floor((low - first) / cell - 0.5)
+    end = math.ceil((high - first) / cell - 0.5) + 1
+    return max(begin, 0), min(end, count)
+
+
+@njit(cache=True)
+def block_rectangles(
+    grid: OccupancyGrid, rectangles: Any, radius: float
+) -> None:  # pragma: no cover  (compiled)
+    """Blocks the cells whose middles are nearer to a rectangle than a radius.
+
+    Distances are exact: those of a distance transform are between middles of cells, off
+    by up to 0.7 cells, and compiled steps cannot call it.
+
+    Args:
+        grid: Changed.
+        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
+        radius: They are grown by it, m.
+    """
+    n, m = grid.blocked.shape
+    for k in range(len(rectangles)):
+        box = rectangles[k]
+        c, s = abs(math.cos(box[2])), abs(math.sin(box[2]))
+        half_x = 0.5 * (c * box[3] + s * box[4]) + radius
+        half_y = 0.5 * (s * box[3] + c * box[4]) + radius
+        low_x, high_x = box[0] - half_x, box[0] + half_x
+        low_y, high_y = box[1] - half_y, box[1] + half_y
+        from_i, to_i = _span(low_x, high_x, grid.low[0], grid.cell_m, n)
+        from_j, to_j = _span(low_y, high_y, grid.low[1], grid.cell_m, m)
+        for i in range(from_i, to_i):
+            for j in range(from_j, to_j):
+                if not grid.blocked[i, j]:
+                    du, dv = beyond_rectangle(cell_middle(grid, i, j), box)
+                    grid.blocked[i, j] = du * du + dv * dv < radius * radius
+
+
+@njit(cache=True)
+def block_discs(
+    grid: OccupancyGrid, discs: Discs, radius: float
+) -> None:  # pragma: no cover  (compiled)
+    """Blocks the cells whose middles are nearer to a disc than a radius.
+
+    Args:
+        grid: Changed.
+        discs: (n, 3) places and radii, m.
+        radius: They are grown by it, m.
+    """
+    n, m = grid.blocked.shape
+    for k in range(len(discs)):
+        x, y, reach = discs[k, 0], discs[k, 1], discs[k, 2] + radius
+        from_i, to_i = _span(x - reach, x + reach, grid.low[0], grid.cell_m, n)
+        from_j, to_j = _span(y - reach, y + reach, grid.low[1], grid.cell_m, m)
+        for i in range(from_i, to_i):
+            for j in range(from_j, to_j):
+                a, b = cell_middle(grid, i, j)
+                if (a - x) ** 2 + (b - y) ** 2 < reach * reach:
+                    grid.blocked[i, j] = True

@@ -1,0 +1,308 @@
+"""The target that moves along a route."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydrake.systems.framework import LeafSystem
+
+from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import Acceleration, Length, Parameters, Speed
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
+from systems.routes.route import ROUTE_SIZE
+from systems.world.geometry import control_point
+
+__all__ = [
+    "PathTarget",
+    "PathTargetParameters",
+    "TargetNumbers",
+    "nearest_on_route",
+    "next_speed",
+    "path_target_step",
+    "point_on_route",
+    "route_fingerprint",
+]
+
+#: Places in the state; of lengths along the route, m, speed in m/s.
+ALONG, SPEED, REACHED, FINGERPRINT = range(4)
+_STATES = 3 + 4
+#: P is looked for so far behind where it was, and so far ahead of the target, m: a
+#: route may come near to itself.
+_BEHIND_M, _AHEAD_M = 1.0, 0.5
+#: So near to the goal the target is there, m.
+_THERE_M = 1e-6
+
+
+class PathTargetParameters(Parameters):
+    """How the target moves along the route."""
+
+    speed_m_s: Speed = 0.15
+    """Its speed along the route, m/s (ours; Engelbrecht and others print none)."""
+    acceleration_m_s2: Acceleration = 0.15
+    """Of that speed from rest and to rest, m/s^2 (ours)."""
+    timing: Literal["timed", "waiting"] = "timed"
+    """It moves by the clock, as in the paper, or waits for the robot."""
+    lead_m: Length = 0.5
+    """Where it waits, it is no farther ahead of P along the route, m (ours)."""
+
+
+class TargetNumbers(NamedTuple):
+    """What the step of ``PathTarget`` depends on."""
+
+    speed_m_s: float
+    acceleration_m_s2: float
+    waits: bool
+    lead_m: float
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    tick_s: float
+
+
+@njit(cache=True)
+def route_fingerprint(
+    route: Any,
+) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
+    """Four numbers that differ where routes do: count, spacing, moments of x and y."""
+    count, x, y = int(route[0]), 0.0, 0.0
+    for k in range(count):
+        x += (k + 1.0) * route[2 + 2 * k]
+        y += (k + 1.0) * route[3 + 2 * k]
+    return route[0], route[1], x, y
+
+
+@njit(cache=True)
+def nearest_on_route(
+    route: Any, x: float, y: float, low: float, high: float
+) -> float:  # pragma: no cover  (compiled)
+    """Where a place is nearest to a part of a route.
+
+    Args:
+        route: (ROUTE_SIZE,) numbers of ``Route``.
+        x: m.
+        y: m.
+        low: The part begins there along the route, m.
+        high: It ends there, m.
+
+    Returns:
+        Arc length, m.
+    """
+    count, spacing = int(route[0]), route[1]
+    last = (count - 1) * spacing
+    low, high = min(max(low, 0.0), last), min(max(high, 0.0), last)
+    best, found = np.inf, low
+    first = min(int(low / spacing), count - 2)
+    for k in range(first, count - 1):
+        begin = k * spacing
+        if begin > high:
+            break
+        ax, ay = route[2 + 2 * k], route[3 + 2 * k]
+        dx, dy = route[4 + 2 * k] - ax, route[5 + 2 * k] - ay
+        squared = max(dx * dx + dy * dy, 1e-18)
+        part = ((x - ax) * dx + (y - ay) * dy) / squared
+        least = max((low - begin) / spacing, 0.0)
+        most = min((high - begin) / spacing, 1.0)
+        part = min(max(part, least), most)
+        off = math.hypot(ax + part * dx - x, ay + part * dy - y)
+        if off < best:
+            best, found = off, begin + part * spacing
+    return found
+
+
+@njit(cache=True)
+def point_on_route(
+    route: Any, along: float
+) -> tuple[float, float, float, float]:  # pragma: no cover  (compiled)
+    """Place on a route, and its derivative by the arc length.
+
+    Cubic Hermite polynomials through the points (Catmull and Rom), so that the
+    direction turns without steps.
+
+    Args:
+        route: (ROUTE_SIZE,) numbers of ``Route``.
+        along: Arc length, m.
+
+    Returns:
+        x, y, m, and dx/ds, dy/ds.
+    """
+    count, spacing = int(route[0]), route[1]
+    along = min(max(along, 0.0), (count - 1) * spacing)
+    k = min(int(along / spacing), count - 2)
+    t = along / spacing - k
+    place, slope = np.empty(2), np.empty(2)
+    for axis in range(2):
+        at = 2 + axis
+        p, q = route[at + 2 * k], route[at + 2 * (k + 1)]
+        m = q - route[at + 2 * (k - 1)] if k > 0 else 2.0 * (q - p)
+        n = route[at + 2 * (k + 2)] - p if k < count - 2 else 2.0 * (q - p)
+        m, n = 0.5 * m, 0.5 * n
+        b, c = 3.0 * (q - p) - 2.0 * m - n, 2.0 * (p - q) + m + n
+        place[axis] = p + t * (m + t * (b + t * c))
+        slope[axis] = (m + t * (2.0 * b + 3.0 * t * c)) / spacing
+    return place[0], place[1], slope[0], slope[1]
+
+
+@register_jitable
+def next_speed(
+    speed: float, way: float, top: float, acceleration: float, tick_s: float
+) -> float:
+    """The largest speed after a tick from which rest is reached within a way.
+
+    Speed changes evenly in a tick, by no more than the acceleration.
+
+    Args:
+        speed: Now, m/s.
+        way: To go, m; below 0 it was exceeded.
+        top: Largest speed, m/s.
+        acceleration: m/s^2.
+        tick_s: s.
+
+    Returns:
+        m/s, at least 0.
+    """
+    # (v + v') T/2 + v'^2/(2 a) = way.
+    root = 0.25 * tick_s * tick_s + (2.0 * way - speed * tick_s) / acceleration
+    braked = acceleration * (math.sqrt(max(root, 0.0)) - 0.5 * tick_s)
+    change = acceleration * tick_s
+    return max(min(speed + change, top, braked), speed - change, 0.0)
+
+
+@register_jitable
+def path_target_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: TargetNumbers
+) -> None:
+    """The target at one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: Arc length, m, and speed, m/s, of the target, arc length of the point
+            that is nearest to P, m, and fingerprint of the route.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``TargetNumbers``.
+    """
+    route, (target, progress, valid) = np.asarray(inputs[0]), outputs
+    valid[0] = 1.0
+    x, y = control_point(inputs[1], numbers.control_point_m)
+    if route[0] < 2.0:
+        # There is no route: the target is where P is.
+        target[0], target[1] = x, y
+        return
+    length = (route[0] - 1.0) * route[1]
+    known = route_fingerprint(route)
+    is_new = False
+    for k in range(4):
+        is_new = is_new or state[FINGERPRINT + k] != known[k]
+        state[FINGERPRINT + k] = known[k]
+    if is_new:
+        reached = nearest_on_route(route, x, y, 0.0, length)
+        state[ALONG], state[SPEED] = reached, 0.0
+    else:
+        low = min(state[REACHED], state[ALONG]) - _BEHIND_M
+        high = max(state[REACHED], state[ALONG]) + _AHEAD_M
+        reached = nearest_on_route(route, x, y, low, high)
+    along, speed = state[ALONG], state[SPEED]
+    px, py, tx, ty = point_on_route(route, along)
+    target[0], target[1], target[2], target[3] = px, py, speed * tx, speed * ty
+    progress[0], progress[1] = along, reached
+    way = length - along
+    if numbers.waits:
+        # It comes to rest within a tick, up to a T^2/8 later than even braking would.
+        late = 0.125 * numbers.acceleration_m_s2 * numbers.tick_s**2
+        way = min(way, numbers.lead_m - late - along + reached)
+    after = next_speed(
+        speed, way, numbers.speed_m_s, numbers.acceleration_m_s2, numbers.tick_s
+    )
+    along = along + 0.5 * (speed + after) * numbers.tick_s
+    if along > length - _THERE_M:
+        along, after = length, 0.0
+    state[ALONG], state[SPEED], state[REACHED] = along, after, reached
+
+
+class PathTarget(LeafSystem, StepBlock):
+    """Moves a target along the route, from rest to rest at the goal.
+
+    .. pydrake_system::
+
+        name: PathTarget
+        input_ports:
+        - route [number of points, then in m their spacing, and x and y of each]
+        - pose_WB_estimated [m, m, rad]
+        output_ports:
+        - target_state [m, m, m/s, m/s]
+        - route_progress [m, m]
+        - target_valid [0 or 1]
+
+    ``target_state``: place and velocity in W. ``route_progress``: arc lengths of the
+    target and of the point of the route that is nearest to P; of several, near where P
+    was or between it and the target.
+
+    With ``timing: timed`` the speed rises, stays and falls with the clock, whatever the
+    robot does. With ``waiting`` the target brakes so that it is never farther ahead
+    than ``lead_m``, unless P goes back. A route that is new begins where it is nearest
+    to P, at rest.
+
+    Discrete state: arc length and speed of the target, arc length of P, and four
+    numbers that tell a new route. Rate and latency: a function of state and present
+    inputs, at every tick; no latency.
+
+    Args:
+        parameters: ``PathTargetParameters``.
+        robot: Place of P.
+        tick_s: Period of the robot, s.
+
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 2 has its place and velocity;
+    its timing is not printed. That it waits is ours.
+    """
+
+    FACTS = BlockFacts(
+        "tracker",
+        "control",
+        columns={
+            "target_valid": ("target_valid",),
+            "target_state": ("target_x", "target_y", "target_vx", "target_vy"),
+            "route_progress": ("target_along", "robot_along"),
+        },
+        states=(
+            "target_along",
+            "target_speed",
+            "robot_along",
+            "route_points",
+            "route_spacing",
+            "route_moment_x",
+            "route_moment_y",
+        ),
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: PathTargetParameters | None = None,
+        robot: RobotParameters | None = None,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own = parameters or PathTargetParameters()
+        numbers = TargetNumbers(
+            own.speed_m_s,
+            own.acceleration_m_s2,
+            own.timing == "waiting",
+            own.lead_m,
+            (robot or RobotParameters()).control_point_m,
+            tick_s,
+        )
+        self.set_name("path_target")
+        blank: NDArray[np.float64] = np.zeros(_STATES)
+        self.declare_step(
+            float,
+            Step(path_target_step, numbers, blank.tolist()),
+            (("route", ROUTE_SIZE), ("pose_WB_estimated", 3)),
+            (("target_state", 4), ("route_progress", 2), ("target_valid", 1)),
+            tick_s,
+        )

@@ -1,0 +1,433 @@
+"""A smooth route from a place to a goal, past known rectangles and seen discs."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike, NDArray
+
+from systems.framework.input_error import InputError
+from systems.framework.signals import read_only
+from systems.routes.grid_search import search_cells
+from systems.routes.occupancy_grid import (
+    Discs,
+    OccupancyGrid,
+    arena_about,
+    block_rectangles,
+    cell_middle,
+    cell_of,
+    make_occupancy_grid,
+)
+from systems.world.geometry import beyond_rectangle, segment_clearance
+
+__all__ = [
+    "ROUTE_POINTS",
+    "ROUTE_SIZE",
+    "Route",
+    "fill_route",
+    "find_route",
+    "place_clearance",
+    "plan_route",
+]
+
+#: Points of a route at most, and numbers on the port ``route``: how many points there
+#: are, their spacing, and x and y of each.
+ROUTE_POINTS = 200
+ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
+
+#: Spacing at which a pulled way is rounded, m.
+_FINE_M = 0.01
+#: Half of the window of the moving averages, in points of that spacing; shorter where
+#: the route would come too near to an obstacle.
+_HALF_WINDOWS = (15, 10, 7, 5, 3, 2, 1, 0)
+#: Averages that follow one another: after two the curvature is continuous.
+_AVERAGES = 2
+#: By so much a rounded route may come nearer to obstacles than was planned, m.
+_ROUNDING_M = 0.015
+#: By so much a way out may lead nearer to obstacles than it begins, m.
+_WAY_OUT_M = 0.01
+#: A goal may be this much nearer to obstacles than the clearance: rounding, m.
+_GRAZE_M = 1e-9
+#: Start and goal are not nearer to one another, m.
+_SHORTEST_M = 1e-3
+
+
+@njit(cache=True)
+def _length(points: Any) -> float:  # pragma: no cover  (compiled)
+    length = 0.0
+    for k in range(1, len(points)):
+        dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+        length += math.hypot(dx, dy)
+    return length
+
+
+@dataclass(frozen=True)
+class Route:
+    """Points of equal spacing along a smooth line; the last one is the goal."""
+
+    points: NDArray[np.float64]
+    """(n, 2) in W, m; read only."""
+
+    def __post_init__(self) -> None:
+        read_only(self.points)
+
+    @property
+    def spacing_m(self) -> float:
+        """From point to point along the line, m."""
+        return self.length_m / (len(self.points) - 1)
+
+    @property
+    def length_m(self) -> float:
+        """From the first point to the last, m."""
+        return float(_length(self.points))
+
+    @property
+    def numbers(self) -> NDArray[np.float64]:
+        """(ROUTE_SIZE,) what the port ``route`` carries."""
+        numbers: NDArray[np.float64] = np.zeros(ROUTE_SIZE)
+        fill_route(numbers, self.points)
+        return numbers
+
+
+@njit(cache=True)
+def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compiled)
+    """Sets what the port ``route`` carries.
+
+    Args:
+        numbers: (ROUTE_SIZE,) or more; the first ones are changed.
+        points: (n, 2) of equal spacing, m.
+    """
+    for k in range(ROUTE_SIZE):
+        numbers[k] = 0.0
+    for k in range(len(points)):
+        numbers[2 + 2 * k], numbers[3 + 2 * k] = points[k, 0], points[k, 1]
+    numbers[0], numbers[1] = len(points), _length(points) / (len(points) - 1)
+
+
+@njit(cache=True)
+def _clearance(
+    a: Any, b: Any, rectangles: Any, discs: Discs, least: float, most: float
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a segment from all obstacles, ``most`` where it is larger.
+
+    Below ``least`` it is that of some obstacle.
+    """
+    best = most
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    squared = max(dx * dx + dy * dy, 1e-18)
+    for k in range(len(discs)):
+        x, y = discs[k, 0] - a[0], discs[k, 1] - a[1]
+        part = min(max((x * dx + y * dy) / squared, 0.0), 1.0)
+        x, y, reach = x - part * dx, y - part * dy, max(best + discs[k, 2], 0.0)
+        if x * x + y * y < reach * reach:
+            best = math.hypot(x, y) - discs[k, 2]
+            if best < least:
+                return best
+    for k in range(len(rectangles)):
+        box = rectangles[k]
+        # Far off by the circles about both there is no need to look closer.
+        x, y = box[0] - a[0] - 0.5 * dx, box[1] - a[1] - 0.5 * dy
+        reach = 0.5 * (math.hypot(box[3], box[4]) + math.sqrt(squared)) + max(best, 0.0)
+        if x * x + y * y < reach * reach:
+            best = min(best, segment_clearance(a, b, box))
+            if best < least:
+                return best
+    return best
+
+
+@njit(cache=True)
+def place_clearance(
+    x: float, y: float, rectangles: Any, discs: Discs
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a place from all obstacles.
+
+    Args:
+        x: m.
+        y: m.
+        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
+        discs: (n, 3) places and radii, m.
+
+    Returns:
+        m; 0 in a rectangle, below 0 in a disc, infinite where there is none.
+    """
+    best = np.inf
+    for k in range(len(rectangles)):
+        du, dv = beyond_rectangle((x, y), rectangles[k])
+        best = min(best, math.hypot(du, dv))
+    for k in range(len(discs)):
+        off = math.hypot(discs[k, 0] - x, discs[k, 1] - y)
+        best = min(best, off - discs[k, 2])
+    return best
+
+
+@njit(cache=True)
+def _line_clearance(
+    points: Any, rectangles: Any, discs: Discs, most: float
+) -> float:  # pragma: no cover  (compiled)
+    """Distance of a line through points from all obstacles, ``most`` if larger."""
+    best = most
+    for k in range(len(points) - 1):
+        a, b = points[k], points[k + 1]
+        best = min(best, _clearance(a, b, rectangles, discs, -np.inf, best))
+    return best
+
+
+@njit(cache=True)
+def _spaced(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
+    """So many points of equal spacing along a line through points, ends included."""
+    lengths = np.zeros(len(points))
+    for k in range(1, len(points)):
+        dx, dy = points[k, 0] - points[k - 1, 0], points[k, 1] - points[k - 1, 1]
+        lengths[k] = lengths[k - 1] + math.hypot(dx, dy)
+    out, k = np.empty((count, 2)), 1
+    for i in range(count):
+        at = lengths[-1] * i / (count - 1)
+        while k < len(points) - 1 and lengths[k] < at:
+            k += 1
+        part = (at - lengths[k - 1]) / max(lengths[k] - lengths[k - 1], 1e-12)
+        part = min(max(part, 0.0), 1.0)
+        for axis in range(2):
+            first, second = points[k - 1, axis], points[k, axis]
+            out[i, axis] = first + part * (second - first)
+    for axis in range(2):
+        out[0, axis], out[-1, axis] = points[0, axis], points[-1, axis]
+    return out
+
+
+@njit(cache=True)
+def _sees(
+    a: Any, b: Any, rectangles: Any, discs: Discs, clearance: float
+) -> bool:  # pragma: no cover  (compiled)
+    """Whether a segment keeps a clearance."""
+    found = _clearance(a, b, rectangles, discs, clearance, clearance)
+    return bool(found >= clearance)
+
+
+@njit(cache=True)
+def _pulled(
+    points: Any, rectangles: Any, discs: Discs, clearance: float
+) -> Any:  # pragma: no cover  (compiled)
+    """The points that are left where each sees the next; neighbours always do."""
+    kept = np.empty_like(points)
+    kept[0] = points[0]
+    count, at = 1, 0
+    while at < len(points) - 1:
+        to = at + 1
+        while to + 1 < len(points) and _sees(
+            points[at], points[to + 1], rectangles, discs, clearance
+        ):
+            to += 1
+        kept[count] = points[to]
+        count += 1
+        at = to
+    return kept[:count].copy()
+
+
+@njit(cache=True)
+def _averaged(points: Any, half: int) -> Any:  # pragma: no cover  (compiled)
+    """Moving average; towards the ends the window shrinks, so that they stay."""
+    out = np.empty_like(points)
+    for k in range(len(points)):
+        h = min(half, k, len(points) - 1 - k)
+        for axis in range(2):
+            added = 0.0
+            for j in range(k - h, k + h + 1):
+                added += points[j, axis]
+            out[k, axis] = added / (2 * h + 1)
+    return out
+
+
+@njit(cache=True)
+def _rounded(
+    pulled: Any, rectangles: Any, discs: Discs, clearance: float
+) -> Any:  # pragma: no cover  (compiled)
+    """Points of a route: as smooth as the clearance permits."""
+    count = max(math.ceil(_length(pulled) / _FINE_M), 1) + 1
+    fine = _spaced(pulled, count)
+    least = _line_clearance(pulled, rectangles, discs, clearance) - _ROUNDING_M
+    route = pulled
+    for half in _HALF_WINDOWS:
+        line = fine
+        for _ in range(_AVERAGES):
+            line = _averaged(line, half)
+        route = _spaced(line, min(count, ROUTE_POINTS))
+        if _line_clearance(route, rectangles, discs, clearance) >= least:
+            break
+    return route
+
+
+@njit(cache=True)
+def _way_out(
+    grid: OccupancyGrid,
+    end: tuple[float, float],
+    rectangles: Any,
+    discs: Discs,
+    clearance: float,
+) -> tuple[int, int]:  # pragma: no cover  (compiled)
+    """The nearest free cell to which a straight way leads no nearer to obstacles.
+
+    Returns:
+        (-1, -1) where there is none within two clearances.
+    """
+    here = place_clearance(end[0], end[1], rectangles, discs)
+    least = min(here, clearance) - _WAY_OUT_M
+    i, j = cell_of(grid, end[0], end[1])
+    found, best = (-1, -1), np.inf
+    if i < 0 or here <= 0.0:
+        return found
+    reach = math.ceil(2.0 * clearance / grid.cell_m)
+    n, m = grid.blocked.shape
+    for a in range(max(i - reach, 0), min(i + reach + 1, n)):
+        for b in range(max(j - reach, 0), min(j + reach + 1, m)):
+            if grid.blocked[a, b]:
+                continue
+            middle = cell_middle(grid, a, b)
+            away = math.hypot(middle[0] - end[0], middle[1] - end[1])
+            if away < best and _sees(end, middle, rectangles, discs, least):
+                found, best = (a, b), away
+    return found
+
+
+@njit(cache=True)
+def find_route(
+    grid: OccupancyGrid,
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    rectangles: Any,
+    discs: Discs,
+    clearance: float,
+) -> Any:  # pragma: no cover  (compiled)
+    """A route, for compiled code and where a robot plans anew.
+
+    Ends nearer to obstacles than the clearance are left, and reached, by a straight way
+    that leads no nearer to them.
+
+    Args:
+        grid: With the cells blocked that are nearer to obstacles than the clearance.
+        start: (x, y) m.
+        goal: (x, y) m.
+        rectangles: (k, 5) obstacles in W, see ``systems.world.geometry``.
+        discs: (n, 3) places and radii of others, m.
+        clearance: To be kept, m.
+
+    Returns:
+        (p, 2) points of equal spacing from start to goal, m, at most ``ROUTE_POINTS``;
+        none where there is no route.
+    """
+    none = np.empty((0, 2))
+    if math.hypot(goal[0] - start[0], goal[1] - start[1]) < _SHORTEST_M:
+        return none
+    first = _way_out(grid, start, rectangles, discs, clearance)
+    last = _way_out(grid, goal, rectangles, discs, clearance)
+    if first[0] < 0 or last[0] < 0:
+        return none
+    cells = search_cells(grid.blocked, first, last)
+    if len(cells) == 0:
+        return none
+    points = np.empty((len(cells) + 2, 2))
+    for k in range(len(cells)):
+        x, y = cell_middle(grid, cells[k, 0], cells[k, 1])
+        points[k + 1, 0], points[k + 1, 1] = x, y
+    for axis in range(2):
+        points[0, axis], points[-1, axis] = start[axis], goal[axis]
+    # Once from either end: the second time corners are tauter.
+    pulled = _pulled(points, rectangles, discs, clearance)
+    count = max(math.ceil(_length(pulled) / grid.cell_m), 1) + 1
+    back = np.ascontiguousarray(_with_corners(pulled, count)[::-1])
+    pulled = np.ascontiguousarray(_pulled(back, rectangles, discs, clearance)[::-1])
+    return _rounded(pulled, rectangles, discs, clearance)
+
+
+@njit(cache=True)
+def _with_corners(points: Any, count: int) -> Any:  # pragma: no cover  (compiled)
+    """Points along a line besides those that it is made of."""
+    out = np.empty((count + 2 * len(points), 2))
+    step, used = _length(points) / (count - 1), 0
+    for k in range(len(points) - 1):
+        dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+        parts = max(math.ceil(math.hypot(dx, dy) / step - 1e-9), 1)
+        for part in range(parts):
+            out[used, 0] = points[k, 0] + dx * part / parts
+            out[used, 1] = points[k, 1] + dy * part / parts
+            used += 1
+    out[used] = points[-1]
+    return out[: used + 1]
+
+
+def plan_route(
+    start: tuple[float, float],
+    goal: tuple[float, float],
+    rectangles: ArrayLike,
+    *,
+    clearance_m: float = 0.35,
+    cell_m: float = 0.05,
+    arena_margin_m: float = 2.0,
+) -> Route:
+    """A short and smooth route for the centre of a disc.
+
+    A* on a grid of cells whose middles keep the clearance, pulled taut where straight
+    legs keep it, too, and rounded by two moving averages of 0.3 m, shorter ones where
+    these would come nearer to an obstacle than the clearance less 15 mm.
+
+    Args:
+        start: (x, y) in W, m. Where it is nearer to an obstacle than the clearance, the
+            route leads away from it first.
+        goal: (x, y) in W, m.
+        rectangles: (k, 5) known obstacles in W, see ``systems.world.geometry``.
+        clearance_m: Kept from them, m.
+        cell_m: Side of a cell, m.
+        arena_margin_m: The route stays in the least rectangle about start, goal and
+            obstacles, and this margin, m.
+
+    Returns:
+        The route.
+
+    Raises:
+        InputError: Start or goal lies in an obstacle, the goal too near to one or at
+            the start, there is no way, or the grid does not serve; names the field.
+
+    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2 names A* and prints no
+    grid; Hart, Nilsson and Raphael (1968).
+    """
+    known: NDArray[np.float64] = np.array(rectangles, dtype=float).reshape(-1, 5)
+    discs: NDArray[np.float64] = np.empty((0, 3))
+    # Whole numbers would be compiled anew.
+    start = float(start[0]), float(start[1])
+    goal = float(goal[0]), float(goal[1])
+    off = place_clearance(*goal, known, discs)
+    if off < clearance_m - _GRAZE_M:
+        raise InputError(
+            "goal_m",
+            f"{_text(goal)} lies {_where(off)}, and clearance_m is {clearance_m:g}; "
+            "move it, or lower clearance_m",
+        )
+    if place_clearance(*start, known, discs) <= 0.0:
+        raise InputError(
+            "start", f"P starts at {_text(start)}, in a known obstacle; move one"
+        )
+    if math.dist(start, goal) < _SHORTEST_M:
+        raise InputError("goal_m", f"{_text(goal)} is where P starts; move it")
+    arena = arena_about([start, goal], known, arena_margin_m)
+    grid = make_occupancy_grid(arena, cell_m, clearance_m)
+    block_rectangles(grid, known, clearance_m)
+    points = find_route(grid, start, goal, known, discs, clearance_m)
+    if not len(points):
+        raise InputError(
+            "goal_m",
+            f"no way leads from {_text(start)} to {_text(goal)} at {clearance_m:g} m "
+            "from the known obstacles; move start or goal, or lower clearance_m",
+        )
+    return Route(points)
+
+
+def _text(place: tuple[float, float]) -> str:
+    return f"({place[0]:g}, {place[1]:g})"
+
+
+def _where(off: float) -> str:
+    near = f"{off:.3g} m from a known obstacle"
+    return near if off > 0.0 else "in a known obstacle"

@@ -1,0 +1,77 @@
+"""Robots on routes from end to end: by both engines, alone and among others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagrams import load_scenario, simulate
+from docs.tables.routes import outcomes
+from systems.framework.input_error import InputError
+
+
+@pytest.mark.parametrize(
+    ("name", "law"),
+    [
+        ("unknown_block", "trajectory_adaptive"),
+        ("unknown_block", "trajectory_filtered"),
+        ("robots_2", "trajectory_filtered"),
+    ],
+)
+def test_both_engines_do_the_same(name, law):
+    scenario = load_scenario(name, [f"law={law}"])
+    drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
+    assert drake.cause == compiled.cause
+    assert drake.columns.keys() == compiled.columns.keys()
+    for column, values in drake.columns.items():
+        np.testing.assert_allclose(compiled.columns[column], values, atol=1e-9)
+
+
+def test_a_goal_is_reached_at_rest():
+    result = simulate(load_scenario("known_u"), engine="compiled")
+    assert result.cause == "reached"
+    away = result.vector("p_WP")[:, -1] - [6.0, 0.0]
+    assert np.hypot(*away) < 0.1
+    assert np.hypot(*result.vector("v_WB")[:, -1]) < 0.05
+    assert result.columns["replans"][-1] == 0.0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scenario", "runs"),
+    [("unknown_block", 60), ("crossing_obstacle", 60), ("unknown_wall", 40)],
+)
+def test_filtered_it_touches_nothing_and_arrives(scenario, runs):
+    assert outcomes(scenario, "trajectory_filtered", runs) == {"reached": runs}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("scenario", "runs"), [("robots_3", 40), ("robots_4", 40)])
+def test_nor_do_several(scenario, runs):
+    found = outcomes(scenario, "trajectory_filtered", runs)
+    assert found["collision"] == 0
+    assert found["reached"] >= 0.97 * runs
+
+
+@pytest.mark.slow
+def test_adaptation_collides_more_often_than_the_same_law_without():
+    """The paper's claim is the contrary (sec. 6); the same 100 layouts."""
+    conventional, adaptive = (
+        outcomes("unknown_block", f"trajectory_{how}", 100)["collision"]
+        for how in ("conventional", "adaptive")
+    )
+    assert 10 < conventional < adaptive
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        (["law=active"], "law: is 'active', which follows a sound"),
+        (["route=null"], "route: is missing, and law 'trajectory_filtered'"),
+        (["obstacles.0.known=true", "route.goal_m=[3.0, 0.1]"], "goal_m"),
+        (["route.cell_m=0.5"], "cell_m"),
+    ],
+)
+def test_what_cannot_be_is_refused(fields, message):
+    with pytest.raises(InputError, match=message):
+        simulate(load_scenario("unknown_block", fields))

@@ -1,0 +1,179 @@
+"""The law of robots on routes against closed forms, and its two forms to each other."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from systems.laws.trajectory.trajectory_impedance import (
+    TrajectoryImpedanceParameters,
+    contact_force,
+    contact_numbers,
+    contacts_of_objects,
+    state_matrices,
+    target_force,
+)
+from systems.laws.trajectory.trajectory_impedance_controller import (
+    TrajectoryImpedanceController,
+)
+from tests.systems.laws.trajectory.point_robot import ROBOT, TICK_S, along, run
+
+#: As the paper has it, but for signs: K_e = K, S of table 1.
+CONVENTIONAL = TrajectoryImpedanceParameters(
+    contact_stiffness_n_m=3.0, security_zone_m=1.0
+)
+
+
+def objects_of(*slots):
+    flat = np.zeros(64)
+    for k, slot in enumerate(slots):
+        flat[8 * k : 8 * k + len(slot)] = slot
+    return flat
+
+
+def test_force_and_state_space_are_one_law():
+    """Eq. 4, 5 and 11 to 18, with the envelope point q + S n for x_e; 1000 cases."""
+    draw = np.random.default_rng(1)
+    for _ in range(1000):
+        count = int(draw.integers(1, 8))
+        p, v, p_d, v_d = draw.uniform(-2.0, 2.0, (4, 2))
+        mass, k, d = draw.uniform(0.5, 5.0, 3)
+        own = TrajectoryImpedanceParameters(
+            stiffness_n_m=k,
+            damping_n_s_m=d,
+            contact_stiffness_n_m=draw.uniform(0.0, 10.0),
+            contact_damping_n_s_m=draw.uniform(0.0, 10.0),
+            security_zone_m=1.0,
+            damping_fades=False,
+        )
+        bearing, far = draw.uniform(0, math.tau, count), draw.uniform(0.05, 0.95, count)
+        offset = np.stack([far * np.cos(bearing), far * np.sin(bearing)], axis=1)
+        v_o = draw.uniform(-1.0, 1.0, (count, 2))
+        objects = objects_of(*([1, *offset[j], *v_o[j], 1] for j in range(count)))
+        numbers = contact_numbers(own)
+        contacts = contacts_of_objects(objects, v, numbers)
+        gains = own.contact_stiffness_n_m, own.contact_damping_n_s_m
+        target = *p_d, *v_d
+        by_force = np.add(
+            target_force(p, v, target, k, d), contact_force(contacts, *gains, numbers)
+        )
+        a, b1, b2 = state_matrices(mass, (k, d), [gains] * count)
+        for axis in range(2):
+            n = -offset[:, axis] / far
+            x_e = p[axis] + offset[:, axis] + 1.0 * n
+            x = a @ [p[axis], v[axis]] + b1 @ [p_d[axis], v_d[axis]]
+            for j in range(count):
+                x = x + b2[j] @ [x_e[j], v_o[j, axis]]
+            assert x[0] == v[axis]
+            assert mass * x[1] == pytest.approx(by_force[axis], abs=1e-12 * 50)
+
+
+@pytest.mark.parametrize("zone", ["security", "envelope", "jump"])
+def test_three_readings_of_the_zone(zone):
+    own = CONVENTIONAL.model_copy(update={"zone": zone, "horizon_m": 2.0})
+    numbers = contact_numbers(own)
+    for distance in (0.4, 0.999, 1.001, 1.9, 2.1):
+        contacts = contacts_of_objects(
+            objects_of([1, distance, 0.0, 0, 0, 1]), (0.0, 0.0), numbers
+        )
+        force = contact_force(contacts, 3.0, 4.0, numbers)
+        expected = {
+            "security": 3.0 * max(1.0 - distance, 0.0),
+            "envelope": 3.0 * max(2.0 - distance, 0.0),
+            "jump": 3.0 * (2.0 - distance) if distance < 1.0 else 0.0,
+        }[zone]
+        assert force[0] == pytest.approx(-expected, abs=1e-9)
+        assert force[1] == 0.0
+
+
+def test_damping_fades_in_from_the_edge_of_the_zone():
+    numbers = contact_numbers(CONVENTIONAL)
+    for distance, share in ((0.999999, 0.0), (0.5, 0.5), (0.25, 0.75)):
+        contacts = contacts_of_objects(
+            objects_of([1, distance, 0.0, 0.1, 0.0, 1]), (0.3, 0.2), numbers
+        )
+        force = contact_force(contacts, 0.0, 4.0, numbers)
+        assert force == pytest.approx(
+            (-4.0 * share * 0.2, -4.0 * share * 0.2), abs=1e-5
+        )
+
+
+def test_lag_behind_a_target_that_moves():
+    """Velocity feedforward: no lag but in a contact, then D_e v/K."""
+    speed = 0.15
+    own = CONVENTIONAL.model_copy(update={"damping_fades": False})
+    targets = along(speed, 60.0)
+    free = run(targets, law=own)
+    assert abs(free[-1, 0] - targets[-1, 0]) < 0.005
+    # A row of walls beside the way: a point that goes along abreast, at rest in W.
+    beside = np.zeros((len(targets), 1, 4))
+    beside[:, 0, 0], beside[:, 0, 1] = free[:, 0], -0.6
+    held = run(targets, beside, law=own)
+    lag = targets[-1, 0] - held[-1, 0]
+    beside[:, 0, 0] = held[:, 0]
+    for _ in range(6):  # until the point is abreast of where P then is
+        held = run(targets, beside, law=own)
+        beside[:, 0, 0] = held[:, 0]
+        lag = targets[-1, 0] - held[-1, 0]
+    assert lag == pytest.approx(4.0 * speed / 3.0, abs=0.005)
+
+
+def test_offset_beside_a_wall():
+    """At rest (S - b) K_e/(K + K_e) off a target that is b from a wall."""
+    for contact_stiffness, beside in ((3.0, 0.4), (8.0, 0.5), (3.0, 0.7)):
+        own = CONVENTIONAL.model_copy(
+            update={"contact_stiffness_n_m": contact_stiffness}
+        )
+        targets = along(0.0, 40.0)
+        # The nearest point of a wall stays abreast of P.
+        last = run(targets, [[0.0, -beside, 0.0, 0.0]], law=own)[-1]
+        expected = (1.0 - beside) * contact_stiffness / (3.0 + contact_stiffness)
+        # From the target; the wall's point recedes as P does.
+        assert last[1] == pytest.approx(expected, abs=0.005)
+
+
+def test_pulled_through_an_obstacle_only_with_enough_lag():
+    """Head-on: K lag = K_e (S - d_c) at the contact: nothing holds it any more."""
+    touch = 0.1  # from P to the obstacle where the body touches it
+    targets = along(0.15, 60.0)
+    rows = run(targets, [[3.0, 0.0, 0.0, 0.0]], law=CONVENTIONAL)
+    distance = np.abs(3.0 - rows[:, 0])
+    first = int(np.argmax(distance <= touch))
+    assert first > 0
+    lag = targets[first, 0] - rows[first, 0]
+    assert 0.75 <= lag <= 0.95
+    assert lag >= 3.0 * (1.0 - touch) / 3.0 - 0.02
+
+
+def test_the_block_adds_both_and_limits_the_acceleration():
+    block = TrajectoryImpedanceController(parameters=CONVENTIONAL, robot=ROBOT)
+    context = block.CreateDefaultContext()
+    values = {
+        "target_state": [0.5, 0.0, 0.1, 0.0],
+        "objects_W": objects_of([1, 0.0, 0.4, 0.0, 0.0, 1.0]),
+        "pose_WB_estimated": [0.0, 0.0, 0.0],
+        "v_WP": [0.0, 0.05],
+    }
+    for name, value in values.items():
+        block.GetInputPort(name).FixValue(context, np.array(value))
+    forces = block.GetOutputPort("forces_W").Eval(context)
+    pull = [3.0 * (0.5 - 0.08) + 4.0 * 0.1, -4.0 * 0.05]
+    off = [0.0, -3.0 * 0.6 - 4.0 * 0.6 * 0.05]
+    np.testing.assert_allclose(forces, [*pull, *off], atol=1e-9)
+    command = block.GetOutputPort("acceleration_W").Eval(context)
+    wanted = np.add(pull, off)
+    assert np.linalg.norm(wanted) > 2.5
+    np.testing.assert_allclose(command, 2.5 * wanted / np.linalg.norm(wanted))
+
+
+def test_summed_damping_is_stable_up_to_2M_over_T():
+    """Of the sampled velocity loop: v+ = (1 - D1 T/M) v."""
+    for damping, stable in ((75.0, True), (85.0, False)):
+        own = CONVENTIONAL.model_copy(
+            update={"damping_n_s_m": damping, "stiffness_n_m": 1e-3}
+        )
+        rows = run(along(0.0, 2.0), start=(0.0, 0.0, 0.1, 0.0), law=own)
+        assert (abs(rows[-1, 2]) < 0.1) == stable
+    assert 2.0 * ROBOT.mass_kg / TICK_S == 80.0

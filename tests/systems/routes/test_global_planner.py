@@ -1,0 +1,313 @@
+"""The planner with a point that goes where the target is, until something blocks."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder, LeafSystem
+
+from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts
+from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.routes.global_planner import (
+    GlobalPlanner,
+    RouteParameters,
+    planner_step,
+)
+from systems.routes.path_target import PathTarget
+from systems.routes.route import ROUTE_SIZE, plan_route
+from systems.world.geometry import nearest_point_on_rectangle, segment_clearance
+
+EPSILON = 0.08
+ROBOT = RobotParameters(control_point_m=EPSILON)
+#: The point comes no nearer to anything, m.
+KEEP = 0.28
+WALL = (2.0, 0.2, 0.3, 0.1, 1.6)
+WAITS = RouteParameters(goal_m=(4.0, 0.0), timing="waiting", lead_m=0.3)
+
+
+def objects_at(x, y, boxes, robot=0.0):
+    """The port of boxes at rest within 2 m."""
+    seen = []
+    for box in boxes:
+        dx, dy = nearest_point_on_rectangle((x, y), box)
+        if math.hypot(dx, dy) < 2.0:
+            seen.append([1.0, dx, dy, 0.0, 0.0, 1.0, 0.0, robot])
+    port = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
+    port[: len(seen)] = np.reshape(sorted(seen, key=lambda s: math.hypot(*s[1:3])),
+                                   (-1, OBJECT_SIZE))  # fmt: skip
+    return port.ravel()
+
+
+def moved(x, y, target, boxes):
+    """To the target at 0.2 m/s at most, as far as nothing is near."""
+    dx, dy = target[0] - x, target[1] - y
+    part = min(0.2 * TICK_S / max(math.hypot(dx, dy), 1e-9), 1.0)
+    ahead = x + part * dx, y + part * dy
+    if all(segment_clearance(ahead, ahead, box) > KEEP for box in boxes):
+        return ahead
+    return x, y
+
+
+class Point(LeafSystem):
+    """P, which goes to the target; what it sees; the robot's heading is 0."""
+
+    def __init__(self, boxes):
+        super().__init__()
+        self._boxes = boxes
+        self._target = self.DeclareVectorInputPort("target_state", 4)
+        self.DeclareDiscreteState(2)
+        self.DeclarePeriodicDiscreteUpdateEvent(TICK_S, 0.0, self._move)
+        state = {self.xd_ticket()}
+        for name, size, calc in (
+            ("pose_WB_estimated", 3, self._pose),
+            ("objects_W", OBJECT_SLOTS * OBJECT_SIZE, self._objects),
+        ):
+            self.DeclareVectorOutputPort(name, size, calc, prerequisites_of_calc=state)
+
+    def _pose(self, context, output):
+        x, y = context.get_discrete_state(0).value()
+        output.SetFromVector([x - EPSILON, y, 0.0])
+
+    def _objects(self, context, output):
+        x, y = context.get_discrete_state(0).value()
+        output.SetFromVector(objects_at(x, y, self._boxes))
+
+    def _move(self, context, state):
+        x, y = context.get_discrete_state(0).value()
+        at = moved(x, y, self._target.Eval(context), self._boxes)
+        state.set_value(0, np.array(at))
+
+
+def run_by_drake(planner, target, boxes, ticks):
+    """Places of P, and replans, a row a tick."""
+    builder = DiagramBuilder()
+    point = Point(boxes)
+    blocks = [builder.AddSystem(b) for b in (planner, target, point)]
+    outputs = {
+        block.get_output_port(k).get_name(): block.get_output_port(k)
+        for block in blocks
+        for k in range(block.num_output_ports())
+    }
+    for block in blocks:
+        for k in range(block.num_input_ports()):
+            port = block.get_input_port(k)
+            builder.Connect(outputs[port.get_name()], port)
+    diagram = builder.Build()
+    simulator = Simulator(diagram)
+    root = simulator.get_mutable_context()
+    of_point, of_planner = (b.GetMyContextFromRoot(root) for b in (point, planner))
+    rows = []
+    for k in range(ticks):
+        simulator.AdvanceTo(k * TICK_S)
+        place = of_point.get_discrete_state(0).value()
+        replans = planner.GetOutputPort("replans").Eval(of_planner)
+        rows.append([*place, *replans])
+    return np.array(rows)
+
+
+def run_compiled(steps, boxes, ticks, tick, start=(0.0, 0.0)):
+    """The same by compiled steps, in the order of compiled loops."""
+    planner, target = steps
+    states = [np.array(step.state) for step in steps]
+    route, replans = np.zeros(ROUTE_SIZE), np.zeros(1)
+    place, progress, valid = np.zeros(4), np.zeros(2), np.zeros(1)
+    (x, y), rows = start, []
+    for k in range(ticks):
+        planner.publish(states[0], (route, replans), planner.numbers)
+        pose, objects = np.array([x - EPSILON, y, 0.0]), objects_at(x, y, boxes)
+        outputs = place, progress, valid
+        tick(target.step, k, states[1], (route, pose), outputs, target.numbers)
+        rows.append([x, y, replans[0]])
+        seen = objects, pose, progress
+        tick(planner.step, k, states[0], seen, (), planner.numbers)
+        x, y = moved(x, y, place, boxes)
+    return np.array(rows)
+
+
+def make(parameters=WAITS, known=(), start=(0.0, 0.0)):
+    pose = (start[0] - EPSILON, start[1], 0.0)
+    return GlobalPlanner(
+        parameters=parameters, known=known, initial_pose=pose, robot=ROBOT
+    )
+
+
+def facts(start=(0.0, 0.0), mapped=()):
+    pose = (start[0] - EPSILON, start[1], 0.0)
+    return RunFacts(0, TICK_S, pose, "runge_kutta3", TICK_S, lambda _: 0, {}, mapped)
+
+
+def test_the_first_route_is_that_of_the_map(bench):
+    """From P, and not from the axle."""
+    at = bench(make(known=[WALL]))
+    expected = plan_route((0.0, 0.0), (4.0, 0.0), [WALL]).numbers
+    np.testing.assert_array_equal(at.output("route"), expected)
+    assert at.output("replans") == [0.0]
+
+
+def test_it_comes_past_an_unknown_wall_and_compiled_the_same(compiled_tick):
+    """It stops at the wall, and knows a way past what it has seen of it."""
+    planner, target = make(), PathTarget(parameters=WAITS, robot=ROBOT)
+    ticks = 3200
+    drake = run_by_drake(planner, target, [WALL], ticks)
+    steps = planner.step_for(facts()), target.step_for(facts())
+    compiled = run_compiled(steps, [WALL], ticks, compiled_tick)
+    np.testing.assert_array_equal(drake[0, :2], 0.0)
+    assert math.dist(drake[-1, :2], (4.0, 0.0)) < 1e-3
+    assert 1 <= drake[-1, 2] <= 6
+    np.testing.assert_array_equal(compiled, drake)
+    # Runs share a block, but not what they remember.
+    again = run_compiled(
+        (planner.step_for(facts()), steps[1]), [WALL], 400, compiled_tick
+    )
+    np.testing.assert_array_equal(again, drake[:400])
+
+
+def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
+    """When the route changed, of a robot that stands, and the state at the end."""
+    step = planner.step_for(facts())
+    state, changed = np.array(step.state), []
+    for k in range(count):
+        before = state[:ROUTE_SIZE].copy()
+        tick(step.step, k, state, (objects, pose, progress), (), step.numbers)
+        if (before != state[:ROUTE_SIZE]).any():
+            changed.append(k)
+    return changed, state
+
+
+STANDS = (1.0 - EPSILON, 0.0, 0.0)
+POST = [(1.4, 0.0, 0.0, 0.1, 0.1)]
+
+
+def test_it_plans_anew_after_6_s_without_way(compiled_tick):
+    """P is 0.3 m along from the first tick on: that is way made, at 0 s."""
+    objects = objects_at(1.0, 0.0, POST)
+    changed, state = ticks_of_replans(make(), compiled_tick, objects, STANDS, 300)
+    # From then on the route is known: planned again from the same place it is the same.
+    assert changed == [240]
+    route = state[2:ROUTE_SIZE].reshape(-1, 2)[: int(state[0])]
+    assert route[0] == pytest.approx([1.0, 0.0])
+    assert route[-1] == pytest.approx([4.0, 0.0])
+    # What is known is the nearest point, (1.35, 0).
+    assert np.hypot(*(route - [1.35, 0.0]).T).min() >= 0.35 - 0.02
+
+
+def test_who_is_at_the_goal_does_not_stall(compiled_tick):
+    pose = (3.9 - EPSILON, 0.0, 0.0)
+    changed, _ = ticks_of_replans(make(), compiled_tick, np.zeros(64), pose, 600)
+    assert not changed
+
+
+def test_way_that_is_made_is_no_stall(compiled_tick):
+    """0.11 m in 5.9 s."""
+    step = make().step_for(facts())
+    state = np.array(step.state)
+    for k in range(1000):
+        progress = 0.0, 0.11 * (k // 236)
+        inputs = np.zeros(64), STANDS, progress
+        compiled_tick(step.step, k, state, inputs, (), step.numbers)
+    np.testing.assert_array_equal(state[:ROUTE_SIZE], step.state[:ROUTE_SIZE])
+
+
+def test_way_on_a_new_route_counts_from_its_begin(compiled_tick):
+    """It stalls 3 m along the first one, and makes way on the second."""
+    step = make().step_for(facts())
+    state = np.array(step.state)
+    for k in range(900):
+        along = 3.0 if k <= 240 else 0.11 * ((k - 241) // 236)
+        inputs = np.zeros(64), STANDS, (along, along)
+        compiled_tick(step.step, k, state, inputs, (), step.numbers)
+    assert state[ROUTE_SIZE] == 1.0
+
+
+def test_where_there_is_no_way_the_route_stays_until_there_is_one(compiled_tick):
+    """A ring of robots at rest, which go after the second attempt."""
+    planner = make()
+    step = planner.step_for(facts())
+    state = np.array(step.state)
+    ring = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
+    for k, slot in enumerate(ring):
+        angle = math.tau * k / OBJECT_SLOTS
+        x, y = 0.6 * math.cos(angle), 0.6 * math.sin(angle)
+        slot[:] = 1, x, y, 0, 0, 1, 0.15, 1
+    replans = []
+    for k in range(760):
+        objects = ring.ravel() if k < 600 else np.zeros(64)
+        inputs = objects, STANDS, (0.0, 0.0)
+        compiled_tick(step.step, k, state, inputs, (), step.numbers)
+        replans.append(state[ROUTE_SIZE])
+    assert np.flatnonzero(np.diff(replans)).tolist() == [719]
+    np.testing.assert_allclose(state[2:4], [1.0, 0.0], atol=1e-12)
+
+
+def test_without_replanning_the_route_stays(bench):
+    off = WAITS.model_copy(update={"replan": False})
+    planner, target = make(off), PathTarget(parameters=off, robot=ROBOT)
+    rows = run_by_drake(planner, target, [WALL], 800)
+    assert rows[-1, 2] == 0.0
+    assert rows[-1, 0] < 2.0
+    step = planner.step_for(facts())
+    state = np.array(step.state)
+    planner_step(900, state, (np.zeros(64), STANDS, (0.0, 0.0)), (), step.numbers)
+    np.testing.assert_array_equal(state, step.state)
+
+
+def test_a_run_has_its_own_start_and_map():
+    planner = make()
+    step = planner.step_for(facts(start=(0.0, 1.0), mapped=[WALL]))
+    expected = plan_route((0.0, 1.0), (4.0, 0.0), [WALL]).numbers
+    np.testing.assert_array_equal(step.state[:ROUTE_SIZE], expected)
+    np.testing.assert_array_equal(step.numbers.rectangles, [WALL])
+
+
+def test_planning_anew_takes_less_than_10_ms(compiled_tick):
+    """10 m x 10 m in cells of 5 cm, 20 boxes, 500 points seen; median of 7."""
+    generator = np.random.default_rng(5)
+    boxes = np.column_stack(
+        [generator.uniform(-4, 4, (20, 2)), np.zeros(20), np.full((20, 2), 0.4)]
+    )
+    boxes = boxes[np.hypot(boxes[:, 0], boxes[:, 1]) > 1.0]
+    corners = [[-4.9, 0, 0, 0.2, 10], [4.9, 0, 0, 0.2, 10]]
+    own = RouteParameters(goal_m=(4.4, 4.4), arena_margin_m=0.1, stalled_s=6.0)
+    boxes = boxes[np.hypot(boxes[:, 0] - 4.4, boxes[:, 1] - 4.4) > 1.0]
+    planner = make(own, [*boxes, *corners], (-4.4, -4.4))
+    step = planner.step_for(facts((-4.4, -4.4), [*boxes, *corners]))
+    assert step.numbers.grid.blocked.size >= 200 * 200
+    seen = step.numbers.seen
+    seen.points[:500] = generator.uniform(-4, 4, (500, 2)) * [1, 0.1]
+    seen.points[:500, 1] -= 1.5
+    seen.added[0] = 500
+    took = []
+    for k in range(8):
+        state = np.array(step.state)
+        inputs = np.zeros(64), (-4.4 - EPSILON, -4.4, 0.0), (0.0, 0.0)
+        begin = time.process_time()
+        compiled_tick(step.step, 240, state, inputs, (), step.numbers)
+        took.append(time.process_time() - begin)
+        assert state[ROUTE_SIZE] == 1.0, k
+    assert np.median(took[1:]) < 0.01
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"stall_m": 1.0}, "stall_m: 1 m in stalled_s = 6 s is more than .* lower"),
+        ({"cell_m": 0.2}, "cell_m: 0.2 m is too coarse"),
+        ({"clearance_m": 0.1}, "too coarse for a clearance of 0.1"),
+    ],
+)
+def test_parameters_that_cannot_serve_are_refused(changes, message):
+    with pytest.raises(ValidationError, match=message):
+        RouteParameters(**changes)
+
+
+def test_a_goal_in_an_obstacle_is_refused():
+    with pytest.raises(InputError, match="goal_m"):
+        make(known=[(4.0, 0.2, 0.0, 1.0, 1.0)])

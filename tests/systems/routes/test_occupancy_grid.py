@@ -1,0 +1,67 @@
+"""Blocked cells against distances worked out cell by cell, and SciPy's transform."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.ndimage import distance_transform_edt
+
+from systems.routes.occupancy_grid import (
+    arena_about,
+    block_discs,
+    block_rectangles,
+    cell_middle,
+    cell_of,
+    make_occupancy_grid,
+)
+from systems.world.geometry import rectangle_clearance
+
+RADIUS = 0.35
+ARENA = (-2.0, -1.5, 2.0, 1.5)
+
+
+def test_cells_near_rectangles_are_blocked_and_no_others():
+    generator = np.random.default_rng(3)
+    boxes = np.column_stack(
+        [generator.uniform(-2.2, 2.2, (6, 3)), generator.uniform(0.05, 1.0, (6, 2))]
+    )
+    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    block_rectangles(grid, boxes, RADIUS)
+    assert grid.blocked.shape == (80, 60)
+    for i in range(80):
+        for j in range(60):
+            # Two rectangles' distance, one of no extent.
+            speck = np.array([-1.975 + 0.05 * i, -1.475 + 0.05 * j, 0.0, 0.0, 0.0])
+            off = min(rectangle_clearance(speck, box) for box in boxes)
+            assert grid.blocked[i, j] == (off < RADIUS), (i, j, off)
+
+
+def test_discs_grow_as_a_distance_transform_does():
+    """From a disc in the middle of a cell, the transform is exact."""
+    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    marks = np.ones((80, 60), dtype=bool)
+    places = [(3, 5), (40, 22), (79, 59)]
+    discs = np.array([[*cell_middle(grid, i, j), 0.1] for i, j in places])
+    for place in places:
+        marks[place] = False
+    block_discs(grid, discs, RADIUS - 0.003)
+    off = 0.05 * distance_transform_edt(marks)
+    np.testing.assert_array_equal(grid.blocked, off < RADIUS + 0.1 - 0.003)
+
+
+def test_cells_and_their_middles():
+    grid = make_occupancy_grid(ARENA, 0.05, RADIUS)
+    assert cell_of(grid, -1.99, -1.49) == (0, 0)
+    assert cell_of(grid, 1.99, 1.49) == (79, 59)
+    assert cell_of(grid, 2.01, 0.0) == (-1, -1)
+    assert cell_of(grid, 0.0, -1.51) == (-1, -1)
+    assert cell_middle(grid, 40, 30) == pytest.approx((0.025, 0.025))
+
+
+def test_the_arena_holds_points_and_corners():
+    """A square of 1 m turned by 45 deg reaches sqrt(1/2) from its middle."""
+    arena = arena_about([(0, 0), (5, -1)], [[2, 3, math.pi / 4, 1, 1]], 0.5)
+    assert arena == pytest.approx((-0.5, -1.5, 5.5, 3.5 + math.sqrt(0.5)))
+    assert arena_about([(1, 2), (3, 4)], [], 1.0) == (0.0, 1.0, 4.0, 5.0)

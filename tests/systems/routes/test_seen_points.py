@@ -1,0 +1,91 @@
+"""What is remembered of objects, slot by slot."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.routes.occupancy_grid import make_occupancy_grid
+from systems.routes.seen_points import (
+    discs_to_avoid,
+    make_seen_points,
+    remember_objects,
+)
+
+ARENA = (-3.0, -3.0, 3.0, 3.0)
+P = (0.5, -0.5)
+NOTHING = np.empty((0, 5))
+
+
+def slots(*objects):
+    """There, x, y, vx, vy, velocity known, radius, is a robot; the rest is empty."""
+    port = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
+    port[: len(objects)] = np.reshape(objects, (-1, OBJECT_SIZE))
+    return port.ravel()
+
+
+def remembered(*objects, rectangles=NOTHING):
+    grid = make_occupancy_grid(ARENA, 0.05, 0.35)
+    seen = make_seen_points(grid)
+    remember_objects(seen, grid, rectangles, slots(*objects), P)
+    return seen.points[: seen.added[0]]
+
+
+def test_nearest_points_of_what_rests_or_may_rest():
+    found = remembered(
+        (1, 0.6, 0.0, 0, 0, 1, 0.2, 0),
+        (1, 0.0, 0.7, 0.0, 0, 0, 0, 0),
+        (1, 1.0, 1.0, 0.01, 0.01, 1, 0, 0),
+    )
+    assert found == pytest.approx(np.array([[1.1, -0.5], [0.5, 0.2], [1.5, 0.5]]))
+
+
+@pytest.mark.parametrize(
+    "slot",
+    [
+        (0, 0.6, 0.0, 0, 0, 0, 0, 0),
+        (1, 0.6, 0.0, 0.1, 0, 1, 0.2, 0),
+        (1, 0.6, 0.0, 0, 0, 1, 0.2, 1),
+        (1, 2.6, 0.0, 0, 0, 1, 0, 0),
+    ],
+    ids=["empty", "moves", "robot", "off the arena"],
+)
+def test_what_is_not_remembered(slot):
+    assert len(remembered(slot)) == 0
+
+
+def test_what_the_map_has_is_not_remembered():
+    box = np.array([[1.3, -0.5, 0.0, 0.4, 0.4]])
+    at_box, beside = (1, 0.6, 0.0, 0, 0, 1, 0, 0), (1, 0.5, 0.3, 0, 0, 1, 0, 0)
+    found = remembered(at_box, beside, rectangles=box)
+    assert found == pytest.approx(np.array([[1.0, -0.2]]))
+
+
+def test_one_point_a_cell_and_the_oldest_are_forgotten():
+    grid = make_occupancy_grid((0.0, 0.0, 6.0, 6.0), 0.05, 0.35)
+    seen = make_seen_points(grid)
+    assert len(seen.points) == 4000
+    for k in range(5000):
+        x, y = 0.05 * (k % 120) + 0.02, 0.05 * (k // 120) + 0.01
+        for shift in (0.0, 0.02):
+            port = slots((1, x + shift - P[0], y - P[1], 0, 0, 0, 0, 0))
+            remember_objects(seen, grid, NOTHING, port, P)
+    assert seen.added[0] == 5000
+    assert seen.taken.sum() == 4000
+    # The first thousand made room for the last.
+    assert seen.points[0] == pytest.approx([0.05 * (4000 % 120) + 0.02, 0.05 * 33.2])
+    assert not seen.taken[0, 0]
+    assert seen.taken[120 - 1, 40]
+
+
+def test_routes_keep_off_robots_that_rest_for_now():
+    grid = make_occupancy_grid(ARENA, 0.05, 0.35)
+    seen = make_seen_points(grid)
+    box = (1, 0.6, 0.0, 0, 0, 0, 0, 0)
+    rests, moves = (1, 0, -0.8, 0, 0, 1, 0.15, 1), (1, 0.9, 0, 0, 0.1, 1, 0.15, 1)
+    port = slots(box, rests, moves)
+    remember_objects(seen, grid, NOTHING, port, P)
+    expected = [[1.1, -0.5, 0.0], [0.5, -0.5 - 0.95, 0.15]]
+    assert discs_to_avoid(seen, port, P) == pytest.approx(np.array(expected))
+    assert discs_to_avoid(seen, slots(), P) == pytest.approx(np.array(expected[:1]))
