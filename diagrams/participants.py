@@ -22,6 +22,7 @@ from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowingParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
 from systems.ranging.ideal_object_sensor import ObjectSensorParameters
+from systems.ranging.object_detector import ObjectDetectorParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.routes.global_planner import RouteParameters
 from systems.safety.free_space_map import FreeSpaceParameters
@@ -85,6 +86,7 @@ class FollowerParameters(Parameters):
     route: RouteParameters | None = None
     """A goal to drive to on a planned way, in the place of a sound to follow."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
+    detector: ObjectDetectorParameters = ObjectDetectorParameters()
     guard: GuardParameters | None = None
     """Keeps the robot in space that its sensors have seen free, whatever the law; null:
     nothing does, unless the law is ``guarded``."""

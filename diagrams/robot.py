@@ -175,7 +175,7 @@ def robot_blocks(
             scenario,
             bodies=bodies,
             robots=robots,
-            seed=seed_of(scenario, "ideal_object_sensor", name),
+            seed_of=lambda block: seed_of(scenario, block, name),
         )
     ours = [
         DiffDrivePlant(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from diagrams.scenario import Scenario
@@ -10,10 +10,12 @@ from systems import (
     GlobalPlanner,
     IdealObjectSensor,
     ImpedanceAdaptation,
+    ObjectDetector,
     PathTarget,
     ReferenceModel,
     SafetyFilter,
     TrajectoryImpedanceController,
+    UltrasonicArray,
 )
 from systems.laws.trajectory.trajectory_laws import (
     AdaptiveTrajectoryParameters,
@@ -70,7 +72,11 @@ def trajectory_command(scenario: Scenario) -> Any | None:
 
 
 def routed_blocks(
-    scenario: Scenario, *, bodies: int, robots: Sequence[int], seed: int
+    scenario: Scenario,
+    *,
+    bodies: int,
+    robots: Sequence[int],
+    seed_of: Callable[[str], int],
 ) -> list[Any]:
     """All but plant, odometry, law and wheel command.
 
@@ -78,7 +84,7 @@ def routed_blocks(
         scenario: Of this robot alone, see ``Scenario.of_robot``.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
         robots: Which of them are robots.
-        seed: Of its sensors.
+        seed_of: Seed of a block by its name.
 
     Returns:
         Blocks, not yet in a diagram.
@@ -97,15 +103,45 @@ def routed_blocks(
             tick_s=tick_s,
         ),
         PathTarget(parameters=scenario.route, robot=robot, tick_s=tick_s),
-        IdealObjectSensor(
-            parameters=scenario.objects,
+        *_seen_objects(scenario, bodies, robots, seed_of),
+        *_adaptation(scenario),
+    ]
+
+
+def _seen_objects(
+    scenario: Scenario,
+    bodies: int,
+    robots: Sequence[int],
+    seed_of: Callable[[str], int],
+) -> list[Any]:
+    robot, tick_s = scenario.robot, scenario.tick_s
+    if scenario.obstacle_sensing == "ideal":
+        return [
+            IdealObjectSensor(
+                parameters=scenario.objects,
+                robot=robot,
+                bodies=bodies,
+                robots=robots,
+                seed=seed_of("ideal_object_sensor"),
+                tick_s=tick_s,
+            )
+        ]
+    return [
+        UltrasonicArray(
+            parameters=scenario.ultrasonic,
+            acoustics=scenario.acoustics,
             robot=robot,
-            bodies=bodies,
-            robots=robots,
-            seed=seed,
+            source_size=None,
+            obstacle_count=bodies,
+            seed=seed_of("ultrasonic_array"),
             tick_s=tick_s,
         ),
-        *_adaptation(scenario),
+        ObjectDetector(
+            parameters=scenario.detector,
+            sensors=scenario.ultrasonic,
+            robot=robot,
+            tick_s=tick_s,
+        ),
     ]
 
 

@@ -55,6 +55,7 @@ from systems.ranging.ideal_obstacle_sensor import (
     IdealObstacleSensor,
     IdealObstacleSensor_,
 )
+from systems.ranging.object_detector import ObjectDetector
 from systems.ranging.ultrasonic_array import UltrasonicArray
 from systems.routes.global_planner import GlobalPlanner
 from systems.routes.path_target import PathTarget
@@ -90,6 +91,7 @@ __all__ = [
     "ImpedanceAdaptation",
     "MicArray",
     "MotionGuard",
+    "ObjectDetector",
     "Obstacles",
     "Obstacles_",
     "PathIntegralController",

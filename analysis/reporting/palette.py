@@ -27,7 +27,16 @@ COLOURS = {
     "tracked": "#882255",
 }
 #: Of several robots, in turn.
-ROBOT_COLOURS = ("#0072B2", "#009E73", "#AA4499", "#56B4E9", "#B07D00", "#332288")
+ROBOT_COLOURS = (
+    "#0072B2",
+    "#009E73",
+    "#AA4499",
+    "#56B4E9",
+    "#B07D00",
+    "#332288",
+    "#882255",
+    "#444444",
+)
 
 #: For curves that are no such thing, as of laws: in order, after the grey of none.
 SERIES_COLOURS = (

@@ -161,6 +161,8 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         _record_estimate(meshcat, own, estimate_path(path))
         p_WP = own.vector("p_WP").T
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
+        if own.scenario.route is not None:
+            _record_target(meshcat, own, path, frames, look.estimates)
         if own.name in sounds:
             _record_rings(meshcat, result, path, sounds[own.name])
         _record_known_space(meshcat, result, look, path)
@@ -290,6 +292,22 @@ def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
             meshcat.SetTransform(path, upright(x_0, y_0, height, 0.0), before)
         time = float(result.time[tick])
         meshcat.SetTransform(path, upright(x, y, height, 0.0), time)
+
+
+def _record_target(
+    meshcat: Meshcat,
+    result: RunResult,
+    path: str,
+    frames: NDArray[np.float64],
+    colour: str,
+) -> None:
+    """The ball is the target on the way, and leaves a thin line."""
+    places = result.vector("target").T
+    flat = np.column_stack([places, np.zeros(len(places))])
+    height = replay_scene.SOURCE_HEIGHT_M
+    seen = _at_frames(result, flat, frames)
+    _record_path(meshcat, estimate_path(path), frames, seen, height)
+    _record_trail(meshcat, result, f"trail/target/{path}", places, colour)
 
 
 def _record_known_space(

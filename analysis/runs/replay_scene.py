@@ -184,7 +184,10 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
     for side, y in (("left", 0.5), ("right", -0.5)):
         place = y * robot.wheel_separation_m
         _add_wheel(meshcat, scenario, f"{path}/{side}", place)
-    _add_microphones(meshcat, scenario, path)
+    if scenario.route is None:
+        _add_microphones(meshcat, scenario, path)
+    else:
+        _add_goal(meshcat, scenario.route.goal_m, look.colour, path)
     if scenario.obstacle_sensing == "ultrasonic":
         for sensor in range(scenario.ultrasonic.count):
             _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
@@ -201,6 +204,14 @@ def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> Non
     meshcat.SetObject(f"{path}/wheel/tyre", tyre, Rgba(0.12, 0.12, 0.12))
     spoke = Box(1.7 * radius, 0.25 * radius, WHEEL_WIDTH_M + 0.004)
     meshcat.SetObject(f"{path}/wheel/spoke", spoke, Rgba(0.95, 0.95, 0.95))
+
+
+def _add_goal(
+    meshcat: Meshcat, goal: tuple[float, float], colour: str, robot: str
+) -> None:
+    """A flat disc on the floor where P is to come to rest."""
+    disc = Cylinder(0.08, 0.01)
+    _put(meshcat, f"goals/{robot}", disc, _colour(colour, 0.6), *goal, 0.006)
 
 
 def _add_microphones(meshcat: Meshcat, scenario: Scenario, path: str) -> None:

@@ -122,6 +122,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     panels = [_range, _bearing] if hears else [_goal]
     if "attraction_x" in result.columns:  # a law may tell no forces
         panels.append(_forces)
+    if "stiffness" in result.columns:
+        panels.append(_gains)
     panels += [_speeds, _turning]
     if guarded_motion(result) is not None:
         panels += [_guard_actions, _guard_distances]
@@ -220,6 +222,17 @@ def _forces(axes: Axes, result: RunResult) -> None:
         size = np.hypot(*result.vector(name))
         axes.plot(result.time, size, color=COLOURS[name], lw=1.2, label=name)
     axes.set_ylabel("force on P\n(N)")
+    axes.set_ylim(bottom=0.0)
+
+
+def _gains(axes: Axes, result: RunResult) -> None:
+    for name, label, colour in (
+        ("stiffness", "K (N/m)", "source"),
+        ("damping", "D (N s/m)", "robot"),
+        ("contact_stiffness", "K_e (N/m)", "repulsion"),
+    ):
+        axes.plot(result.time, result.columns[name], color=COLOURS[colour], label=label)
+    axes.set_ylabel("adapted gains")
     axes.set_ylim(bottom=0.0)
 
 

@@ -78,6 +78,7 @@ class Look(NamedTuple):
     """Colour of where it takes the source to be."""
     path_label: str = "path of the control point P"
     body_label: str = "robot with its microphones"
+    """Empty: the path's colour tells."""
     estimates_label: str = "estimates of the source, faint: early"
     seen: str = COLOURS["seen"]
     """Of the floor that it knows to be free, much lightened."""
@@ -99,8 +100,8 @@ def looks(result: RunResult) -> list[Look]:
             own,
             colour,
             colour,
-            f"path of {name}'s P",
-            name if own.scenario.route else f"{name} with its microphones",
+            f"{name}, path of P" if own.scenario.route else f"path of {name}'s P",
+            "" if own.scenario.route else f"{name} with its microphones",
             f"{name}'s estimates, faint: early",
             colour,
             colour,

@@ -94,7 +94,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
             facecolor=(*to_rgb(colour), 0.10),
             edgecolor=colour,
             linewidth=1.0,
-            label=look.body_label if index == 0 else None,
+            label=(look.body_label or None) if index == 0 else None,
             zorder=3,
         )
         if scenario.route is None:
@@ -105,13 +105,13 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
 
 def _draw_target(axes: Axes, look: Look) -> None:
     """Where the target has been, and the goal."""
-    of = f" of {look.result.name}" if look.result.whole else ""
+    several = look.result.whole is not None
     axes.plot(
         *look.result.vector("target"),
         ":",
         color=look.colour,
         linewidth=1.2,
-        label=f"path of the target{of}",
+        label="paths of the targets" if several else "path of the target",
         zorder=3.5,
     )
     route = look.result.scenario.route
@@ -122,7 +122,7 @@ def _draw_target(axes: Axes, look: Look) -> None:
         color=look.colour,
         markersize=11,
         linestyle="none",
-        label=f"goal{of}",
+        label="goals" if several else "goal",
         zorder=5,
     )
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import sys
 from collections import Counter
+from collections.abc import Mapping
+from typing import Any
 
 from analysis.comparison.compare import library_layouts
 from analysis.reporting.intervals import wilson_interval
@@ -16,7 +18,7 @@ from analysis.sweeps.plan import load_sweep
 from diagrams import simulate
 from systems.laws.catalogue import LAWS
 
-__all__ = ["SCENARIOS", "outcomes", "routes_table"]
+__all__ = ["SCENARIOS", "outcomes", "outcomes_cell", "routes_table"]
 
 #: Of the library, those whose robots have routes.
 SCENARIOS = (
@@ -34,7 +36,13 @@ SCENARIOS = (
 )
 
 
-def outcomes(scenario: str, law: str, runs: int, seed: int = 2026) -> Counter[str]:
+def outcomes(
+    scenario: str,
+    law: str,
+    runs: int,
+    seed: int = 2026,
+    settings: Mapping[str, Any] | None = None,
+) -> Counter[str]:
     """How runs of random layouts ended.
 
     Args:
@@ -42,13 +50,18 @@ def outcomes(scenario: str, law: str, runs: int, seed: int = 2026) -> Counter[st
         law: Of all robots.
         runs: Layouts.
         seed: Of all of them; the same layouts for each law.
+        settings: Fields of the scenario that differ.
 
     Returns:
         Causes and how often each was; of several robots that of the first which did
         not do what it should.
     """
     plan = load_sweep(library_layouts()[scenario])
-    fields = {"set": {**plan.set, "law": law}, "runs": runs, "seed": seed}
+    fields = {
+        "set": {**plan.set, "law": law, **(settings or {})},
+        "runs": runs,
+        "seed": seed,
+    }
     plan = plan.model_copy(update=fields)
     return Counter(
         simulate(plan.scenario_of(point), engine="compiled").cause
@@ -69,11 +82,20 @@ def routes_table(runs: int) -> str:
     rows = []
     for scenario in SCENARIOS:
         found = [outcomes(scenario, law, runs) for law in laws]
-        rows.append([f"`{scenario}`", *(_cell(each, runs) for each in found)])
+        rows.append([f"`{scenario}`", *(outcomes_cell(each, runs) for each in found)])
     return markdown_table(["layouts", *(f"`{law}`" for law in laws)], rows)
 
 
-def _cell(causes: Counter[str], runs: int) -> str:
+def outcomes_cell(causes: Counter[str], runs: int) -> str:
+    """What the tables say of some runs.
+
+    Args:
+        causes: As ``outcomes``.
+        runs: How many there were.
+
+    Returns:
+        Collisions, % with the 95 % interval, then goals reached, %.
+    """
     hits = wilson_interval(causes["collision"], runs)
     low, high = 100.0 * hits.low, 100.0 * hits.high
     reached = 100.0 * causes["reached"] / runs

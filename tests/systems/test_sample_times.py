@@ -21,6 +21,7 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "ImpedanceAdaptation": {},
     "MicArray": {},
     "MotionGuard": {},
+    "ObjectDetector": {},
     "PathTarget": {},
     "ReferenceModel": {},
     "SafetyFilter": {},
