@@ -176,8 +176,8 @@ class ObjectDetector(LeafSystem, StepBlock):
     as the beams are apart. A second after boxes have come into view that cross at 0.15
     to 0.3 m/s, 1 m off, half of the velocities are wrong by more than 25 % with 36
     beams all around, 15 % with 72 and 7 % with 360, and what rests seems to move at up
-    to 0.3, 0.1 and 0 m/s while the robot turns. Where beams are
-    farther apart than ``coarse_m``, as the 7 from 0.48 m on, none is known.
+    to 0.3, 0.12 and 0 m/s while the robot turns. Where beams are farther apart than
+    ``coarse_m``, as the 7 from 0.48 m on, none is known.
 
     Discrete state, every tick: hits and tracks. The output is a function of state and
     inputs: no latency, but the velocity follows a change within some 0.5 s.

@@ -46,6 +46,8 @@ TRACK_SIZE = _COVARIANCE + 16
 _FIRST_M_S, _ANYWHERE_M = 0.5, 10.0
 #: In which what an object's place is behind its nearest point follows what is seen, s.
 _DEPTH_S = 4.0
+#: In which a motion along a surface that cannot be seen any more is forgotten.
+_FORGET_S = 5.0
 
 
 class TrackNumbers(NamedTuple):
@@ -94,27 +96,54 @@ def _move_on(track: Any, own: TrackNumbers) -> None:  # pragma: no cover  (compi
 
 @njit(cache=True)
 def _correct(
-    track: Any, place: Any, along: Any, variances: Any
+    track: Any, off: float, h: Any, variance: float
 ) -> None:  # pragma: no cover  (compiled)
-    """Takes a place in, one direction after the other.
+    """Takes in how far off a place is along a unit vector, m."""
+    state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
+    gain = p[:, 0] * h[0] + p[:, 1] * h[1]
+    total = gain[0] * h[0] + gain[1] * h[1] + variance
+    for i in range(4):
+        state[i] += gain[i] / total * off
+    for i in range(4):
+        for j in range(4):
+            p[i, j] -= gain[i] * gain[j] / total
 
-    Args:
-        track: Changed.
-        place: (x, y) in W, m.
-        along: Unit vector of the first direction; the second one is across.
-        variances: Of the place in both directions, m^2.
+
+@njit(cache=True)
+def _turn_surface(
+    track: Any, p_WP: Any, along: Any, own: TrackNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """The place of a surface slides to where it is nearest now, as far from P.
+
+    By the noise of ranges it slides to and fro by more than a beam, and only how far it
+    is tells of motion. What is known of that goes with it; of motion along the surface
+    nothing is, and it comes to count as none.
     """
     state, p = track[_STATE:_COVARIANCE], track[_COVARIANCE:].reshape(4, 4)
-    for k in range(2):
-        hx, hy = (along[0], along[1]) if k == 0 else (-along[1], along[0])
-        gain = p[:, 0] * hx + p[:, 1] * hy
-        total = gain[0] * hx + gain[1] * hy + variances[k]
-        off = (place[0] - state[0]) * hx + (place[1] - state[1]) * hy
-        for i in range(4):
-            state[i] += gain[i] / total * off
-        for i in range(4):
-            for j in range(4):
-                p[i, j] -= gain[i] * gain[j] / total
+    x, y = state[0] - p_WP[0], state[1] - p_WP[1]
+    far = max(math.hypot(x, y), 1e-9)
+    old = np.array([x / far, y / far])
+    new, across = np.array([along[0], along[1]]), np.array([-along[1], along[0]])
+    old_across = np.array([-old[1], old[0]])
+    outer, outer_across = np.outer(new, new), np.outer(across, across)
+    for i in range(2):
+        for j in range(2):
+            part = p[2 * i : 2 * i + 2, 2 * j : 2 * j + 2].copy()
+            aside = 0.0
+            if i == j:
+                aside = np.sum(part * np.outer(old_across, old_across))
+            # Where along the surface tells nothing of the middle of what is seen.
+            if i == 0 and j == 0:
+                aside = _ANYWHERE_M**2
+            towards = np.sum(part * np.outer(old, old))
+            p[2 * i : 2 * i + 2, 2 * j : 2 * j + 2] = (
+                towards * outer + aside * outer_across
+            )
+    state[0], state[1] = p_WP[0] + far * along[0], p_WP[1] + far * along[1]
+    aside_m_s = along[0] * state[3] - along[1] * state[2]
+    lost = own.tick_s / _FORGET_S * aside_m_s
+    state[2] += lost * along[1]
+    state[3] -= lost * along[0]
 
 
 @njit(cache=True)
@@ -148,8 +177,6 @@ def _take_in(
     far = max(math.hypot(x, y), 1e-9)
     along = x / far, y / far
     place = p_WP[0] + x, p_WP[1] + y
-    aside = _ANYWHERE_M if wide else own.noise_m + group[CHORD]
-    variances = own.noise_m**2, aside**2
     if track[_EXISTS] < 0.5:
         track[_EXISTS] = 1.0
         track[_STATE], track[_STATE + 1] = place
@@ -157,13 +184,15 @@ def _take_in(
         for i in range(2):
             p[i, i] = _ANYWHERE_M**2
             p[2 + i, 2 + i] = _FIRST_M_S**2
-    _correct(track, place, along, variances)
     if wide:
-        # Its nearest point slides along the surface; towards P it was foretold.
+        _turn_surface(track, p_WP, along, own)
+    dx, dy = place[0] - track[_STATE], place[1] - track[_STATE + 1]
+    _correct(track, dx * along[0] + dy * along[1], along, own.noise_m**2)
+    if not wide:
+        across = -along[1], along[0]
         dx, dy = place[0] - track[_STATE], place[1] - track[_STATE + 1]
-        slid = along[0] * dy - along[1] * dx
-        track[_STATE] -= slid * along[1]
-        track[_STATE + 1] += slid * along[0]
+        aside = own.noise_m + group[CHORD]
+        _correct(track, dx * across[0] + dy * across[1], across, aside**2)
     track[_SURE] = track[_SURE] + own.tick_s if sure else 0.0
     track[_UNSEEN] = 0.0
     track[_QX], track[_QY] = p_WP[0] + group[NEAR_X], p_WP[1] + group[NEAR_Y]

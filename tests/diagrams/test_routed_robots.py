@@ -6,20 +6,24 @@ import numpy as np
 import pytest
 
 from diagrams import load_scenario, simulate
+from docs.tables.object_sensing import SENSING
 from docs.tables.routes import outcomes
 from systems.framework.input_error import InputError
 
 
+BEAMS = "obstacle_sensing=ultrasonic", "ultrasonic.preset=scan_7"
+
+
 @pytest.mark.parametrize(
-    ("name", "law"),
+    ("name", "law", "fields"),
     [
-        ("unknown_block", "trajectory_adaptive"),
-        ("unknown_block", "trajectory_filtered"),
-        ("robots_2", "trajectory_filtered"),
+        ("unknown_block", "trajectory_adaptive", ()),
+        ("unknown_block", "trajectory_filtered", BEAMS),
+        ("robots_2", "trajectory_filtered", ()),
     ],
 )
-def test_both_engines_do_the_same(name, law):
-    scenario = load_scenario(name, [f"law={law}"])
+def test_both_engines_do_the_same(name, law, fields):
+    scenario = load_scenario(name, [f"law={law}", *fields])
     drake, compiled = (simulate(scenario, engine=e) for e in ("drake", "compiled"))
     assert drake.cause == compiled.cause
     assert drake.columns.keys() == compiled.columns.keys()
@@ -43,6 +47,14 @@ def test_a_goal_is_reached_at_rest():
 )
 def test_filtered_it_touches_nothing_and_arrives(scenario, runs):
     assert outcomes(scenario, "trajectory_filtered", runs) == {"reached": runs}
+
+
+@pytest.mark.slow
+def test_with_72_beams_it_passes_walls_that_the_map_does_not_have():
+    """What rests must rest to them, or the way is never planned anew."""
+    settings = SENSING["72 beams"]
+    found = outcomes("unknown_wall", "trajectory_filtered", 20, settings=settings)
+    assert found == {"reached": 20}
 
 
 @pytest.mark.slow

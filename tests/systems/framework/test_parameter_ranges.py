@@ -85,6 +85,11 @@ FIELDS = {
     "ObjectSensorParameters.noise_m": (0.0, 1e3),
     "ObjectSensorParameters.velocity_noise_m_s": (0.0, 100.0),
     "ObjectSensorParameters.latency_s": (0.0, 86_400.0),
+    "ObjectDetectorParameters.most_oblique_deg": (0.0, 85.0),
+    "ObjectDetectorParameters.noise_m": (0.0, 1e3),
+    "ObjectDetectorParameters.confirmation_s": (0.0, 86_400.0),
+    "ObjectDetectorParameters.memory_s": (0.0, 86_400.0),
+    "ObjectDetectorParameters.resting_m_s": (0.0, 100.0),
     # A way along walls would graze them.
     "RouteParameters.clearance_m": (1e-9, 1e3),
     "GuardParameters.obstacle_speed_m_s": (0.0, 100.0),
