@@ -10,7 +10,6 @@ from docs.tables.object_sensing import SENSING
 from docs.tables.routes import outcomes
 from systems.framework.input_error import InputError
 
-
 BEAMS = "obstacle_sensing=ultrasonic", "ultrasonic.preset=scan_7"
 
 
