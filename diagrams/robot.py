@@ -171,12 +171,13 @@ def robot_blocks(
     if scenario.route is None:
         sensing = _sound_and_ranges(scenario, name, controller, bodies, others)
     else:
-        sensing = routed_blocks(
-            scenario,
-            bodies=bodies,
-            robots=robots,
-            seed_of=lambda block: seed_of(scenario, block, name),
-        )
+        with _fields_of_robot(name):
+            sensing = routed_blocks(
+                scenario,
+                bodies=bodies,
+                robots=robots,
+                seed_of=lambda block: seed_of(scenario, block, name),
+            )
     ours = [
         DiffDrivePlant(
             robot=scenario.robot, plant=scenario.plant, initial_pose=scenario.start.pose
@@ -307,6 +308,17 @@ def _emitter(
             tick_s=scenario.tick_s,
             seed=seed_of(scenario, "sound_emitter", name),
         )
+
+
+@contextmanager
+def _fields_of_robot(name: str) -> Iterator[None]:
+    """Errors of a route name the robot's field in the scenario."""
+    try:
+        yield
+    except InputError as error:
+        if name == ROBOT or not error.field.startswith(("route.", "start.")):
+            raise
+        raise InputError(f"robots.{name}.{error.field}", error.message) from None
 
 
 @contextmanager

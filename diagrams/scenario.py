@@ -24,6 +24,7 @@ from diagrams.bodies import (
     robot_rectangle,
 )
 from diagrams.explain import explain
+from diagrams.goal_checks import check_goals
 from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
 from diagrams.run_parameters import RunParameters
@@ -312,6 +313,7 @@ class Scenario(FollowerParameters, RunParameters):
                     f"is missing, and law {robot.law!r} drives on one; set "
                     f"{prefix}route.goal_m",
                 )
+        check_goals(dict(self._robot_fields()), self.stop.diverged_range_m)
         return self
 
     @model_validator(mode="after")

@@ -250,14 +250,19 @@ class GlobalPlanner(LeafSystem):
     ) -> Step:
         own, epsilon = self._parameters, self._robot.control_point_m
         start = control_point(initial_pose, epsilon)
-        route = plan_route(
-            start,
-            goal,
-            known,
-            clearance_m=own.clearance_m,
-            cell_m=own.cell_m,
-            arena_margin_m=own.arena_margin_m,
-        )
+        try:
+            route = plan_route(
+                start,
+                goal,
+                known,
+                clearance_m=own.clearance_m,
+                cell_m=own.cell_m,
+                arena_margin_m=own.arena_margin_m,
+            )
+        except InputError as error:
+            field = "start.position_m" if error.field == "start" else error.field
+            group = "" if error.field == "start" else "route."
+            raise InputError(f"{group}{field}", error.message) from error
         arena = arena_about([start, goal], known, own.arena_margin_m)
         grid = make_occupancy_grid(arena, own.cell_m, own.clearance_m)
         block_rectangles(grid, known, own.clearance_m)

@@ -79,10 +79,38 @@ def test_adaptation_collides_more_often_than_the_same_law_without():
     [
         (["law=active"], "law: is 'active', which follows a sound"),
         (["route=null"], "route: is missing, and law 'trajectory_filtered'"),
-        (["obstacles.0.known=true", "route.goal_m=[3.0, 0.1]"], "goal_m"),
-        (["route.cell_m=0.5"], "cell_m"),
+        (
+            ["obstacles.0.known=true", "route.goal_m=[3.0, 0.1]"],
+            r"^route.goal_m: \(3, 0.1\) lies in a known obstacle",
+        ),
+        (
+            ["obstacles.0.known=true", "route.arena_margin_m=0.2"],
+            "^route.goal_m: no way leads",
+        ),
+        (["route.cell_m=0.5"], "^route.cell_m"),
+        (
+            ["route.goal_m=[60, 0]"],
+            "^route.goal_m: .* beyond stop.diverged_range_m, 20",
+        ),
+        (["guard={}"], "^guard: is set, but a robot on a route"),
     ],
 )
 def test_what_cannot_be_is_refused(fields, message):
     with pytest.raises(InputError, match=message):
         simulate(load_scenario("unknown_block", fields))
+
+
+@pytest.mark.parametrize(
+    ("fields", "message"),
+    [
+        (
+            ["robots.second.route.goal_m=[3.1, 0.1]"],
+            "0.141 m from another robot's goal",
+        ),
+        (["robots.second.start.position_m=[-3.0, 0.1]"], "stands in robot 'first'"),
+        (["robots.second.route.cell_m=0.5"], "^robots.second.route.cell_m"),
+    ],
+)
+def test_nor_what_two_robots_cannot(fields, message):
+    with pytest.raises(InputError, match=message):
+        simulate(load_scenario("robots_2", fields))
