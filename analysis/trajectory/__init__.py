@@ -1,0 +1,1 @@
+"""Stability of robots on routes: frozen gains, adaptation, chains of robots."""

@@ -1,0 +1,294 @@
+"""Poles and margins of a robot on a route, and how stiff and damped it may be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.linear.contact_mode import contact_matrix
+from analysis.linear.loop_margins import LoopMargins, loop_margins
+from analysis.models.linear_models import LinearModel
+from analysis.trajectory.route_loop import (
+    AXES,
+    RoutePoint,
+    acceleration_loop,
+    frozen_model,
+    route_law,
+    route_points,
+)
+from diagrams.scenario import Scenario
+from systems.laws.trajectory.sampled_bounds import (
+    SampledMass,
+    damping_bound,
+    stiffness_bound,
+)
+from systems.laws.trajectory.trajectory_impedance import (
+    TrajectoryImpedanceParameters,
+    contact_numbers,
+)
+
+__all__ = [
+    "WELL_DAMPED",
+    "FrozenPoint",
+    "GainBounds",
+    "damping_ratio",
+    "damped_stiffness",
+    "frozen_gains",
+    "gain_bounds",
+]
+
+#: The damping ratio that is asked for.
+WELL_DAMPED = 0.7
+#: Ages of the place that the bounds are for, ticks: as built, and a processor's more.
+LATE_TICKS = (0, 1)
+#: Dampings of the chart, N s/m, up to this share of the greatest.
+_CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.995
+_HALVINGS = 50
+#: Poles nearer to z = 0 are delays.
+_DELAY = 1e-6
+
+
+@dataclass(frozen=True)
+class FrozenPoint:
+    """The loop at one place, gains frozen."""
+
+    at: RoutePoint
+    stiffness_n_m: float
+    """All springs along the route, N/m."""
+    damping_n_s_m: float
+    """All dampers along the route, N s/m."""
+    model: LinearModel
+    """From target to P."""
+    margins: dict[str, LoopMargins]
+    """Of the loop cut at the acceleration, along and across."""
+
+    @property
+    def poles(self) -> NDArray[np.complex128]:
+        """(n,) s plane, rad/s: ln(z)/T."""
+        return _s_plane(self.model.poles, self.model.period_s or 1.0)
+
+    @property
+    def growth_per_s(self) -> float:
+        """Of the slowest mode, 1/s; negative where all decay."""
+        return float(self.poles.real.max())
+
+    @property
+    def damping_ratio(self) -> float:
+        """Of the least damped mode; 1 where none swings."""
+        return float((-self.poles.real / np.abs(self.poles)).min())
+
+
+def _s_plane(
+    z: NDArray[np.complex128], period_s: float
+) -> NDArray[np.complex128]:
+    moving = z[np.abs(z) > _DELAY].astype(complex)
+    return np.log(moving) / period_s
+
+
+def frozen_gains(scenario: Scenario) -> tuple[FrozenPoint, ...]:
+    """Poles and margins at each of ``route_points``.
+
+    Raises:
+        InputError: The law is none of a route, or the wheels can slip.
+    """
+    return tuple(_frozen(scenario, point) for point in route_points(scenario))
+
+
+def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
+    own = route_law(scenario)
+    stiffness, damping = own.stiffness_n_m, own.damping_n_s_m
+    if point.wall_m is not None:
+        contact = _contact(own, point.wall_m)
+        stiffness, damping = stiffness + contact[0], damping + contact[1]
+    return FrozenPoint(
+        at=point,
+        stiffness_n_m=stiffness,
+        damping_n_s_m=damping,
+        model=frozen_model(scenario, point),
+        margins={
+            axis: loop_margins(acceleration_loop(scenario, point, axis))
+            for axis in AXES
+        },
+    )
+
+
+def _contact(
+    own: TrajectoryImpedanceParameters, distance_m: float
+) -> tuple[float, float]:
+    """Stiffness, N/m, and damping, N s/m, that a contact adds along its normal."""
+    numbers = contact_numbers(own)
+    share = 1.0 - distance_m / numbers.begins_m if numbers.fades else 1.0
+    # Eq. 10 pulls by the distance itself, and its spring is as stiff.
+    return (
+        own.contact_stiffness_n_m,
+        numbers.damper_sign * share * own.contact_damping_n_s_m,
+    )
+
+
+@dataclass(frozen=True)
+class GainBounds:
+    """How stiff and how damped the sampled loop may be."""
+
+    mass: SampledMass
+    """Mass, lag and tick."""
+    late_ticks: tuple[int, ...]
+    """Ages of the place, one a column of the curves."""
+    damping_n_s_m: NDArray[np.float64]
+    """(n,) dampings of the curves, N s/m."""
+    stable_n_m: NDArray[np.float64]
+    """(n, ages) stiffness at which it stops coming to rest, N/m."""
+    damped_n_m: NDArray[np.float64]
+    """(n, ages) stiffness up to which the damping ratio is 0.7 or more, N/m."""
+    today: dict[str, tuple[float, float]]
+    """(K, D) of the scenario: of the target alone, and with a contact."""
+    stable_today_n_m: tuple[float, ...]
+    """At the target's own damping, for each age, N/m."""
+    damped_today_n_m: tuple[float, ...]
+    """The same for a damping ratio of 0.7."""
+    closed_form_n_m: tuple[float, ...]
+    """``stable_today_n_m`` by ``stiffness_bound``, N/m."""
+    most_damping_n_s_m: float
+    """Greatest sum of dampers, by bisection, N s/m."""
+    closed_damping_n_s_m: float
+    """2 M/T."""
+    contacts: float
+    """How many contacts of full damping may be summed; infinite without damping."""
+    box: tuple[tuple[float, float], tuple[float, float]] | None
+    """(K, D) of the adaptation's box, least and greatest; none: it has none."""
+
+
+def gain_bounds(scenario: Scenario) -> GainBounds:
+    """Bounds of K and D by bisection on the blocks' own one-period matrix.
+
+    Raises:
+        InputError: The law is none of a route, or the wheels can slip.
+    """
+    own = route_law(scenario)
+    of = SampledMass(
+        scenario.robot.mass_kg, scenario.plant.motor_lag_s, scenario.tick_s
+    )
+    most = _most_damping(scenario)
+    dampings = np.geomspace(_LEAST_N_S_M, _MOST * most, _CHART_POINTS)
+    both = [
+        [_bounds(scenario, float(d), late) for late in LATE_TICKS] for d in dampings
+    ]
+    curves = np.array(both)
+    today = np.array(
+        [_bounds(scenario, own.damping_n_s_m, late) for late in LATE_TICKS]
+    )
+    zone = contact_numbers(own).begins_m
+    stiffness, damping = _contact(own, 0.5 * zone)
+    k, d = own.stiffness_n_m, own.damping_n_s_m
+    return GainBounds(
+        mass=of,
+        late_ticks=LATE_TICKS,
+        damping_n_s_m=dampings,
+        stable_n_m=curves[..., 0],
+        damped_n_m=curves[..., 1],
+        today={"target": (k, d), "half way in": (k + stiffness, d + damping)},
+        stable_today_n_m=tuple(today[:, 0].tolist()),
+        damped_today_n_m=tuple(today[:, 1].tolist()),
+        closed_form_n_m=tuple(
+            stiffness_bound(d, of._replace(late_ticks=late)) for late in LATE_TICKS
+        ),
+        most_damping_n_s_m=most,
+        closed_damping_n_s_m=damping_bound(of),
+        contacts=_contacts(own, most),
+        box=_box(own),
+    )
+
+
+def damping_ratio(
+    scenario: Scenario, stiffness: float, damping: float, late_ticks: int = 0
+) -> float:
+    """Of the least damped mode of one axis.
+
+    Args:
+        scenario: Robot, plant and tick are used.
+        stiffness: All springs together, N/m, above 0.
+        damping: All dampers together, N s/m.
+        late_ticks: Age of the place that springs act on.
+
+    Returns:
+        -Re s/|s|, least of all modes; 1 where none swings.
+    """
+    matrix = contact_matrix(
+        scenario, stiffness, damping_n_s_m=damping, latency_ticks=late_ticks
+    )
+    poles = _s_plane(np.linalg.eigvals(matrix), scenario.tick_s)
+    return float((-poles.real / np.abs(poles)).min())
+
+
+def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) -> float:
+    """Stiffness up to which the damping ratio is ``WELL_DAMPED`` or more.
+
+    Args:
+        scenario: Robot, plant and tick are used.
+        damping: All dampers together, N s/m.
+        late_ticks: Age of the place that springs act on.
+
+    Returns:
+        N/m; 0 where there is none.
+    """
+    return _last(
+        lambda k: damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED
+    )
+
+
+def _bounds(scenario: Scenario, damping: float, late: int) -> tuple[float, float]:
+    """Where one axis stops coming to rest, and where it begins to swing, N/m."""
+
+    def rests(stiffness: float) -> bool:
+        matrix = contact_matrix(
+            scenario, stiffness, damping_n_s_m=damping, latency_ticks=late
+        )
+        return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
+
+    return _last(rests), damped_stiffness(scenario, damping, late)
+
+
+def _last(holds: Callable[[float], bool], begin: float = 1e-3) -> float:
+    """The end of the interval from 0 on in which something holds; 0: it is empty."""
+    if not holds(begin):
+        return 0.0
+    low, high = begin, 2.0 * begin
+    while holds(high) and high < 1e9:
+        low, high = high, 2.0 * high
+    for _ in range(_HALVINGS):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if holds(middle) else (low, middle)
+    return low
+
+
+def _most_damping(scenario: Scenario) -> float:
+    """Where a damper without a spring stops taking the velocity, N s/m."""
+
+    def rests(damping: float) -> bool:
+        matrix = contact_matrix(scenario, 0.0, damping_n_s_m=damping)
+        poles = np.linalg.eigvals(matrix)
+        # Without a spring the place stays where it is, at z = 1.
+        moving = np.delete(poles, np.abs(poles - 1.0).argmin())
+        return bool(np.abs(moving).max() < 1.0)
+
+    return _last(rests)
+
+
+def _contacts(own: TrajectoryImpedanceParameters, most: float) -> float:
+    if own.contact_damping_n_s_m == 0.0:
+        return math.inf
+    room = (most - own.damping_n_s_m) / own.contact_damping_n_s_m
+    # At the bound itself it does not come to rest.
+    return float(max(math.ceil(room - 1e-6) - 1, 0))
+
+
+def _box(
+    own: TrajectoryImpedanceParameters,
+) -> tuple[tuple[float, float], tuple[float, float]] | None:
+    adaptation = getattr(own, "adaptation", None)
+    if adaptation is None or adaptation.rule == "none" or not adaptation.projected:
+        return None
+    return adaptation.stiffness_box_n_m, adaptation.damping_box_n_s_m

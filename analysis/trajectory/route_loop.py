@@ -1,0 +1,281 @@
+"""The loop of a robot on a route, linear, with gains that are frozen."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.autodiffutils import AutoDiffXd
+from pydrake.systems.analysis import DiscreteTimeApproximation
+
+from analysis.models.block_models import block_model, join_blocks
+from analysis.models.ideal_scenarios import require_rolling
+from analysis.models.linear_models import LinearModel
+from analysis.models.model_reduction import minimal_model
+from diagrams.scenario import Scenario
+from diagrams.simulation import simulator_config
+from systems import DiffDrivePlant
+from systems.base.wheel_odometry import OdometryParameters, WheelOdometry_
+from systems.base.wheel_speed_command import WheelSpeedCommand_
+from systems.framework.block_facts import block_facts
+from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
+from systems.laws.trajectory.trajectory_impedance import (
+    TrajectoryImpedanceParameters,
+    contact_numbers,
+)
+from systems.laws.trajectory.trajectory_impedance_controller import (
+    TrajectoryImpedanceController_,
+)
+from systems.ranging.objects import KNOWN, OBJECT_SIZE, OBJECT_SLOTS, THERE, X
+
+__all__ = [
+    "AXES",
+    "RoutePoint",
+    "acceleration_loop",
+    "frozen_model",
+    "route_law",
+    "route_points",
+    "whole_route_model",
+]
+
+#: Along the route, and across it.
+AXES = ("along", "across")
+#: What the law commands, and the same before it is joined to the wheels.
+_COMMAND, _LAW = "acceleration_W", "law_W"
+#: Shares of the zone at which a contact is looked at: damping that fades differs there.
+_DEPTHS = {"edge of a zone": 0.999, "half way in": 0.5, "deep in": 0.1}
+
+
+@dataclass(frozen=True)
+class RoutePoint:
+    """Where the loop is linearised; the robot heads along x."""
+
+    name: str
+    speed_m_s: float = 0.0
+    """Of target and robot, along x."""
+    wall_m: float | None = None
+    """Distance from P to a wall across its way; none: nothing is near."""
+
+
+def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
+    """The parameters of the law of a robot on a route.
+
+    Raises:
+        InputError: It has another law.
+    """
+    law = LAWS.get(scenario.law)
+    if scenario.route is None or law is None or not law.on_route:
+        names = ", ".join(name for name, each in LAWS.items() if each.on_route)
+        raise InputError(
+            "law",
+            f"is {scenario.law!r}, but frozen gains are of a robot that has a route "
+            f"and one of {names}; use one of these",
+        )
+    own: TrajectoryImpedanceParameters = getattr(scenario.repulsion, scenario.law)
+    return own
+
+
+def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
+    """Along the route, at rest, and before a wall: at the zone's edge, and within.
+
+    Args:
+        scenario: Has a route.
+
+    Returns:
+        Contacts only where the law has a spring or a damper for them.
+    """
+    own = route_law(scenario)
+    assert scenario.route is not None
+    points = [
+        RoutePoint("on the route", speed_m_s=scenario.route.speed_m_s),
+        RoutePoint("at rest"),
+    ]
+    if own.contact_stiffness_n_m > 0.0 or own.contact_damping_n_s_m > 0.0:
+        zone = contact_numbers(own).begins_m
+        depths = _DEPTHS if own.damping_fades else {"in a zone": 0.5}
+        points += [RoutePoint(name, wall_m=d * zone) for name, d in depths.items()]
+    return tuple(points)
+
+
+def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
+    """The closed loop over a tick, without what no target moves or no place shows.
+
+    Law, wheel command, plant and odometry are those that simulate, each linearised by
+    AutoDiff and joined by the names of their ports. A filter that has nothing to do is
+    the wheel command. Gains do not adapt, and no limit is reached.
+
+    Args:
+        scenario: Has a route.
+        point: Where.
+
+    Returns:
+        From the target, m and m/s, to the place of P, m.
+
+    Raises:
+        InputError: The law is none of a route, or the wheels can slip.
+    """
+    return minimal_model(whole_route_model(scenario, point))
+
+
+def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
+    """The same with every state of plant, odometry, wheel command and seen objects."""
+    models = _blocks(scenario, point)
+    targets = tuple(f"target_state[{k}]" for k in range(4))
+    poses = tuple(f"pose_WB[{k}]" for k in range(3))
+    joined = join_blocks(
+        models, _states(models), name="frozen gains", inputs=targets, outputs=poses
+    )
+    to_P = _place_of_P(scenario)
+    return replace(
+        joined,
+        C=to_P @ joined.C,
+        D=to_P @ joined.D,
+        input_names=("p_d_x", "p_d_y", "v_d_x", "v_d_y"),
+        output_names=("p_WP_x", "p_WP_y"),
+    )
+
+
+def acceleration_loop(scenario: Scenario, point: RoutePoint, axis: str) -> LinearModel:
+    """The loop cut at the law's acceleration, the other axis closed.
+
+    Args:
+        scenario: Has a route.
+        point: Where.
+        axis: One of ``AXES``.
+
+    Returns:
+        L, in the convention of negative feedback.
+    """
+    k = AXES.index(axis)
+    models = tuple(
+        _renamed(model) if model.name == "controller" else model
+        for model in _blocks(scenario, point)
+    )
+    whole = join_blocks(
+        models,
+        _states(models),
+        name=f"acceleration {axis}",
+        inputs=tuple(f"{_COMMAND}[{i}]" for i in range(2)),
+        outputs=tuple(f"{_LAW}[{i}]" for i in range(2)),
+    )
+    other = 1 - k
+    closed = whole.A + np.outer(whole.B[:, other], whole.C[other])
+    cut = replace(
+        whole,
+        A=closed,
+        B=whole.B[:, [k]],
+        C=-whole.C[[k]],
+        D=np.zeros((1, 1)),
+        input_names=(axis,),
+        output_names=(axis,),
+    )
+    return minimal_model(cut)
+
+
+def _renamed(model: LinearModel) -> LinearModel:
+    names = tuple(name.replace(_COMMAND, _LAW) for name in model.output_names)
+    return replace(model, output_names=names)
+
+
+def _states(models: tuple[LinearModel, ...]) -> tuple[str, ...]:
+    return tuple(name for model in models for name in model.state_names)
+
+
+def _place_of_P(scenario: Scenario) -> NDArray[np.float64]:
+    """(2, 3) from a small change of pose to one of P, at heading 0."""
+    epsilon = scenario.robot.control_point_m
+    return np.array([[1.0, 0.0, 0.0], [0.0, 1.0, epsilon]])
+
+
+def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
+    own = route_law(scenario)
+    require_rolling(scenario.plant)
+    robot, tick_s, speed = scenario.robot, scenario.tick_s, point.speed_m_s
+    wheel, p = speed / robot.wheel_radius_m, np.array([robot.control_point_m, 0.0])
+    wheels, pose, v = np.full(2, wheel), np.zeros(3), np.array([speed, 0.0])
+    objects = np.zeros(OBJECT_SLOTS * OBJECT_SIZE)
+    ahead = 0.0
+    if point.wall_m is not None:
+        objects[[THERE, X, KNOWN]] = 1.0, point.wall_m, 1.0
+        ahead = _push(own, point.wall_m) / own.stiffness_n_m
+    target = np.array([p[0] + ahead, 0.0, speed, 0.0])
+    plant = DiffDrivePlant(robot=robot, plant=scenario.plant)
+    config = simulator_config(scenario)
+    unrounded = OdometryParameters(rounding=False)
+    odometry = WheelOdometry_[AutoDiffXd](
+        robot=robot, odometry=unrounded, tick_s=tick_s
+    )
+    command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
+    law = TrajectoryImpedanceController_[AutoDiffXd](
+        parameters=own, robot=robot, tick_s=tick_s
+    )
+    driven = block_model(
+        DiscreteTimeApproximation(plant, tick_s, config).ToAutoDiffXd(),
+        np.array([*pose, 0.0, 0.0, *wheels]),
+        [wheels],
+        period_s=tick_s,
+        ports=plant,
+        read_after=True,
+    )
+    before = [-speed * tick_s, 0.0, 0.0, *(-tick_s * wheels)]
+    models = (
+        (plant, driven),
+        (
+            odometry,
+            block_model(odometry, np.array(before), [np.zeros(2)], period_s=tick_s),
+        ),
+        (law, block_model(law, np.empty(0), [target, objects, pose, v], period_s=tick_s)),
+        (
+            command,
+            block_model(
+                command,
+                np.array([*v, *wheels]),
+                [np.zeros(2), pose],
+                period_s=tick_s,
+                held={"wheel_speeds"},
+            ),
+        ),
+    )
+    named = tuple(_named(block, model) for block, model in models)
+    return (*named, _seen_wall(scenario, point))
+
+
+def _named(block: object, model: LinearModel) -> LinearModel:
+    facts = block_facts(block)
+    states = tuple(f"{facts.part}.{name}" for name in facts.states)
+    return replace(model, name=facts.part, state_names=states if len(model.A) else ())
+
+
+def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:
+    """Of the spring of a contact with what rests, N."""
+    numbers = contact_numbers(own)
+    attracts = numbers.spring_sign < 0.0
+    overlap = distance_m if attracts else numbers.rest_m - distance_m
+    return numbers.spring_sign * own.contact_stiffness_n_m * overlap
+
+
+def _seen_wall(scenario: Scenario, point: RoutePoint) -> LinearModel:
+    """How ``objects_W`` follows the pose: a face across x, seen a latency late."""
+    ticks = round(scenario.objects.latency_s / scenario.tick_s)
+    away = -_place_of_P(scenario)[:1]
+    if point.wall_m is None:
+        away = 0.0 * away
+    A, B, C = np.zeros((ticks, ticks)), np.zeros((ticks, 3)), np.zeros((64, ticks))
+    D = np.zeros((OBJECT_SLOTS * OBJECT_SIZE, 3))
+    if ticks:
+        A[1:, :-1], B[0], C[X, -1] = np.eye(ticks - 1), away[0], 1.0
+    else:
+        D[X] = away[0]
+    return LinearModel(
+        name="objects",
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        state_names=tuple(f"objects.x_{k + 1}" for k in range(ticks)),
+        input_names=tuple(f"pose_WB[{k}]" for k in range(3)),
+        output_names=tuple(f"objects_W[{k}]" for k in range(len(C))),
+        period_s=scenario.tick_s,
+    )
