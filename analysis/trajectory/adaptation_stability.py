@@ -111,7 +111,7 @@ class Jam:
     end_n_m: tuple[float, float]
     """K at the end of the jam without a cure, and as the scenario has it, N/m."""
     left_n_m: tuple[float, float]
-    """The same so long after."""
+    """The same so long after; infinite: it has run away."""
 
 
 @dataclass(frozen=True)
@@ -415,7 +415,9 @@ def _jam(loop: PointLoop) -> Jam:
         for each in (_uncured(loop), loop)
     ]
     last = int(np.flatnonzero(jammed)[-1])
-    ends, left = ([float(run[at]) for run in runs] for at in (last, -1))
+    found = [[float(run[at]) for run in runs] for at in (last, -1)]
+    # What has run away is no number any more.
+    ends, left = ([k if abs(k) < _WILD else math.inf for k in row] for row in found)
     return Jam(_JAM_S, _AFTER_S, (ends[0], ends[1]), (left[0], left[1]))
 
 

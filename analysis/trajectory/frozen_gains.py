@@ -16,6 +16,7 @@ from analysis.trajectory.route_loop import (
     AXES,
     RoutePoint,
     acceleration_loop,
+    contact_gains,
     frozen_model,
     route_law,
     route_points,
@@ -102,7 +103,7 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
     own = route_law(scenario)
     stiffness, damping = own.stiffness_n_m, own.damping_n_s_m
     if point.wall_m is not None:
-        contact = _contact(own, point.wall_m)
+        contact = contact_gains(own, point.wall_m)
         stiffness, damping = stiffness + contact[0], damping + contact[1]
     return FrozenPoint(
         at=point,
@@ -113,19 +114,6 @@ def _frozen(scenario: Scenario, point: RoutePoint) -> FrozenPoint:
             axis: loop_margins(acceleration_loop(scenario, point, axis))
             for axis in AXES
         },
-    )
-
-
-def _contact(
-    own: TrajectoryImpedanceParameters, distance_m: float
-) -> tuple[float, float]:
-    """Stiffness, N/m, and damping, N s/m, that a contact adds along its normal."""
-    numbers = contact_numbers(own)
-    share = 1.0 - distance_m / numbers.begins_m if numbers.fades else 1.0
-    # Eq. 10 pulls by the distance itself, and its spring is as stiff.
-    return (
-        own.contact_stiffness_n_m,
-        numbers.damper_sign * share * own.contact_damping_n_s_m,
     )
 
 
@@ -181,7 +169,7 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
         [_bounds(scenario, own.damping_n_s_m, late) for late in LATE_TICKS]
     )
     zone = contact_numbers(own).begins_m
-    stiffness, damping = _contact(own, 0.5 * zone)
+    stiffness, damping = contact_gains(own, 0.5 * zone)
     k, d = own.stiffness_n_m, own.damping_n_s_m
     return GainBounds(
         mass=of,

@@ -34,6 +34,7 @@ __all__ = [
     "AXES",
     "RoutePoint",
     "acceleration_loop",
+    "contact_gains",
     "frozen_model",
     "route_law",
     "route_points",
@@ -97,6 +98,26 @@ def route_points(scenario: Scenario) -> tuple[RoutePoint, ...]:
         depths = _DEPTHS if own.damping_fades else {"in a zone": 0.5}
         points += [RoutePoint(name, wall_m=d * zone) for name, d in depths.items()]
     return tuple(points)
+
+
+def contact_gains(
+    own: TrajectoryImpedanceParameters, distance_m: float
+) -> tuple[float, float]:
+    """What a contact adds to K, N/m, and D, N s/m, along its normal.
+
+    Args:
+        own: The law's parameters.
+        distance_m: Of P from the object, m.
+
+    Returns:
+        0 and 0 outside its zone. Eq. 10, which pulls, pulls as stiffly.
+    """
+    numbers = contact_numbers(own)
+    if distance_m >= numbers.begins_m:
+        return 0.0, 0.0
+    share = 1.0 - distance_m / numbers.begins_m if numbers.fades else 1.0
+    damping = numbers.damper_sign * share * own.contact_damping_n_s_m
+    return own.contact_stiffness_n_m, float(damping)
 
 
 def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:

@@ -1,0 +1,272 @@
+"""Robots that follow one another on a line, in time: the law, tick by tick."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from analysis.trajectory.robot_chain import (
+    ROBOTS,
+    ChainPeak,
+    chain_response,
+    disc_offsets,
+    links_of,
+    resting_gaps,
+)
+from analysis.trajectory.route_loop import route_law
+from diagrams.scenario import Scenario
+from systems.base.wheel_speed_command import clamped_velocity, integrate_velocity
+from systems.laws.trajectory.trajectory_impedance import (
+    ContactNumbers,
+    contact_force,
+    contact_numbers,
+    contacts_of_objects,
+    target_force,
+)
+from systems.ranging.objects import (
+    KNOWN,
+    OBJECT_SIZE,
+    OBJECT_SLOTS,
+    RADIUS,
+    ROBOT,
+    THERE,
+    VX,
+    X,
+)
+
+__all__ = ["BrakedChain", "ChainRun", "brake_chain", "run_chain", "shake_chain"]
+
+#: Robots of a simulated chain, the first one among them.
+_ROBOTS = ROBOTS[-1]
+#: Amplitude of a first robot that is shaken, m: far below all limits.
+_SHAKEN_M = 0.002
+#: Periods that the chain is shaken for; amplitudes are those of the last ones.
+_PERIODS, _READ = 40, 5
+#: A chain is watched so long after its first robot has braked, s.
+_WATCHED_S, _DRIVEN_S = 40.0, 20.0
+
+
+class ChainNumbers(NamedTuple):
+    """What the run depends on."""
+
+    gains: tuple[float, float, float, float]
+    """K, D, K_e and D_e."""
+    feed_forward: float
+    spacing_m: float
+    offset_ahead_m: float
+    """Of a neighbour's nearest point from its P: less so far ahead ..."""
+    offset_behind_m: float
+    """... and so far behind."""
+    contacts: ContactNumbers
+    mass: float
+    limits: tuple[float, float]
+    """Of acceleration, m/s^2, and speed, m/s."""
+    motors: tuple[float, float]
+    """Share of the speed that is left after a tick, and way for each m/s of it, s."""
+    late_ticks: int
+    tick_s: float
+
+
+@njit(cache=True)
+def _object(
+    objects: Any, slot: int, x: float, speed: float
+) -> None:  # pragma: no cover  (compiled)
+    at = slot * OBJECT_SIZE
+    objects[at + THERE], objects[at + X] = 1.0, x
+    objects[at + VX], objects[at + KNOWN], objects[at + ROBOT] = speed, 1.0, 1.0
+    objects[at + RADIUS] = 0.0
+
+
+@njit(cache=True)
+def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
+    """Places P of all robots at each tick; they start in formation, and drive as the
+    first one does at its first tick."""
+    ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
+    places = np.empty((ticks, robots))
+    begin = (first[1] - first[0]) / tick_s
+    p, v, w = np.empty(robots), np.full(robots, begin), np.full(robots, begin)
+    p[0] = first[0]
+    for i in range(1, robots):
+        p[i] = p[i - 1] - gaps[i - 1]
+    k, d, k_e, d_e = numbers.gains
+    late = numbers.late_ticks
+    objects = np.zeros(OBJECT_SLOTS * OBJECT_SIZE)
+    for tick in range(ticks):
+        p[0] = first[tick]
+        places[tick] = p
+        # What is seen is a latency old; before the start all went on as at it.
+        seen, speed = np.empty(robots), np.full(robots, begin)
+        for i in range(robots):
+            then = tick - late
+            seen[i] = places[then, i] if then >= 0 else places[0, i] + begin * tick_s * then
+            if then > 0:
+                speed[i] = (places[then, i] - places[then - 1, i]) / tick_s
+        for i in range(1, robots):
+            target = (
+                seen[i - 1] - numbers.spacing_m,
+                0.0,
+                numbers.feed_forward * speed[i - 1],
+                0.0,
+            )
+            objects[:] = 0.0
+            ahead = seen[i - 1] - p[i] - numbers.offset_ahead_m
+            _object(objects, 0, ahead, speed[i - 1])
+            if i + 1 < robots:
+                behind = p[i] - seen[i + 1] - numbers.offset_behind_m
+                _object(objects, 1, -behind, speed[i + 1])
+            velocity = v[i], 0.0
+            ux, _ = target_force((p[i], 0.0), velocity, target, k, d)
+            found = contacts_of_objects(objects, velocity, numbers.contacts)
+            fx, _ = contact_force(found, k_e, d_e, numbers.contacts)
+            a, b = clamped_velocity((ux + fx) / numbers.mass, 0.0, numbers.limits[0])
+            v[i], _ = integrate_velocity(velocity, (a, b), tick_s, numbers.limits[1])
+        kept, coasting = numbers.motors
+        for i in range(1, robots):
+            p[i] += coasting * w[i] + (tick_s - coasting) * v[i]
+            w[i] = kept * w[i] + (1.0 - kept) * v[i]
+    return places
+
+
+def run_chain(
+    scenario: Scenario,
+    first_m: NDArray[np.float64],
+    *,
+    feed_forward: float,
+    spacing_m: float,
+    robots: int = _ROBOTS,
+) -> NDArray[np.float64]:
+    """Places of robots on a line, the first of which moves as it is told.
+
+    The law's own functions with contacts to both neighbours, the limits of acceleration
+    and speed, and the motors' lag; no filter.
+
+    Args:
+        scenario: Law, robot, motors, tick and latency of objects are used.
+        first_m: (ticks,) place P of the first robot, m; its first step is how fast all
+            drive at the start.
+        feed_forward: Share of the velocity of the robot before it that a target has.
+        spacing_m: Between P of neighbours, m.
+        robots: How many, the first one among them.
+
+    Returns:
+        (ticks, robots) places P, m.
+    """
+    own, robot, tick_s = route_law(scenario), scenario.robot, scenario.tick_s
+    lag = scenario.plant.motor_lag_s
+    kept = math.exp(-tick_s / lag)
+    numbers = ChainNumbers(
+        (
+            own.stiffness_n_m,
+            own.damping_n_s_m,
+            own.contact_stiffness_n_m,
+            own.contact_damping_n_s_m,
+        ),
+        float(feed_forward),
+        float(spacing_m),
+        *disc_offsets(scenario),
+        contact_numbers(own),
+        robot.mass_kg,
+        (own.acceleration_limit_m_s2, robot.top_speed_m_s),
+        (kept, lag * (1.0 - kept)),
+        round(scenario.objects.latency_s / tick_s),
+        tick_s,
+    )
+    gaps = resting_gaps(scenario, spacing_m, robots)
+    return np.asarray(_run(np.asarray(first_m, dtype=float), gaps, numbers))
+
+
+@dataclass(frozen=True)
+class ChainRun:
+    """A shaken chain, simulated, beside its frequency response."""
+
+    name: str
+    frequency_rad_s: float
+    simulated: NDArray[np.float64]
+    """(robots,) amplitude of each, of the first one's."""
+    predicted: NDArray[np.float64]
+    """(robots,) the same by ``chain_response``."""
+
+    @property
+    def difference(self) -> float:
+        """Largest share by which both differ."""
+        return float(np.abs(self.simulated / self.predicted - 1.0).max())
+
+
+def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
+    """Shakes the first of eight robots where the chain amplifies most.
+
+    Where nothing grows, at the natural frequency of a robot.
+
+    Args:
+        scenario: As of ``run_chain``.
+        name: Of the chain.
+        peak: Where it amplifies.
+
+    Returns:
+        Amplitudes of the last five of forty periods.
+    """
+    natural = math.sqrt(route_law(scenario).stiffness_n_m / scenario.robot.mass_kg)
+    omega = peak.frequency_rad_s if peak.grows else natural
+    period = math.tau / omega
+    time = np.arange(0.0, _PERIODS * period, scenario.tick_s)
+    # It starts at rest, at the turn of its swing.
+    first = _SHAKEN_M * (np.cos(omega * time) - 1.0)
+    kind = {"feed_forward": peak.feed_forward, "spacing_m": peak.spacing_m}
+    places = run_chain(scenario, first, **kind)
+    last = time > (_PERIODS - _READ) * period
+    basis = np.column_stack(
+        [np.cos(omega * time[last]), np.sin(omega * time[last]), np.ones(last.sum())]
+    )
+    found = np.linalg.lstsq(basis, places[last], rcond=None)[0]
+    sizes = np.hypot(found[0], found[1])
+    links = links_of(scenario, **kind, robots=_ROBOTS)
+    response = np.abs(chain_response(scenario, links, [omega])[0])
+    return ChainRun(name, omega, sizes / sizes[0], np.concatenate([[1.0], response]))
+
+
+@dataclass(frozen=True)
+class BrakedChain:
+    """A chain whose first robot brakes from the target's speed to rest."""
+
+    name: str
+    time_s: NDArray[np.float64]
+    """(n,) s; it brakes at 0."""
+    gap_m: NDArray[np.float64]
+    """(n, robots - 1) way between P of neighbours, m."""
+    least_gap_m: NDArray[np.float64]
+    """(robots - 1,) least of it from the braking on, m."""
+    overshoot_m: NDArray[np.float64]
+    """(robots - 1,) how much less than at the end that is, m."""
+
+
+def brake_chain(
+    scenario: Scenario, name: str, *, feed_forward: float, spacing_m: float
+) -> BrakedChain:
+    """Drives eight robots in formation, and brakes the first as a target brakes.
+
+    Args:
+        scenario: As of ``run_chain``; its route has speed and acceleration.
+        name: Of the chain.
+        feed_forward: Share of the velocity of the robot before it.
+        spacing_m: Between P of neighbours, m.
+
+    Returns:
+        Gaps between neighbours from the braking on.
+    """
+    assert scenario.route is not None
+    speed, slope = scenario.route.speed_m_s, scenario.route.acceleration_m_s2
+    time = np.arange(-_DRIVEN_S, _WATCHED_S, scenario.tick_s)
+    braking = np.clip(time, 0.0, speed / slope)
+    first = speed * np.minimum(time, 0.0) + speed * braking - 0.5 * slope * braking**2
+    places = run_chain(
+        scenario, first, feed_forward=feed_forward, spacing_m=spacing_m
+    )
+    after = time >= 0.0
+    gaps = -np.diff(places, axis=1)[after]
+    least = gaps.min(axis=0)
+    return BrakedChain(name, time[after], gaps, least, gaps[-1] - least)
