@@ -27,6 +27,7 @@ from diagrams.explain import explain
 from diagrams.goal_checks import check_goals
 from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
+from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
 from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
@@ -209,12 +210,17 @@ class Scenario(FollowerParameters, RunParameters):
         ]
         return np.reshape(still, (-1, 5))
 
-    def guard_notes(self) -> list[str]:
-        """What a user should know of what guards do not promise, a line a robot."""
-        notes = (
+    def notes(self) -> list[str]:
+        """What a user should know before a run, a line each.
+
+        What guards do not promise, and gains of routes beyond what sampling permits.
+        """
+        notes = [
             guard_note(n, robot, self.surroundings(n).bodies, self.duration_s)
             for n, robot in self.all_robots.items()
-        )
+        ]
+        for prefix, robot in self._robot_fields():
+            notes += route_notes(prefix, robot, self.tick_s)
         return [note for note in notes if note]
 
     @property

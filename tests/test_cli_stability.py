@@ -18,7 +18,9 @@ from systems.framework.input_error import InputError
 MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
 
 
-def quick_parts(*, full: bool, guarded: bool = False) -> tuple[Part, ...]:
+def quick_parts(
+    *, full: bool, guarded: bool = False, routed: bool = False
+) -> tuple[Part, ...]:
     """Stand-ins for analyses that take their time."""
 
     def verdicts(study):

@@ -37,7 +37,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
 
     place = take(options.out)
     scenario = load_scenario(options.scenario, _settings(options))
-    for note in scenario.guard_notes():
+    for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
     follower = None
     if scenario.engine == "compiled":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
         metavar="LAW",
         action="append",
         help=f"{LAW_HELP}; may be repeated, to compare laws; "
-        "all: those that avoid obstacles (default: the scenario's law)",
+        "all: those that avoid obstacles, or drive on a route (default: the "
+        "scenario's law)",
+    )
+    parser.add_argument(
+        "--robot",
+        metavar="NAME",
+        help="of several robots, the one to analyse, alone (default: the first)",
     )
     take_scenario(parser)
     parser.add_argument(
@@ -32,7 +39,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
-    from analysis.stability.law_analysis import analyse_law, chosen_laws
+    from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
     from analysis.stability.report_files import (
         stability_document,
         stability_text,
@@ -42,10 +49,15 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from diagrams import load_scenario
 
     place = take(options.out)
-    scenario = load_scenario(options.scenario, overrides(options))
+    whole = load_scenario(options.scenario, overrides(options))
+    scenario, note = chosen_robot(whole, options.robot)
+    if note:
+        logging.getLogger("phonotaxis").warning("%s", note)
     scenarios = chosen_laws(scenario, options.law or [])
     work = parts(
-        full=options.full, guarded=any(each.own_guard is not None for each in scenarios)
+        full=options.full,
+        guarded=any(each.own_guard is not None for each in scenarios),
+        routed=scenario.route is not None,
     )
 
     def run(progress: Progress) -> list[LawAnalysis]:

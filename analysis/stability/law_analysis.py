@@ -30,6 +30,7 @@ __all__ = [
     "Study",
     "analyse_law",
     "chosen_laws",
+    "chosen_robot",
 ]
 
 
@@ -129,8 +130,8 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
 
     Args:
         scenario: Any scenario.
-        names: Laws; ``all`` stands for those that avoid obstacles; none at all:
-            the scenario's own.
+        names: Laws; ``all`` stands for those that avoid obstacles, or that drive on a
+            route; none at all: the scenario's own.
 
     Returns:
         One a law; a law that is named twice comes once.
@@ -138,10 +139,20 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     Raises:
         InputError: There is no such law.
     """
-    every = [law for law in FORCE_LAWS if law != "none"]
+    routed = scenario.route is not None
+    every = [
+        name
+        for name, law in LAWS.items()
+        if (law.on_route if routed else name in FORCE_LAWS and name != "none")
+    ]
     laws = [law for name in names for law in (every if name == "all" else [name])]
     for law in laws or [scenario.law]:
-        if law in LAWS and LAWS[law].plans:
+        if routed and law not in every:
+            raise InputError(
+                "law",
+                f"is {law!r}, but the robot has a route; use {', '.join(every)}",
+            )
+        if not routed and law in LAWS and LAWS[law].plans:
             raise InputError(
                 "law",
                 f"{law!r} has no linear model, for it plans and decides; use "
@@ -154,6 +165,33 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
     for each in scenarios:
         make_controller(each)
     return tuple(scenarios)
+
+
+def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
+    """The robot of a scenario that is analysed, alone with what it follows.
+
+    Args:
+        scenario: Any scenario.
+        name: Of the robot; none: the first one.
+
+    Returns:
+        The scenario as if it were alone, and a line that says so; the line is empty
+        where there are no others.
+
+    Raises:
+        InputError: There is no such robot.
+    """
+    names = list(scenario.all_robots)
+    if name is not None and name not in names:
+        raise InputError("robot", f"{name!r} is none; use {', '.join(names)}")
+    chosen = names[0] if name is None else name
+    others = [each for each in names if each != chosen]
+    if not others:
+        return scenario.of_robot(chosen), ""
+    note = f"the report is of robot {chosen!r} alone, without {', '.join(others)}"
+    if name is None:
+        note += "; --robot chooses another"
+    return scenario.of_robot(chosen), note
 
 
 def analyse_law(

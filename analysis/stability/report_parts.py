@@ -7,6 +7,8 @@ from analysis.stability.linear_parts import linear_parts
 from analysis.stability.margin_parts import margin_parts
 from analysis.stability.nonlinear_parts import extended_parts, nonlinear_parts
 from analysis.stability.robustness_parts import robustness_parts
+from analysis.stability.route_parts import route_parts
+from analysis.stability.route_readings import ROUTE_CRITERIA
 from analysis.stability.safety_parts import safety_parts
 from analysis.stability.sampling_parts import gain_parts, sampling_parts
 from analysis.stability.verdict_parts import verdict_parts
@@ -14,16 +16,27 @@ from analysis.stability.verdict_parts import verdict_parts
 __all__ = ["parts"]
 
 
-def parts(*, full: bool, guarded: bool = False) -> tuple[Part, ...]:
+def parts(
+    *, full: bool, guarded: bool = False, routed: bool = False
+) -> tuple[Part, ...]:
     """The parts of a report.
 
     Args:
         full: Also those that take minutes.
         guarded: Also that of a robot's guard.
+        routed: Those of a robot on a route, in the place of one that follows a sound.
 
     Returns:
         In the report's order.
     """
+    guard = safety_parts() if guarded else ()
+    if routed:
+        left_out = [part.title for part in _sound_parts(full=full)]
+        return (*route_parts(left_out), *guard, *verdict_parts(ROUTE_CRITERIA))
+    return (*_sound_parts(full=full), *guard, *verdict_parts())
+
+
+def _sound_parts(*, full: bool) -> tuple[Part, ...]:
     return (
         *linear_parts(full=full),
         *margin_parts(),
@@ -32,6 +45,4 @@ def parts(*, full: bool, guarded: bool = False) -> tuple[Part, ...]:
         *robustness_parts(full=full),
         *(extended_parts() if full else ()),
         *gain_parts(),
-        *(safety_parts() if guarded else ()),
-        *verdict_parts(),
     )

@@ -3,23 +3,43 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Mapping
 
 from analysis.reporting.html_page import Cell, table
 from analysis.stability.law_analysis import Part, Study
-from analysis.stability.verdict_readings import CRITERIA
-from analysis.stability.verdicts import Verdict, judge
+from analysis.stability.verdict_readings import CRITERIA, Reading
+from analysis.stability.verdicts import Criterion, Verdict, judge
 
 __all__ = ["verdict_parts"]
 
 
-def verdict_parts() -> tuple[Part, ...]:
-    """All criteria, of what earlier parts found."""
-    return (Part("verdicts", "Verdicts", _verdicts, _render, fresh=True),)
+def verdict_parts(
+    criteria: Mapping[Criterion, Callable[[Study], Reading]] = CRITERIA,
+) -> tuple[Part, ...]:
+    """All criteria, of what earlier parts found.
+
+    Args:
+        criteria: What is asked, and what is read for it.
+
+    Returns:
+        One part.
+    """
+    return (
+        Part(
+            "verdicts",
+            "Verdicts",
+            lambda study: _verdicts(study, criteria),
+            _render,
+            fresh=True,
+        ),
+    )
 
 
-def _verdicts(study: Study) -> tuple[Verdict, ...]:
+def _verdicts(
+    study: Study, criteria: Mapping[Criterion, Callable[[Study], Reading]]
+) -> tuple[Verdict, ...]:
     verdicts = []
-    for criterion, read in CRITERIA.items():
+    for criterion, read in criteria.items():
         value = read(study)
         if isinstance(value, str):
             verdicts.append(judge(criterion, None, value))

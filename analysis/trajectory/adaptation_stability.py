@@ -16,6 +16,7 @@ from systems.framework.input_error import InputError
 from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
 from systems.laws.trajectory.impedance_sensitivity import sensitivity_sources
 from systems.laws.trajectory.reference_model import held_matrices
+from systems.laws.trajectory.sampled_bounds import pull_through_m
 from systems.laws.trajectory.trajectory_impedance import target_force
 from systems.laws.trajectory.trajectory_laws import AdaptiveTrajectoryParameters
 
@@ -222,12 +223,6 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
         products=tuple(critical_rate(loop, a_m) for a_m in _AMPLITUDES_M),
         cures=_cures(rule),
     )
-
-
-def pull_through_m(own: AdaptiveTrajectoryParameters) -> float:
-    """Lag K_e S/K at which the target pulls P through a contact; 1 m without one."""
-    lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
-    return lag or 1.0
 
 
 def swinging_target(

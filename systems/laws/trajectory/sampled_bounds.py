@@ -8,17 +8,22 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
+
 __all__ = [
     "RATE_BOUNDS",
     "SampledMass",
     "damping_bound",
+    "pull_through_m",
     "rate_bound",
     "sampled_matrix",
     "stiffness_bound",
 ]
 
-#: Largest gamma (a T/M)^2 of each rule before K and D run away, with a the amplitude of
-#: P's target, m; the least that ``analysis.trajectory.critical_rates`` measures.
+#: gamma (a T/M)^2 of each rule below which K and D do not run away, with a the
+#: amplitude of P's target, m: rounded down from what ``critical_rate`` of
+#: ``analysis.trajectory.adaptation_stability`` measures for ticks of 25 to 100 ms and a
+#: reference with the nominal gains; another reference has less.
 RATE_BOUNDS = {"lyapunov": 1.0, "sensitivity": 0.5}
 #: Stiffer springs are not looked for, N/m.
 _STIFFEST_N_M = 1e7
@@ -104,6 +109,19 @@ def stiffness_bound(damping: float, of: SampledMass) -> float:
 def damping_bound(of: SampledMass) -> float:
     """2 M/T: with more, the velocity changes sign at every tick and grows, N s/m."""
     return 2.0 * of.mass_kg / of.tick_s
+
+
+def pull_through_m(own: TrajectoryImpedanceParameters) -> float:
+    """Lag K_e S/K at which the target pulls P through a contact; 1 m without one.
+
+    Args:
+        own: The law's parameters.
+
+    Returns:
+        m.
+    """
+    lag = own.contact_stiffness_n_m * own.security_zone_m / own.stiffness_n_m
+    return lag or 1.0
 
 
 def rate_bound(rule: str, amplitude_m: float, of: SampledMass) -> float:

@@ -1,0 +1,498 @@
+"""Parts of the stability report of a robot on a route."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from analysis.linear.loop_margins import LoopMargins
+from analysis.models.linear_models import LinearModel
+from analysis.reporting.html_page import (
+    Cell,
+    bullets,
+    figure_html,
+    number,
+    paragraph,
+    table,
+)
+from analysis.stability.law_analysis import Part, Study
+from analysis.trajectory.adaptation_stability import (
+    AdaptationStability,
+    adaptation_stability,
+)
+from analysis.trajectory.chain_run import (
+    BrakedChain,
+    ChainRun,
+    brake_chain,
+    shake_chain,
+)
+from analysis.trajectory.frozen_gains import (
+    WELL_DAMPED,
+    FrozenPoint,
+    GainBounds,
+    frozen_gains,
+    gain_bounds,
+)
+from analysis.trajectory.robot_chain import ROBOTS, RobotChain, robot_chain
+from analysis.trajectory.trajectory_plots import (
+    plot_adaptation,
+    plot_braked_chains,
+    plot_chain,
+    plot_frozen_poles,
+    plot_gain_bounds,
+)
+
+__all__ = ["ChainStudy", "route_parts"]
+
+#: Fields of a loop's margins that go to the JSON document.
+_MARGINS = (
+    "stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s",
+    "crossover_rad_s", "sensitivity_peak",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ChainStudy:
+    """Robots that follow one another: responses, and runs beside them."""
+
+    chain: RobotChain
+    runs: tuple[ChainRun, ...]
+    braked: tuple[BrakedChain, ...]
+
+
+def route_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
+    """Frozen gains, bounds, adaptation, chains; and what the report has not.
+
+    Args:
+        left_out: Titles of the parts of a robot that follows a sound.
+
+    Returns:
+        In the report's order.
+    """
+    titles = tuple(left_out)
+    return (
+        Part(
+            "frozen_gains",
+            "Frozen gains",
+            lambda study: frozen_gains(study.scenario),
+            _render_frozen,
+            document=_frozen_document,
+            models=_frozen_models,
+        ),
+        Part(
+            "gain_bounds",
+            "Bounds of stiffness and damping",
+            lambda study: gain_bounds(study.scenario),
+            _render_bounds,
+            document=lambda data: {
+                "gain_bounds": {**vars(data), "mass": data.mass._asdict()}
+            },
+        ),
+        Part(
+            "adaptation",
+            "Adaptation",
+            lambda study: adaptation_stability(study.scenario),
+            _render_adaptation,
+            document=_adaptation_document,
+        ),
+        Part(
+            "robot_chain",
+            "Robots that follow one another",
+            _chain,
+            _render_chain,
+            document=_chain_document,
+        ),
+        Part(
+            "left_out",
+            "What this report has not",
+            lambda study: titles,
+            _render_left_out,
+        ),
+    )
+
+
+def _frozen_models(data: Sequence[FrozenPoint]) -> tuple[LinearModel, ...]:
+    return tuple(
+        replace(point.model, name=f"frozen gains {point.at.name}") for point in data
+    )
+
+
+def _frozen_document(data: Sequence[FrozenPoint]) -> dict[str, Any]:
+    return {
+        "frozen_gains": [
+            {
+                "at": point.at,
+                "stiffness_n_m": point.stiffness_n_m,
+                "damping_n_s_m": point.damping_n_s_m,
+                "poles": point.poles,
+                "growth_per_s": point.growth_per_s,
+                "damping_ratio": point.damping_ratio,
+                "margins": {
+                    axis: {name: getattr(margins, name) for name in _MARGINS}
+                    for axis, margins in point.margins.items()
+                },
+            }
+            for point in data
+        ]
+    }
+
+
+def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
+    poles: list[list[Cell]] = [
+        [
+            point.at.name,
+            point.stiffness_n_m,
+            point.damping_n_s_m,
+            ", ".join(_poles_of(point)),
+            point.growth_per_s,
+            point.damping_ratio,
+        ]
+        for point in data
+    ]
+    margins: list[list[Cell]] = [
+        [point.at.name, axis, *_margin_cells(each)]
+        for point in data
+        for axis, each in point.margins.items()
+    ]
+    return [
+        paragraph(
+            "The loop about P's target with its gains held as they are: law, wheel "
+            "command, plant and odometry as built, each linearised, over a tick. On the "
+            "route it drives at the target's speed; a contact is with a wall across its "
+            "way, at rest, K and D along the way. A safety filter that has nothing to do "
+            "is the wheel command, and limits are not reached."
+        ),
+        table(
+            ["place", "K (N/m)", "D (N s/m)", "poles ln(z)/T (rad/s)", "growth (1/s)",
+             "damping ratio"],
+            poles,
+        ),
+        table(
+            ["place", "direction", "gain (dB)", "phase (deg)", "delay (s)", "M_s"],
+            margins,
+            caption="Margins of the loop cut at the acceleration",
+        ),
+        figure_html(plot_frozen_poles(data), name, "Poles with frozen gains."),
+    ]  # fmt: skip
+
+
+def _poles_of(point: FrozenPoint) -> list[str]:
+    """One of each pair, slowest first."""
+    poles = sorted(point.poles.tolist(), key=lambda pole: -pole.real)
+    shown = [pole for pole in poles if pole.imag >= -1e-9]
+    return [number(p if abs(p.imag) > 1e-9 else p.real) for p in shown]
+
+
+def _margin_cells(each: LoopMargins) -> list[Cell]:
+    return [
+        each.gain_margin_db,
+        each.phase_margin_deg,
+        each.delay_margin_s,
+        each.sensitivity_peak,
+    ]
+
+
+def _render_bounds(data: GainBounds, name: str) -> list[str]:
+    rows: list[list[Cell]] = [
+        [
+            f"{late} ticks late" if late else "as built",
+            data.stable_today_n_m[k],
+            data.closed_form_n_m[k],
+            data.damped_today_n_m[k],
+        ]
+        for k, late in enumerate(data.late_ticks)
+    ]
+    stiffness, damping = data.today["target"]
+    contacts = "any number of" if math.isinf(data.contacts) else f"{data.contacts:g}"
+    return [
+        paragraph(
+            f"With D = {number(damping)} N s/m (K = {number(stiffness)} N/m today), a "
+            f"motor lag of {number(data.mass.motor_lag_s)} s and ticks of "
+            f"{number(data.mass.tick_s * 1e3)} ms. By bisection on the one-period matrix "
+            "of the blocks, and by the closed form that warns before a run."
+        ),
+        table(
+            ["the place that springs act on", "stable below K (N/m)", "closed form",
+             f"damping ratio {WELL_DAMPED:g} up to K (N/m)"],
+            rows,
+        ),
+        paragraph(
+            f"Dampers act on the velocity of the virtual mass. Together they may reach "
+            f"{number(data.most_damping_n_s_m)} N s/m; 2 M/T is "
+            f"{number(data.closed_damping_n_s_m)}. So {contacts} contacts may be summed "
+            "with their full damping: a scan of more beams has to be made objects first."
+        ),
+        figure_html(plot_gain_bounds(data), name, "Bounds of K over D."),
+    ]  # fmt: skip
+
+
+def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
+    run = data.lyapunov
+    return {
+        "adaptation": {
+            "rule": data.rule,
+            "rate": data.rate,
+            "reference_rad_s": data.reference[0],
+            "reference_damping_ratio": data.reference[1],
+            "reference_poles": data.reference_poles,
+            "reference_poles_z": data.held_poles,
+            "matched": data.matched,
+            "lyapunov": run
+            and {
+                "falls": run.falls,
+                "largest_rise": run.largest_rise,
+                "sampled_rise": run.sampled_rise,
+                "left": float(run.continuous[-1]),
+                "sampled_left": float(run.sampled[-1]),
+            },
+            "drift": {
+                name: getattr(data.drift, name)
+                for name in (
+                    "push_n", "time_s", "gradient_n_m", "simulated_n_m", "cured_n_m"
+                )
+            },
+            "jam": data.jam,
+            "critical_rate": data.critical.rate,
+            "critical_amplitude_m": data.critical.amplitude_m,
+            "critical_products": {
+                f"{each.amplitude_m:g}": each.product for each in data.products
+            },
+            "margin": data.margin,
+            "bounded": data.bounded,
+            "cures": {cure.field: cure.active for cure in data.cures},
+        }
+    }  # fmt: skip
+
+
+def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
+    frequency, ratio = data.reference
+    pieces = [
+        paragraph(
+            f"Reference: w_n = {number(frequency)} rad/s, xi = {number(ratio)}, poles "
+            f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} rad/s, "
+            f"over a tick {', '.join(number(_plain(z)) for z in data.held_poles)}: it is "
+            "exact, and stable for every xi above 0."
+            + (
+                " It has the nominal gains, so that there is nothing to learn: what is "
+                "learnt comes of contacts, limits and the motors."
+                if data.matched
+                else ""
+            )
+        ),
+        paragraph(_of_lyapunov(data)),
+        paragraph(
+            f"Rate: gamma = {number(data.rate)}. Without a cure K and D run away from "
+            f"{number(data.critical.rate)} on where the target swings by "
+            f"{number(data.critical.amplitude_m)} m, the lag at which it pulls P through "
+            f"a contact: {number(data.margin)} times today's. gamma_crit a\u00b2 is "
+            + ", ".join(
+                f"{number(each.product)} at {number(each.amplitude_m)} m"
+                for each in data.products
+            )
+            + "."
+        ),
+        table(
+            ["time (s)", "gradient, closed form", "this rule", "as it is"],
+            [
+                [float(time), *values]
+                for time, *values in zip(
+                    data.drift.time_s,
+                    data.drift.gradient_n_m,
+                    data.drift.simulated_n_m,
+                    data.drift.cured_n_m,
+                    strict=True,
+                )
+            ],
+            caption=f"Drift: K (N/m) under a push of {number(data.drift.push_n)} N that "
+            "the reference does not know; (K_0\u2074 + 4 gamma F\u00b2 t)^(1/4), and "
+            "simulated without and with the cures",
+        ),
+        table(
+            ["", f"after {number(data.jam.jam_s)} s of jam",
+             f"{number(data.jam.after_s)} s later"],
+            [
+                [text, data.jam.end_n_m[k], data.jam.left_n_m[k]]
+                for k, text in enumerate(("without a cure", "as it is"))
+            ],
+            caption="Jam: K (N/m) behind a wall that holds P while the target goes on, "
+            "which then is gone; infinite: the loop is unstable with what it learnt",
+        ),
+        table(
+            ["cure", "field", "", "what it does"],
+            [
+                [cure.name, f"`{cure.field}`", "on" if cure.active else "off",
+                 cure.effect]
+                for cure in data.cures
+            ],
+        ),
+        paragraph(
+            "K and D are bounded whatever happens."
+            if data.bounded
+            else "Nothing bounds K and D: `projected` would."
+        ),
+        figure_html(
+            plot_adaptation(data), name, "Lyapunov function, and drift under a push."
+        ),
+    ]  # fmt: skip
+    return pieces
+
+
+def _plain(pole: complex) -> complex:
+    return pole if abs(pole.imag) > 1e-9 else pole.real
+
+
+def _of_lyapunov(data: AdaptationStability) -> str:
+    run = data.lyapunov
+    if run is None:
+        return (
+            f"The rule {data.rule!r} is a gradient: no function is known that always "
+            "falls, and it is stable only below a rate."
+        )
+    return (
+        "V = w_n\u00b2 |e|\u00b2/2 + |e_v|\u00b2/2 + (\u0394K\u00b2 + "
+        "\u0394D\u00b2)/(2 gamma), from gains that are half of the wanted ones, "
+        + ("falls all the time" if run.falls else "rises")
+        + f" in continuous time: largest rise {number(run.largest_rise)} of its start. "
+        f"Sampled, with motors, it may rise by {number(run.sampled_rise)} a tick; after "
+        f"a minute {number(float(run.continuous[-1]))} and "
+        f"{number(float(run.sampled[-1]))} are left. Contacts are not in V: they are a "
+        "disturbance to it."
+    )
+
+
+def _chain(study: Study) -> ChainStudy:
+    scenario = study.scenario
+    chain = robot_chain(scenario)
+    kinds = chain.peaks.items()
+    return ChainStudy(
+        chain,
+        tuple(shake_chain(scenario, name, peak) for name, peak in kinds),
+        tuple(
+            brake_chain(
+                scenario,
+                name,
+                feed_forward=peak.feed_forward,
+                spacing_m=peak.spacing_m,
+            )
+            for name, peak in kinds
+        ),
+    )
+
+
+def _chain_document(data: ChainStudy) -> dict[str, Any]:
+    chain = data.chain
+    return {
+        "robot_chain": {
+            "stiffness_n_m": chain.stiffness_n_m,
+            "damping_n_s_m": chain.damping_n_s_m,
+            "least_damping_n_s_m": chain.least_damping_n_s_m,
+            "most_feed_forward": chain.most_feed_forward,
+            "time_headway_s": chain.time_headway_s,
+            "chains": [
+                {
+                    "name": name,
+                    "feed_forward": peak.feed_forward,
+                    "spacing_m": peak.spacing_m,
+                    "peak": peak.peak,
+                    "frequency_rad_s": peak.frequency_rad_s,
+                    "grows": peak.grows,
+                    "tail": {str(n): value for n, value in peak.tail.items()},
+                    "simulated": run.simulated,
+                    "predicted": run.predicted,
+                    "difference": run.difference,
+                    "least_gap_m": braked.least_gap_m,
+                    "overshoot_m": braked.overshoot_m,
+                }
+                for (name, peak), run, braked in zip(
+                    chain.peaks.items(), data.runs, data.braked, strict=True
+                )
+            ],
+        }
+    }
+
+
+def _render_chain(data: ChainStudy, name: str) -> list[str]:
+    chain = data.chain
+    rows: list[list[Cell]] = [
+        [
+            kind,
+            peak.spacing_m,
+            peak.peak,
+            *(peak.tail[n] for n in ROBOTS[1:]),
+            run.difference,
+            "grows" if peak.grows else "does not grow",
+        ]
+        for (kind, peak), run in zip(chain.peaks.items(), data.runs, strict=True)
+    ]
+    brakes: list[list[Cell]] = [
+        [run.name, *(1e3 * value for value in run.overshoot_m.tolist())]
+        for run in data.braked
+    ]
+    headings = ["chain", "spacing (m)", *(f"{n} robots" for n in ROBOTS)]
+    pairs = range(1, len(data.braked[0].overshoot_m) + 1)
+    return [
+        paragraph(
+            "Robots like this one on a line, each with the place behind the one before "
+            "it as its target, by the same law, with and without that robot's velocity. "
+            "What its object sensor sees is exact. In contact the zones of neighbours "
+            "meet, and each pushes the other. Amplification: the largest over frequency "
+            "of how much the last one swings for a swing of the first. A safety filter "
+            "does nothing in it."
+        ),
+        table(
+            [*headings, "simulated, off by", "a disturbance"],
+            rows,
+            caption="Amplification from the first to the last robot",
+        ),
+        paragraph(_of_chain(chain)),
+        table(
+            ["chain", *(f"robots {k} and {k + 1}" for k in pairs)],
+            brakes,
+            caption="The first robot brakes from the target's speed to rest: how far "
+            "each gap falls below where it ends, mm",
+        ),
+        figure_html(
+            plot_chain(chain, data.runs),
+            f"{name}-response",
+            "A pair over frequency; eight robots where their chain amplifies most, or at "
+            "a robot's natural frequency where nothing grows; a pair over D, apart.",
+        ),
+        figure_html(
+            plot_braked_chains(data.braked),
+            f"{name}-braked",
+            "Gaps after the first robot has braked.",
+        ),
+    ]
+
+
+def _of_chain(chain: RobotChain) -> str:
+    growing = [name for name, peak in chain.peaks.items() if peak.grows]
+    calm = [name for name in chain.peaks if name not in growing]
+    text = ""
+    if growing:
+        text += f"A disturbance grows along the chain {'; '.join(growing)}. "
+    if calm:
+        text += f"It does not grow {'; '.join(calm)}. "
+    text += (
+        "Out of contact, with the whole velocity of the one before, it grows for every "
+        f"D: at low frequency |G| is above 1. Without it, it does not from D = "
+        f"{number(chain.least_damping_n_s_m)} N s/m on at K = "
+        f"{number(chain.stiffness_n_m)} N/m, but gaps grow by D/K = "
+        f"{number(chain.time_headway_s)} s times the speed."
+    )
+    if chain.most_feed_forward >= 0.0:
+        share = 100.0 * chain.most_feed_forward
+        text += f" Up to {number(share, 3)} % of the velocity may be fed forward."
+    return text
+
+
+def _render_left_out(data: Sequence[str], name: str) -> list[str]:
+    return [
+        paragraph(
+            "Left out, for they are of a robot that follows a sound: its follow "
+            "distance, its tracker, its bursts and its law's push."
+        ),
+        bullets(data),
+    ]
