@@ -49,21 +49,24 @@ def _damping_notes(
     field: str, own: TrajectoryImpedanceParameters, of: SampledMass
 ) -> list[str]:
     bound, damping = damping_bound(of), own.damping_n_s_m
+    if damping >= bound:
+        note = (
+            f"{field}.damping_n_s_m is {damping:g}, but from 2 M/T, {bound:g}, on the "
+            "robot does not come to rest; lower it"
+        )
+        return [note]
     each = own.contact_damping_n_s_m
-    if damping < bound and each > 0.0 and own.reading != "printed_force":
-        contacts = math.ceil((bound - damping) / each) - 1
-        if contacts < OBJECT_SLOTS:
-            return [
-                f"{field}.contact_damping_n_s_m is {each:g}: with more than {contacts} "
-                f"contacts at once all dampers reach 2 M/T, {bound:g} N s/m, beyond "
-                "which the robot does not come to rest; lower it"
-            ]
-    if damping < bound:
+    if each == 0.0 or own.reading == "printed_force":
         return []
-    return [
-        f"{field}.damping_n_s_m is {damping:g}, but from 2 M/T, {bound:g}, on the robot "
-        "does not come to rest; lower it"
-    ]
+    contacts = math.ceil((bound - damping) / each) - 1
+    if contacts >= OBJECT_SLOTS:
+        return []
+    note = (
+        f"{field}.contact_damping_n_s_m is {each:g}: with more than {contacts} "
+        f"contacts at once all dampers reach 2 M/T, {bound:g} N s/m, from which on the "
+        "robot does not come to rest; lower it"
+    )
+    return [note]
 
 
 def _stiffness_notes(
@@ -76,10 +79,11 @@ def _stiffness_notes(
     what, value = "stiffness_n_m", own.stiffness_n_m
     if value < bound:
         what, value = "stiffness_n_m and contact_stiffness_n_m together", total
-    return [
+    note = (
         f"{field}: {what}, {value:g} N/m, is beyond {bound:.3g}, from which on a robot "
         f"with damping_n_s_m {own.damping_n_s_m:g} does not come to rest; lower it"
-    ]
+    )
+    return [note]
 
 
 def _adaptation_notes(
@@ -88,17 +92,15 @@ def _adaptation_notes(
     if own.projected:
         least, most = own.damping_box_n_s_m[0], own.stiffness_box_n_m[1]
         bound = stiffness_bound(least, of)
-        if most < bound:
-            return []
-        return [
-            f"{field}.stiffness_box_n_m ends at {most:g} N/m, but from {bound:.3g} on a "
-            f"robot with the least of damping_box_n_s_m, {least:g}, does not come to "
+        note = (
+            f"{field}.stiffness_box_n_m ends at {most:g} N/m, but from {bound:.3g} on "
+            f"a robot with the least of damping_box_n_s_m, {least:g}, does not come to "
             "rest; end it lower"
-        ]
+        )
+        return [note] if most >= bound else []
     bound = rate_bound(own.rule, amplitude_m, of)
-    if own.rate < bound or own.normalisation is not None:
-        return []
-    return [
+    note = (
         f"{field}.rate is {own.rate:g}, but from about {bound:.3g} on K and D run away "
         f"where the target is {amplitude_m:.3g} m ahead; lower it, or set projected"
-    ]
+    )
+    return [note] if own.rate >= bound and own.normalisation is None else []

@@ -34,14 +34,20 @@ _OTHERS = frozenset(
     }
 )
 
+#: The same of a robot on a route.
+_ROUTE_PARTS = ("repulsion", "robot", "plant", "route", "objects")
+
 #: Conventions and assumptions, for every law.
-_ASSUMPTIONS = (
+_CONVENTIONS = (
     "World frame W on the floor. Body frame B midway between the wheels, x forward.",
     "Angles counter-clockwise, in rad unless a name ends in `_deg`; SI units.",
     (
         "P, ahead of the axle by epsilon, carries the virtual mass M. What the robot "
         "weighs acts by way of the motor lag alone."
     ),
+)
+_ASSUMPTIONS = (
+    *_CONVENTIONS,
     (
         "Linear models are of the build with exact sensors (`hearing` and "
         "`obstacle_sensing` ideal, odometry not rounded), made by the builder that "
@@ -55,6 +61,15 @@ _ASSUMPTIONS = (
         "The heading follows the motion of P and is neutral at rest: its poles at 0 "
         "(z = 1) are left out where stability is judged."
     ),
+)
+_ROUTE_ASSUMPTIONS = (
+    *_CONVENTIONS,
+    (
+        "Linear models are of law, wheel command, plant and odometry (not rounded) "
+        "with the gains held; objects are seen as they are, their latency late."
+    ),
+    "They hold while |v_P|, the acceleration and the wheels stay below their limits.",
+    "Planner, safety filter and what adapts are in no linear model.",
 )
 
 
@@ -94,7 +109,7 @@ class Latency:
     """A delay between the world and the wheels."""
 
     path: str
-    """``source`` or ``obstacle``."""
+    """``source``, ``target`` or ``obstacle``."""
     part: str
     """What takes the time."""
     mean_s: float
@@ -123,33 +138,38 @@ class ModelSheet:
     assumptions: tuple[str, ...]
     versions: dict[str, str]
 
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """From what latencies are counted."""
+        return tuple(dict.fromkeys(row.path for row in self.latencies))
+
     def latency_s(self, path: str) -> float:
-        """Sum over ``source`` or ``obstacle``, s."""
+        """Sum over one of ``paths``, s."""
         return sum(row.mean_s for row in self.latencies if row.path == path)
 
 
 def model_sheet(scenario: Scenario) -> ModelSheet:
     """Collects the model sheet of a scenario's law."""
-    law = LAWS.get(scenario.law)
+    law, routed = LAWS.get(scenario.law), scenario.route is not None
     return ModelSheet(
         scenario=scenario.name,
         description=scenario.description,
         law=scenario.law,
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
-        motion=_motion(scenario.tick_s),
+        motion=_route_motion(scenario.tick_s) if routed else _motion(scenario.tick_s),
         law_equations=law.equations if law else (),
         parameters=tuple(_parameters(scenario)),
-        envelope=_envelope(scenario),
-        latencies=_latencies(scenario),
-        assumptions=_ASSUMPTIONS,
+        envelope=_route_envelope(scenario) if routed else _envelope(scenario),
+        latencies=_route_latencies(scenario) if routed else _latencies(scenario),
+        assumptions=_ROUTE_ASSUMPTIONS if routed else _ASSUMPTIONS,
         versions=versions(),
     )
 
 
 def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
     others = {f"repulsion.{law}." for law in LAWS if law != scenario.law}
-    for part in _PARTS:
+    for part in _ROUTE_PARTS if scenario.route is not None else _PARTS:
         for row in _rows(getattr(scenario, part), f"{part}."):
             if row.field not in _OTHERS and not row.field.startswith(tuple(others)):
                 yield row
@@ -208,6 +228,46 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
     )
 
 
+def _route_envelope(scenario: Scenario) -> tuple[Limit, ...]:
+    assert scenario.route is not None
+    robot, target = scenario.robot, scenario.route
+    return (
+        Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
+        Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
+        Limit("speed of the target", target.speed_m_s, "m/s", "along the route"),
+        Limit("objects seen", scenario.objects.maximum_range_m, "m", "from P"),
+    )
+
+
+def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
+    seen = Latency(
+        "obstacle", "objects seen", scenario.objects.latency_s, "objects.latency_s"
+    )
+    held = scenario.tick_s / 2.0
+    rows = [
+        row
+        for path in ("target", "obstacle")
+        for row in (
+            Latency(path, "velocity held for a tick", held, "WheelSpeedCommand"),
+            Latency(path, "motor lag", scenario.plant.motor_lag_s, "first order"),
+        )
+    ]
+    return (*rows[:2], seen, *rows[2:])
+
+
+def _route_motion(tick_s: float) -> tuple[Equation, ...]:
+    command, plant = _drive(tick_s)
+    return (
+        Equation(
+            "Virtual mass at P",
+            r"M\,\ddot{p} = U + V",
+            "M p'' = U + V, the pull of the target and the push of contacts",
+        ),
+        command,
+        plant,
+    )
+
+
 def _motion(tick_s: float) -> tuple[Equation, ...]:
     return (
         Equation(
@@ -221,6 +281,13 @@ def _motion(tick_s: float) -> tuple[Equation, ...]:
             r"F_m = K_r\,(p_S-p)\left(1-\frac{d_f}{|p_S-p|}\right)-D_r\,v_P",
             "F_m = K_r (p_S - p)(1 - d_f/|p_S - p|) - D_r v_P",
         ),
+        *_drive(tick_s),
+    )
+
+
+def _drive(tick_s: float) -> tuple[Equation, Equation]:
+    """From the acceleration to the wheels, and from these to the motion."""
+    return (
         Equation(
             f"Command, each tick T = {tick_s * 1e3:g} ms",
             r"v_P \leftarrow v_P + T\,\ddot{p},\quad v=v_P\cdot x_B,"

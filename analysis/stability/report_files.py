@@ -83,10 +83,13 @@ def stability_text(document: dict[str, Any]) -> str:
         known = verdicts if isinstance(verdicts, list) else []
         rows = [_as_comparison(row, document["law"]) for row in known]
     laws = list(rows[0]["values"]) if rows else []
-    lines = [f"{'':<34}{'threshold':>14}" + "".join(f"{law:>22}" for law in laws)]
+    width = max(22, 2 + max(map(len, laws), default=0))
+    heads = "".join(f"{law:>{width}}" for law in laws)
+    lines = [f"{'':<34}{'threshold':>14}{heads}"]
     for row in rows:
         cells = "".join(
-            f"{_value(row['values'][law]):>12} {_mark(row['verdicts'][law]):>9}"
+            f"{_value(row['values'][law]):>{width - 10}}"
+            f"{_mark(row['verdicts'][law]):>10}"
             for law in laws
         )
         lines.append(f"{row['name']:<34}{row['threshold']:>14}{cells}")

@@ -134,7 +134,7 @@ def _model(sheet: ModelSheet) -> str:
         )
     )
     latencies: list[list[Cell]] = []
-    for path in ("source", "obstacle"):
+    for path in sheet.paths:
         latencies.append([f"From {path} to wheels: {1e3 * sheet.latency_s(path):g} ms"])
         latencies += [
             [x.part, 1e3 * x.mean_s, x.remark]

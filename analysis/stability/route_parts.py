@@ -159,10 +159,10 @@ def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
     return [
         paragraph(
             "The loop about P's target with its gains held as they are: law, wheel "
-            "command, plant and odometry as built, each linearised, over a tick. On the "
-            "route it drives at the target's speed; a contact is with a wall across its "
-            "way, at rest, K and D along the way. A safety filter that has nothing to do "
-            "is the wheel command, and limits are not reached."
+            "command, plant and odometry as built, each linearised, over a tick. On "
+            "the route it drives at the target's speed; a contact is with a wall "
+            "across its way, at rest, K and D along the way. A safety filter that has "
+            "nothing to do is the wheel command, and limits are not reached."
         ),
         table(
             ["place", "K (N/m)", "D (N s/m)", "poles ln(z)/T (rad/s)", "growth (1/s)",
@@ -210,8 +210,8 @@ def _render_bounds(data: GainBounds, name: str) -> list[str]:
         paragraph(
             f"With D = {number(damping)} N s/m (K = {number(stiffness)} N/m today), a "
             f"motor lag of {number(data.mass.motor_lag_s)} s and ticks of "
-            f"{number(data.mass.tick_s * 1e3)} ms. By bisection on the one-period matrix "
-            "of the blocks, and by the closed form that warns before a run."
+            f"{number(data.mass.tick_s * 1e3)} ms. By bisection on the one-period "
+            "matrix of the blocks, and by the closed form that warns before a run."
         ),
         table(
             ["the place that springs act on", "stable below K (N/m)", "closed form",
@@ -221,8 +221,9 @@ def _render_bounds(data: GainBounds, name: str) -> list[str]:
         paragraph(
             f"Dampers act on the velocity of the virtual mass. Together they may reach "
             f"{number(data.most_damping_n_s_m)} N s/m; 2 M/T is "
-            f"{number(data.closed_damping_n_s_m)}. So {contacts} contacts may be summed "
-            "with their full damping: a scan of more beams has to be made objects first."
+            f"{number(data.closed_damping_n_s_m)}. So {contacts} contacts may be "
+            "summed with their full damping: a scan of more beams has to be made "
+            "objects first."
         ),
         figure_html(plot_gain_bounds(data), name, "Bounds of K over D."),
     ]  # fmt: skip
@@ -268,12 +269,13 @@ def _adaptation_document(data: AdaptationStability) -> dict[str, Any]:
 
 def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
     frequency, ratio = data.reference
-    pieces = [
+    return [
         paragraph(
             f"Reference: w_n = {number(frequency)} rad/s, xi = {number(ratio)}, poles "
-            f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} rad/s, "
-            f"over a tick {', '.join(number(_plain(z)) for z in data.held_poles)}: it is "
-            "exact, and stable for every xi above 0."
+            f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} "
+            f"rad/s, over a tick "
+            f"{', '.join(number(_plain(z)) for z in data.held_poles)}: "
+            "it is exact, and stable for every xi above 0."
             + (
                 " It has the nominal gains, so that there is nothing to learn: what is "
                 "learnt comes of contacts, limits and the motors."
@@ -285,8 +287,9 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
         paragraph(
             f"Rate: gamma = {number(data.rate)}. Without a cure K and D run away from "
             f"{number(data.critical.rate)} on where the target swings by "
-            f"{number(data.critical.amplitude_m)} m, the lag at which it pulls P through "
-            f"a contact: {number(data.margin)} times today's. gamma_crit a\u00b2 is "
+            f"{number(data.critical.amplitude_m)} m, the lag at which it pulls P "
+            f"through a contact: {number(data.margin)} times today's. gamma_crit "
+            "a\u00b2 is "
             + ", ".join(
                 f"{number(each.product)} at {number(each.amplitude_m)} m"
                 for each in data.products
@@ -305,9 +308,9 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
                     strict=True,
                 )
             ],
-            caption=f"Drift: K (N/m) under a push of {number(data.drift.push_n)} N that "
-            "the reference does not know; (K_0\u2074 + 4 gamma F\u00b2 t)^(1/4), and "
-            "simulated without and with the cures",
+            caption=f"Drift: K (N/m) under a push of {number(data.drift.push_n)} N "
+            "that the reference does not know; (K_0\u2074 + 4 gamma F\u00b2 t)^(1/4), "
+            "and simulated without and with the cures",
         ),
         table(
             ["", f"after {number(data.jam.jam_s)} s of jam",
@@ -336,7 +339,6 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             plot_adaptation(data), name, "Lyapunov function, and drift under a push."
         ),
     ]  # fmt: skip
-    return pieces
 
 
 def _plain(pole: complex) -> complex:
@@ -355,8 +357,8 @@ def _of_lyapunov(data: AdaptationStability) -> str:
         "\u0394D\u00b2)/(2 gamma), from gains that are half of the wanted ones, "
         + ("falls all the time" if run.falls else "rises")
         + f" in continuous time: largest rise {number(run.largest_rise)} of its start. "
-        f"Sampled, with motors, it may rise by {number(run.sampled_rise)} a tick; after "
-        f"a minute {number(float(run.continuous[-1]))} and "
+        f"Sampled, with motors, it may rise by {number(run.sampled_rise)} a tick; "
+        f"after a minute {number(float(run.continuous[-1]))} and "
         f"{number(float(run.sampled[-1]))} are left. Contacts are not in V: they are a "
         "disturbance to it."
     )
@@ -388,6 +390,7 @@ def _chain_document(data: ChainStudy) -> dict[str, Any]:
             "stiffness_n_m": chain.stiffness_n_m,
             "damping_n_s_m": chain.damping_n_s_m,
             "least_damping_n_s_m": chain.least_damping_n_s_m,
+            "least_damping_in_contact_n_s_m": chain.least_damping_in_contact_n_s_m,
             "most_feed_forward": chain.most_feed_forward,
             "time_headway_s": chain.time_headway_s,
             "chains": [
@@ -435,11 +438,11 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
     return [
         paragraph(
             "Robots like this one on a line, each with the place behind the one before "
-            "it as its target, by the same law, with and without that robot's velocity. "
-            "What its object sensor sees is exact. In contact the zones of neighbours "
-            "meet, and each pushes the other. Amplification: the largest over frequency "
-            "of how much the last one swings for a swing of the first. A safety filter "
-            "does nothing in it."
+            "it as its target, by the same law, with and without that robot's "
+            "velocity. What its object sensor sees is exact. In contact the zones of "
+            "neighbours meet, and each pushes the other. Amplification: the largest "
+            "over frequency of how much the last one swings for a swing of the first. "
+            "A safety filter does nothing in it."
         ),
         table(
             [*headings, "simulated, off by", "a disturbance"],
@@ -456,8 +459,8 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
         figure_html(
             plot_chain(chain, data.runs),
             f"{name}-response",
-            "A pair over frequency; eight robots where their chain amplifies most, or at "
-            "a robot's natural frequency where nothing grows; a pair over D, apart.",
+            "A pair over frequency; eight robots where their chain amplifies most, or "
+            "at a robot's natural frequency where nothing grows; a pair over D, apart.",
         ),
         figure_html(
             plot_braked_chains(data.braked),
@@ -479,7 +482,8 @@ def _of_chain(chain: RobotChain) -> str:
         "Out of contact, with the whole velocity of the one before, it grows for every "
         f"D: at low frequency |G| is above 1. Without it, it does not from D = "
         f"{number(chain.least_damping_n_s_m)} N s/m on at K = "
-        f"{number(chain.stiffness_n_m)} N/m, but gaps grow by D/K = "
+        f"{number(chain.stiffness_n_m)} N/m (in contact from "
+        f"{number(chain.least_damping_in_contact_n_s_m)}), but gaps grow by D/K = "
         f"{number(chain.time_headway_s)} s times the speed."
     )
     if chain.most_feed_forward >= 0.0:

@@ -190,7 +190,10 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
         InputError: The law does not adapt.
     """
     own = route_law(scenario)
-    if not isinstance(own, AdaptiveTrajectoryParameters) or own.adaptation.rule == "none":
+    if (
+        not isinstance(own, AdaptiveTrajectoryParameters)
+        or own.adaptation.rule == "none"
+    ):
         raise InputError(
             "law",
             f"nothing of {scenario.law!r} adapts; use trajectory_adaptive with a rule",

@@ -48,7 +48,7 @@ _SHAKEN_M = 0.002
 #: Periods that the chain is shaken for; amplitudes are those of the last ones.
 _PERIODS, _READ = 40, 5
 #: A chain is watched so long after its first robot has braked, s.
-_WATCHED_S, _DRIVEN_S = 40.0, 20.0
+_WATCHED_S, _DRIVEN_S = 25.0, 40.0
 
 
 class ChainNumbers(NamedTuple):
@@ -84,8 +84,10 @@ def _object(
 
 @njit(cache=True)
 def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cover
-    """Places P of all robots at each tick; they start in formation, and drive as the
-    first one does at its first tick."""
+    """Places P of all robots at each tick.
+
+    They start in formation, and drive as the first one does at its first tick.
+    """
     ticks, robots, tick_s = len(first), len(gaps) + 1, numbers.tick_s
     places = np.empty((ticks, robots))
     begin = (first[1] - first[0]) / tick_s
@@ -103,7 +105,9 @@ def _run(first: Any, gaps: Any, numbers: ChainNumbers) -> Any:  # pragma: no cov
         seen, speed = np.empty(robots), np.full(robots, begin)
         for i in range(robots):
             then = tick - late
-            seen[i] = places[then, i] if then >= 0 else places[0, i] + begin * tick_s * then
+            seen[i] = (
+                places[then, i] if then >= 0 else places[0, i] + begin * tick_s * then
+            )
             if then > 0:
                 speed[i] = (places[then, i] - places[then - 1, i]) / tick_s
         for i in range(1, robots):
@@ -216,15 +220,15 @@ def shake_chain(scenario: Scenario, name: str, peak: ChainPeak) -> ChainRun:
     time = np.arange(0.0, _PERIODS * period, scenario.tick_s)
     # It starts at rest, at the turn of its swing.
     first = _SHAKEN_M * (np.cos(omega * time) - 1.0)
-    kind = {"feed_forward": peak.feed_forward, "spacing_m": peak.spacing_m}
-    places = run_chain(scenario, first, **kind)
+    share, spacing = peak.feed_forward, peak.spacing_m
+    places = run_chain(scenario, first, feed_forward=share, spacing_m=spacing)
     last = time > (_PERIODS - _READ) * period
     basis = np.column_stack(
         [np.cos(omega * time[last]), np.sin(omega * time[last]), np.ones(last.sum())]
     )
     found = np.linalg.lstsq(basis, places[last], rcond=None)[0]
     sizes = np.hypot(found[0], found[1])
-    links = links_of(scenario, **kind, robots=_ROBOTS)
+    links = links_of(scenario, share, spacing, _ROBOTS)
     response = np.abs(chain_response(scenario, links, [omega])[0])
     return ChainRun(name, omega, sizes / sizes[0], np.concatenate([[1.0], response]))
 
@@ -263,9 +267,7 @@ def brake_chain(
     time = np.arange(-_DRIVEN_S, _WATCHED_S, scenario.tick_s)
     braking = np.clip(time, 0.0, speed / slope)
     first = speed * np.minimum(time, 0.0) + speed * braking - 0.5 * slope * braking**2
-    places = run_chain(
-        scenario, first, feed_forward=feed_forward, spacing_m=spacing_m
-    )
+    places = run_chain(scenario, first, feed_forward=feed_forward, spacing_m=spacing_m)
     after = time >= 0.0
     gaps = -np.diff(places, axis=1)[after]
     least = gaps.min(axis=0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,8 +37,8 @@ __all__ = [
     "WELL_DAMPED",
     "FrozenPoint",
     "GainBounds",
-    "damping_ratio",
     "damped_stiffness",
+    "damping_ratio",
     "frozen_gains",
     "gain_bounds",
 ]
@@ -83,9 +84,7 @@ class FrozenPoint:
         return float((-self.poles.real / np.abs(self.poles)).min())
 
 
-def _s_plane(
-    z: NDArray[np.complex128], period_s: float
-) -> NDArray[np.complex128]:
+def _s_plane(z: NDArray[Any], period_s: float) -> NDArray[np.complex128]:
     moving = z[np.abs(z) > _DELAY].astype(complex)
     return np.log(moving) / period_s
 

@@ -98,7 +98,10 @@ class RobotChain:
     peaks: dict[str, ChainPeak]
     """With and without velocity feed-forward, apart and in contact."""
     least_damping_n_s_m: float
-    """D from which, without feed-forward, nothing grows at this K; infinite: never."""
+    """D from which, without feed-forward and apart, nothing grows at this K; infinite:
+    from none that is tried."""
+    least_damping_in_contact_n_s_m: float
+    """The same in contact, in a chain of eight."""
     most_feed_forward: float
     """Share of the velocity up to which nothing grows at these gains; below 0: even
     without it does something grow."""
@@ -153,7 +156,10 @@ def robot_chain(scenario: Scenario) -> RobotChain:
         stiffness_n_m=k,
         damping_n_s_m=d,
         peaks=peaks,
-        least_damping_n_s_m=least_damping(scenario, k),
+        least_damping_n_s_m=least_damping(scenario, links_of(scenario, 0.0, apart, 2)),
+        least_damping_in_contact_n_s_m=least_damping(
+            scenario, links_of(scenario, 0.0, near, ROBOTS[-1])
+        ),
         most_feed_forward=most_feed_forward(scenario, k, d),
         dampings=_DAMPINGS,
         peaks_by_damping=np.array(plain),
@@ -305,9 +311,7 @@ def chain_response(
     return np.asarray(np.linalg.solve(matrix, force)[..., 0])
 
 
-def chain_peak(
-    scenario: Scenario, feed_forward: float, spacing_m: float
-) -> ChainPeak:
+def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> ChainPeak:
     """Largest amplification by a pair, of each robot, and from head to tail.
 
     Args:
@@ -358,29 +362,39 @@ def _peak(
     return float(values[k]), float(omega[k])
 
 
+def _rests(scenario: Scenario, links: ChainLinks) -> bool:
+    """Whether a robot comes to rest behind one that rests."""
+    stiffness, damping = links.ahead
+    matrix = contact_matrix(
+        scenario,
+        links.stiffness + stiffness,
+        damping_n_s_m=links.damping + damping,
+    )
+    return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
+
+
 def _stable_peak(scenario: Scenario, links: ChainLinks) -> float:
     """Largest |G| of a pair; infinite where the robot does not come to rest."""
-    matrix = contact_matrix(scenario, links.stiffness, damping_n_s_m=links.damping)
-    if np.abs(np.linalg.eigvals(matrix)).max() >= 1.0:
-        return math.inf
-    return _peak(scenario, [links])[0]
+    return _peak(scenario, [links])[0] if _rests(scenario, links) else math.inf
 
 
-def least_damping(scenario: Scenario, stiffness: float) -> float:
-    """D from which nothing grows without feed-forward, apart, N s/m.
+def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
+    """D from which no robot of a chain swings more than the first, N s/m.
 
     Args:
-        scenario: Mass, motors, tick and latency of objects are used.
-        stiffness: K, N/m.
+        scenario: Mass, motors and tick are used.
+        links: Of each robot but the first; their own D does not count.
 
     Returns:
         By bisection; infinite where no damping that is tried will do.
     """
-    late = _late(scenario)
 
     def calm(damping: float) -> bool:
-        links = ChainLinks(stiffness, damping, 0.0, late_ticks=late)
-        return _stable_peak(scenario, links) <= 1.0 + _ROUNDING
+        damped = [link._replace(damping=damping) for link in links]
+        if not _rests(scenario, damped[0]):
+            return False
+        peaks = (_peak(scenario, damped, i)[0] for i in range(len(damped)))
+        return all(peak <= 1.0 + _ROUNDING for peak in peaks)
 
     tried = _DAMPINGS.tolist()
     first = next((n for n, each in enumerate(tried) if calm(each)), None)

@@ -247,7 +247,10 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
             odometry,
             block_model(odometry, np.array(before), [np.zeros(2)], period_s=tick_s),
         ),
-        (law, block_model(law, np.empty(0), [target, objects, pose, v], period_s=tick_s)),
+        (
+            law,
+            block_model(law, np.empty(0), [target, objects, pose, v], period_s=tick_s),
+        ),
         (
             command,
             block_model(

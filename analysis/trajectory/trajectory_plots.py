@@ -171,13 +171,13 @@ def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
     middle.set_xlabel("robot (line: response, dots: simulated)")
     middle.set_ylabel("amplitude, of the first")
     for k, name in enumerate(("with feed-forward", "without")):
-        right.loglog(
+        right.semilogx(
             chain.dampings, chain.peaks_by_damping[:, k], color=_LINES[k], label=name
         )
     right.axvline(
         chain.damping_n_s_m, color=COLOURS["empty"], linestyle="--", label="today"
     )
-    right.set_ylim(0.9, 1.3 * _HIGHEST)
+    right.set_ylim(0.8, _HIGHEST)
     right.set_xlabel(f"D (N s/m) at K = {chain.stiffness_n_m:g} N/m")
     right.set_ylabel("largest amplification by a pair")
     for axes in (left, middle, right):
