@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 from systems.framework.parameters import Length, NonNegativeStiffness
 from systems.laws.law import Equation, Law
 from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
@@ -19,6 +21,7 @@ __all__ = [
     "AdaptiveTrajectoryParameters",
     "ConventionalTrajectoryParameters",
     "FilteredTrajectoryParameters",
+    "PrintedAdaptationParameters",
 ]
 
 
@@ -33,10 +36,17 @@ class ConventionalTrajectoryParameters(TrajectoryImpedanceParameters):
     """Switched on at the edge of the zone, as it is printed."""
 
 
+class PrintedAdaptationParameters(AdaptationParameters):
+    """The same; who sets one of its fields still has the paper's rule."""
+
+    rule: Literal["none", "lyapunov", "sensitivity"] = "lyapunov"
+    """See ``AdaptationParameters``."""
+
+
 class AdaptiveTrajectoryParameters(ConventionalTrajectoryParameters):
     """The same with the adaptation that eq. 40 to 42 print."""
 
-    adaptation: AdaptationParameters = AdaptationParameters(rule="lyapunov")
+    adaptation: PrintedAdaptationParameters = PrintedAdaptationParameters()
     """How K, D and K_e adapt."""
     reference: ReferenceModelParameters = ReferenceModelParameters()
     """What they adapt to."""

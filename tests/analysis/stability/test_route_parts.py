@@ -1,0 +1,121 @@
+"""The report of a robot on a route: parts, verdicts, document and page."""
+
+from __future__ import annotations
+
+import pytest
+
+from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
+from analysis.stability.report_files import stability_document, stability_text
+from analysis.stability.report_page import stability_page
+from analysis.stability.report_parts import parts
+from diagrams import load_scenario
+from systems.framework.input_error import InputError
+
+
+@pytest.fixture(scope="module")
+def analyses():
+    scenario = load_scenario("unknown_block")
+    laws = ["trajectory_adaptive", "trajectory_filtered"]
+    work = parts(full=False, routed=True)
+    return [analyse_law(each, work) for each in chosen_laws(scenario, laws)]
+
+
+def test_every_part_is_there_or_says_why_not(analyses):
+    for analysis in analyses:
+        assert analysis.failures == {}
+    adaptive, filtered = analyses
+    assert not any(finding.problem for finding in adaptive.findings.values())
+    assert filtered.findings["adaptation"].problem.startswith("law: nothing of")
+    assert "Burst cycle" in adaptive.data("left_out")
+    assert "verdicts" in adaptive.findings
+
+
+def test_the_document_has_the_numbers(analyses):
+    document = stability_document(analyses[:1], None)
+    assert [row["at"]["name"] for row in document["frozen_gains"]] == [
+        "on the route",
+        "at rest",
+        "in a zone",
+    ]
+    bounds = document["gain_bounds"]
+    assert bounds["stable_today_n_m"][1] == pytest.approx(60.9, abs=0.05)
+    assert bounds["mass"]["motor_lag_s"] == 0.05
+    assert document["adaptation"]["lyapunov"]["falls"]
+    assert document["adaptation"]["cures"]["projected"] is False
+    chains = document["robot_chain"]["chains"]
+    assert [chain["grows"] for chain in chains] == [True, False, True, False]
+    assert chains[0]["tail"]["8"] == pytest.approx(chains[0]["peak"] ** 7)
+    assert document["model"]["motion"][0]["title"] == "Virtual mass at P"
+    fields = [row["field"] for row in document["model"]["parameters"]]
+    assert "route.speed_m_s" in fields
+    assert "attraction.stiffness_n_m" not in fields
+
+
+def test_verdicts_are_of_the_numbers(analyses):
+    adaptive, filtered = (
+        {verdict.name: verdict for verdict in analysis.verdicts}
+        for analysis in analyses
+    )
+    assert adaptive["growth with frozen gains"].verdict == "pass"
+    assert adaptive["contacts that may be summed"].value == 18.0
+    assert adaptive["stiffness learnt, of the stable"].verdict == "fail"
+    assert filtered["stiffness learnt, of the stable"].verdict == "not applicable"
+    # K + K_e = 11 N/m, D = 4 at the zone's edge.
+    assert filtered["springs of the stable sum"].value == pytest.approx(
+        11.0 / 60.89, rel=1e-3
+    )
+    assert filtered["least damping ratio"].value == pytest.approx(0.528, abs=0.002)
+    for name in ("growth along a chain, fed forward", "the same in contact"):
+        assert filtered[name].verdict == "fail"
+    assert adaptive["the same without its velocity"].verdict == "pass"
+
+
+def test_page_and_table_show_both_laws(analyses):
+    page = stability_page(analyses)
+    assert page.count("<figure>") == 9
+    for text in (
+        "Robots that follow one another",
+        "What this report has not",
+        "From target to wheels: 62.5 ms",
+        "Not computed: law: nothing of",
+    ):
+        assert text in page
+    lines = stability_text(stability_document(analyses, None)).splitlines()
+    assert lines[0].split() == [
+        "threshold",
+        "trajectory_adaptive",
+        "trajectory_filtered",
+    ]
+    assert len({len(line) for line in lines}) == 1
+
+
+def test_laws_of_a_route_are_chosen_on_a_route():
+    scenario = load_scenario("unknown_block")
+    assert [each.law for each in chosen_laws(scenario, ["all"])] == [
+        "trajectory_conventional",
+        "trajectory_adaptive",
+        "trajectory_filtered",
+    ]
+    with pytest.raises(InputError, match="law: is 'active', but the robot has a route"):
+        chosen_laws(scenario, ["active"])
+
+
+@pytest.mark.parametrize(
+    ("scenario", "name", "start", "others"),
+    [
+        ("robots_2", None, (-3.0, 0.0), "without second; --robot chooses another"),
+        ("robots_2", "second", (0.0, -3.0), "without first"),
+        ("unknown_block", None, (0.0, 0.0), ""),
+    ],
+)
+def test_one_robot_of_several_is_taken_alone(scenario, name, start, others):
+    alone, note = chosen_robot(load_scenario(scenario), name)
+    assert alone.start.position_m == start
+    assert not alone.robots
+    assert note.endswith(others)
+    assert bool(note) == bool(others)
+
+
+def test_a_robot_that_is_none_is_refused():
+    with pytest.raises(InputError, match="robot: 'third' is none; use first, second"):
+        chosen_robot(load_scenario("robots_2"), "third")
