@@ -197,7 +197,7 @@ def _margin_cells(each: LoopMargins) -> list[Cell]:
 def _render_bounds(data: GainBounds, name: str) -> list[str]:
     rows: list[list[Cell]] = [
         [
-            f"{late} ticks late" if late else "as built",
+            f"{late} tick{'s' * (late > 1)} late" if late else "as built",
             data.stable_today_n_m[k],
             data.closed_form_n_m[k],
             data.damped_today_n_m[k],

@@ -93,7 +93,7 @@ def test_the_box_is_held_against_what_its_least_damping_stands():
 
 
 def test_what_is_warned_of_leaves_all_that_is_stable():
-    """Three times the bound, at the amplitude that it names: D beyond 2 M/T."""
+    """At the amplitude that it names: D beyond 2 M/T, and below the bound not."""
     own = load_scenario(
         "unknown_block",
         ["law=trajectory_adaptive", f"{ADAPTIVE}.adaptation.rate=5000"],
@@ -104,7 +104,7 @@ def test_what_is_warned_of_leaves_all_that_is_stable():
     slower = loop._replace(
         adaptation=own.adaptation.model_copy(update={"rate": 1500.0})
     )
-    assert np.abs(run_point(slower, targets).gains[:, :2]).max() < 40.0
+    assert np.abs(run_point(slower, targets).gains[:, 1]).max() < 80.0
 
 
 def test_each_robot_is_named():

@@ -37,10 +37,11 @@ class ConventionalTrajectoryParameters(TrajectoryImpedanceParameters):
 
 
 class PrintedAdaptationParameters(AdaptationParameters):
-    """The same; who sets one of its fields still has the paper's rule."""
+    """How K, D and K_e adapt: as eq. 40 to 42 are printed, unless ``rule`` is set."""
 
     rule: Literal["none", "lyapunov", "sensitivity"] = "lyapunov"
-    """See ``AdaptationParameters``."""
+    """Nothing adapts; eq. 40 to 42 as they are printed, which is a Lyapunov rule; or
+    the gradient of eq. 27 by the sensitivities that eq. 34 means."""
 
 
 class AdaptiveTrajectoryParameters(ConventionalTrajectoryParameters):
