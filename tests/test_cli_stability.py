@@ -152,6 +152,25 @@ def test_bad_input_is_one_line_and_status_2(capsys, tmp_path, words, field, hint
     assert not (tmp_path / "out").exists()
 
 
+def test_of_several_robots_one_is_analysed_alone(quick, capsys, tmp_path):
+    documents = []
+    for k, chosen in enumerate(([], ["--robot", "second"])):
+        out = tmp_path / str(k)
+        words = ["robots_2", *chosen, "--json", "--out", str(out)]
+        status, printed, complaint = run(capsys, *words)
+        assert status == 0
+        assert complaint.count("\n") == 1
+        assert f"the report is of robot {['first', 'second'][k]!r} alone" in complaint
+        documents.append(json.loads(printed))
+        again = load_scenario(out / "scenario.yaml")
+        assert not again.robots
+        assert again.start.position_m == [(-3.0, 0.0), (0.0, -3.0)][k]
+    assert documents[0]["law"] == "trajectory_filtered"
+    status, _, complaint = run(capsys, "robots_2", "--robot", "nobody")
+    assert status == 2
+    assert complaint == "phonotaxis: robot: 'nobody' is none; use first, second\n"
+
+
 def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):
     def demand(study):
         raise SystemExit(1)

@@ -188,10 +188,12 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     others = [each for each in names if each != chosen]
     if not others:
         return scenario.of_robot(chosen), ""
+    # Alone there is nobody to hear it.
+    alone = scenario.of_robot(chosen).model_copy(update={"loudspeaker": None})
     note = f"the report is of robot {chosen!r} alone, without {', '.join(others)}"
     if name is None:
         note += "; --robot chooses another"
-    return scenario.of_robot(chosen), note
+    return alone, note
 
 
 def analyse_law(

@@ -475,9 +475,9 @@ def _of_chain(chain: RobotChain) -> str:
     calm = [name for name in chain.peaks if name not in growing]
     text = ""
     if growing:
-        text += f"A disturbance grows along the chain {'; '.join(growing)}. "
+        text += f"A disturbance grows along the chain: {'; '.join(growing)}. "
     if calm:
-        text += f"It does not grow {'; '.join(calm)}. "
+        text += f"It does not grow: {'; '.join(calm)}. "
     text += (
         "Out of contact, with the whole velocity of the one before, it grows for every "
         f"D: at low frequency |G| is above 1. Without it, it does not from D = "

@@ -37,8 +37,8 @@ __all__ = [
     "WELL_DAMPED",
     "FrozenPoint",
     "GainBounds",
+    "axis_damping_ratio",
     "damped_stiffness",
-    "damping_ratio",
     "frozen_gains",
     "gain_bounds",
 ]
@@ -48,7 +48,7 @@ WELL_DAMPED = 0.7
 #: Ages of the place that the bounds are for, ticks: as built, and a processor's more.
 LATE_TICKS = (0, 1)
 #: Dampings of the chart, N s/m, up to this share of the greatest.
-_CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.995
+_CHART_POINTS, _LEAST_N_S_M, _MOST = 60, 0.5, 0.97
 _HALVINGS = 50
 #: Poles nearer to z = 0 are delays.
 _DELAY = 1e-6
@@ -189,7 +189,7 @@ def gain_bounds(scenario: Scenario) -> GainBounds:
     )
 
 
-def damping_ratio(
+def axis_damping_ratio(
     scenario: Scenario, stiffness: float, damping: float, late_ticks: int = 0
 ) -> float:
     """Of the least damped mode of one axis.
@@ -222,7 +222,7 @@ def damped_stiffness(scenario: Scenario, damping: float, late_ticks: int = 0) ->
         N/m; 0 where there is none.
     """
     return _last(
-        lambda k: damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED
+        lambda k: axis_damping_ratio(scenario, k, damping, late_ticks) >= WELL_DAMPED
     )
 
 

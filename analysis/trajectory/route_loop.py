@@ -141,7 +141,15 @@ def frozen_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
 
 
 def whole_route_model(scenario: Scenario, point: RoutePoint) -> LinearModel:
-    """The same with every state of plant, odometry, wheel command and seen objects."""
+    """The same with every state of plant, odometry, wheel command and seen objects.
+
+    Args:
+        scenario: Has a route.
+        point: Where.
+
+    Returns:
+        From the target, m and m/s, to the place of P, m.
+    """
     models = _blocks(scenario, point)
     targets = tuple(f"target_state[{k}]" for k in range(4))
     poses = tuple(f"pose_WB[{k}]" for k in range(3))

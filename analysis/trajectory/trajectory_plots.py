@@ -156,7 +156,15 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
 
 
 def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
-    """Amplification over frequency, robot by robot, and over D."""
+    """Amplification over frequency, robot by robot, and over D.
+
+    Args:
+        chain: Responses.
+        runs: The same chains, shaken.
+
+    Returns:
+        Three panels.
+    """
     figure = Figure(figsize=(11.4, 3.9), layout="constrained")
     left, middle, right = figure.subplots(1, 3)
     for k, (name, peak) in enumerate(chain.peaks.items()):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from analysis.models.ideal_scenarios import ideal_scenario, require_ideal
 from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
@@ -114,6 +115,14 @@ def test_one_robot_of_several_is_taken_alone(scenario, name, start, others):
     assert not alone.robots
     assert note.endswith(others)
     assert bool(note) == bool(others)
+
+
+@pytest.mark.parametrize("name", ["leader", "second"])
+def test_one_of_a_convoy_has_a_linear_model_of_its_own(name):
+    """A leader alone has nobody who hears its loudspeaker."""
+    alone, _ = chosen_robot(load_scenario("convoy"), name)
+    (chosen,) = chosen_laws(alone, [])
+    require_ideal(ideal_scenario(chosen))
 
 
 def test_a_robot_that_is_none_is_refused():
