@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
-from analysis.linear.contact_mode import contact_matrix, motion_chain
+from analysis.linear.contact_mode import motion_chain
 from analysis.trajectory.route_loop import contact_gains, route_law
 from diagrams.scenario import Scenario
+from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "ChainLinks",
     "ChainPeak",
     "RobotChain",
+    "chain_matrix",
     "chain_peak",
     "chain_response",
     "chain_spacings",
@@ -71,7 +73,8 @@ class ChainPeak:
     spacing_m: float
     """That is asked for between P of neighbours, m."""
     peak: float
-    """Largest amplification by a pair over frequency; 1 at rest."""
+    """Largest amplification by a pair over frequency, 1 at rest; infinite, as the
+    others, where they come to no rest."""
     omega: NDArray[np.float64]
     """(n,) rad/s."""
     gain: NDArray[np.float64]
@@ -147,7 +150,7 @@ def robot_chain(scenario: Scenario) -> RobotChain:
     late = _late(scenario)
     plain = [
         [
-            _stable_peak(scenario, ChainLinks(k, each, share, late_ticks=late))
+            _stable_peak(scenario, [ChainLinks(k, each, share, late_ticks=late)])
             for share in (1.0, 0.0)
         ]
         for each in _DAMPINGS.tolist()
@@ -325,14 +328,14 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
     omega = _grid(scenario)
-    tail = {n: _peak(scenario, each)[0] for n, each in links.items()}
+    tail = {n: _stable_peak(scenario, each) for n, each in links.items()}
     return ChainPeak(
         feed_forward=feed_forward,
         spacing_m=spacing_m,
         peak=tail[2],
         omega=omega,
         gain=np.abs(chain_response(scenario, links[most], omega)),
-        each=tuple(_peak(scenario, links[most], i)[0] for i in range(most - 1)),
+        each=tuple(_stable_peak(scenario, links[most], i) for i in range(most - 1)),
         tail=tail,
         frequency_rad_s=_peak(scenario, links[most])[1],
     )
@@ -362,20 +365,59 @@ def _peak(
     return float(values[k]), float(omega[k])
 
 
-def _rests(scenario: Scenario, links: ChainLinks) -> bool:
-    """Whether a robot comes to rest behind one that rests."""
-    stiffness, damping = links.ahead
-    matrix = contact_matrix(
-        scenario,
-        links.stiffness + stiffness,
-        damping_n_s_m=links.damping + damping,
-    )
+def chain_matrix(
+    scenario: Scenario, links: Sequence[ChainLinks]
+) -> NDArray[np.float64]:
+    """x+ = A x of the robots behind a first one that rests.
+
+    Args:
+        scenario: Mass, motors and tick are used.
+        links: Of each robot but the first.
+
+    Returns:
+        (n, n); states of each robot are those of ``sampled_matrix``, then as many
+        earlier places as its neighbours need.
+    """
+    tick_s, mass = scenario.tick_s, scenario.robot.mass_kg
+    of = SampledMass(mass, scenario.plant.motor_lag_s, tick_s)
+    free = sampled_matrix(0.0, 0.0, of)
+    late = links[0].late_ticks
+    size = 3 + late + 1
+    # An acceleration moves v by T, and w and p as v moves them.
+    moved = tick_s / mass * free[:, 2]
+    matrix = np.zeros((size * len(links), size * len(links)))
+    for i, link in enumerate(links):
+        (k_a, d_a), (k_b, d_b) = link.ahead, link.behind
+        force = np.zeros(len(matrix))
+        own = size * i
+        force[own] = -(link.stiffness + k_a + k_b)
+        force[own + 2] = -(link.damping + d_a + d_b)
+        front = link.stiffness + k_a, link.damping * link.feed_forward + d_a
+        for at, (k, d) in ((i - 1, front), (i + 1, (k_b, d_b))):
+            if 0 <= at < len(links):
+                places = [size * at, *range(size * at + 3, size * (at + 1))]
+                force[places[late]] += k + d / tick_s
+                force[places[late + 1]] -= d / tick_s
+        block = slice(own, own + 3)
+        matrix[block, block] = free
+        matrix[block] += np.outer(moved, force)
+        matrix[own + 3, own] = 1.0
+        for n in range(late):
+            matrix[own + 4 + n, own + 3 + n] = 1.0
+    return matrix
+
+
+def _rests(scenario: Scenario, links: Sequence[ChainLinks]) -> bool:
+    """Whether the robots come to rest behind one that rests."""
+    matrix = chain_matrix(scenario, links)
     return bool(np.abs(np.linalg.eigvals(matrix)).max() < 1.0)
 
 
-def _stable_peak(scenario: Scenario, links: ChainLinks) -> float:
-    """Largest |G| of a pair; infinite where the robot does not come to rest."""
-    return _peak(scenario, [links])[0] if _rests(scenario, links) else math.inf
+def _stable_peak(
+    scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
+) -> float:
+    """Largest amplification of one of them; infinite where they come to no rest."""
+    return _peak(scenario, links, robot)[0] if _rests(scenario, links) else math.inf
 
 
 def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
@@ -391,7 +433,7 @@ def least_damping(scenario: Scenario, links: Sequence[ChainLinks]) -> float:
 
     def calm(damping: float) -> bool:
         damped = [link._replace(damping=damping) for link in links]
-        if not _rests(scenario, damped[0]):
+        if not _rests(scenario, damped):
             return False
         peaks = (_peak(scenario, damped, i)[0] for i in range(len(damped)))
         return all(peak <= 1.0 + _ROUNDING for peak in peaks)
@@ -422,7 +464,7 @@ def most_feed_forward(scenario: Scenario, stiffness: float, damping: float) -> f
 
     def calm(share: float) -> bool:
         links = ChainLinks(stiffness, damping, share, late_ticks=late)
-        return _stable_peak(scenario, links) <= 1.0 + _ROUNDING
+        return _stable_peak(scenario, [links]) <= 1.0 + _ROUNDING
 
     if not calm(0.0):
         return -1.0

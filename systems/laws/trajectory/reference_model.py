@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,6 +57,7 @@ class ReferenceNumbers(NamedTuple):
     b: tuple[float, float, float, float]
 
 
+@lru_cache(maxsize=64)
 def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNumbers:
     """Eq. 20 to 26 over a tick in which the target's state is held: exact.
 

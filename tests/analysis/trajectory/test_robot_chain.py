@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 from scipy.optimize import fsolve
 
+from analysis.linear.contact_mode import motion_chain
 from analysis.trajectory.chain_run import brake_chain, run_chain, shake_chain
 from analysis.trajectory.robot_chain import (
     ChainLinks,
+    chain_matrix,
     chain_response,
     chain_spacings,
     disc_offsets,
@@ -61,6 +63,41 @@ def test_a_late_neighbour_turns_the_phase_alone():
         for n in (0, 3)
     )
     np.testing.assert_allclose(late, soon * np.exp(-3j * omega * T), rtol=1e-9)
+
+
+@pytest.mark.parametrize("late", [0, 2])
+def test_the_matrix_of_a_chain_is_that_of_its_response(late):
+    """Cramer: the last one's amplitude is what couples all, over a determinant."""
+    where = scenario()
+    links = [
+        ChainLinks(K, D, 0.7, (3.0, 2.0), (2.0, 1.0), late),
+        ChainLinks(K, D, 0.7, (3.0, 1.0), (1.0, 0.5), late),
+        ChainLinks(K, D, 0.7, (1.0, 0.5), (0.0, 0.0), late),
+    ]
+    omega = np.array([0.3, 1.7, 8.0, 40.0])
+    z = np.exp(1j * omega * T)
+    place = motion_chain(where).response(omega)[0, 0]
+    coupled = np.ones(len(omega), dtype=complex)
+    for link in links:
+        speed = (1.0 - 1.0 / z) / T
+        pull = link.stiffness + link.ahead[0] + (0.7 * D + link.ahead[1]) * speed
+        coupled *= pull * z**-late * place / where.robot.mass_kg
+    loose = [ChainLinks(0.0, 0.0, 0.0, late_ticks=late)] * 3
+    determinants = [
+        np.array([np.linalg.det(each * np.eye(len(A)) - A) for each in z])
+        for A in (chain_matrix(where, links), chain_matrix(where, loose))
+    ]
+    found = chain_response(where, links, omega)[:, -1]
+    expected = coupled * determinants[1] / determinants[0]
+    np.testing.assert_allclose(found, expected, rtol=1e-6)
+
+
+def test_robots_that_come_to_no_rest_are_no_chain():
+    field = "repulsion.trajectory_filtered.damping_n_s_m=90"
+    chain = robot_chain(load_scenario("unknown_block", [field]))
+    for peak in chain.peaks.values():
+        assert peak.grows
+        assert peak.peak == math.inf
 
 
 def test_fed_forward_a_disturbance_grows_and_without_it_does_not(chains):
