@@ -24,7 +24,7 @@ from diagrams.bodies import (
     robot_rectangle,
 )
 from diagrams.explain import explain
-from diagrams.goal_checks import check_goals
+from diagrams.goal_checks import check_goals, start_note
 from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
 from diagrams.route_checks import route_notes
@@ -213,13 +213,15 @@ class Scenario(FollowerParameters, RunParameters):
     def notes(self) -> list[str]:
         """What a user should know before a run, a line each.
 
-        What guards do not promise, and gains of routes beyond what sampling permits.
+        What guards do not promise, starts within the clearance of a route, and gains
+        beyond what sampling permits.
         """
         notes = [
             guard_note(n, robot, self.surroundings(n).bodies, self.duration_s)
             for n, robot in self.all_robots.items()
         ]
         for prefix, robot in self._robot_fields():
+            notes.append(start_note(prefix, robot, self.mapped()))
             notes += route_notes(prefix, robot, self.tick_s)
         return [note for note in notes if note]
 

@@ -114,3 +114,12 @@ def test_what_cannot_be_is_refused(fields, message):
 def test_nor_what_two_robots_cannot(fields, message):
     with pytest.raises(InputError, match=message):
         simulate(load_scenario("robots_2", fields))
+
+
+def test_a_start_within_the_clearance_is_told():
+    """P at 0.08 m, the box from 0.2 m on: 0.12 m."""
+    near = ["obstacles.0.known=true", "obstacles.0.waypoints_m=[[0.4, 0.0]]"]
+    (note,) = load_scenario("unknown_block", near).notes()
+    assert note.startswith("start.position_m: P starts 0.12 m from a known obstacle")
+    assert "route.clearance_m, 0.35 m" in note
+    assert not load_scenario("unknown_block").notes()
