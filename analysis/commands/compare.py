@@ -24,7 +24,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--laws",
         metavar="LAW,...",
-        help="laws to compare (default: the papers', and none)",
+        help="laws to compare (default: the papers', and none; with routes those for "
+        "routes)",
     )
     parser.add_argument(
         "--velocity-term",

@@ -21,11 +21,11 @@ from analysis.reporting.result_directory import ResultDirectory, take_directory
 from analysis.sweeps.one_run import require_runs
 from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
-from diagrams import load_scenario
+from diagrams import Scenario, load_scenario
 from diagrams.explain import explain
 from diagrams.loading import parse_setting, read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS
+from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 __all__ = [
     "EXPERIMENTS",
@@ -107,7 +107,7 @@ def library_layouts() -> dict[str, Path]:
 def comparison_plan(
     scenario: str,
     *,
-    laws: Iterable[str] = FORCE_LAWS,
+    laws: Iterable[str] | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: dict[str, Any] | None = None,
@@ -119,7 +119,8 @@ def comparison_plan(
         scenario: A library name, whose layouts are those of the library; a YAML
             file of layouts (a sweep without grid, runs and pair); or a YAML file
             of a scenario, whose runs differ in noise alone.
-        laws: What to compare.
+        laws: What to compare, each as that of all robots; none: the papers' and no
+            avoidance, or those for routes.
         runs: Layouts, each met by every law.
         seed: Of all layouts and noise.
         settings: Further fields of the scenario, by dotted path.
@@ -132,7 +133,12 @@ def comparison_plan(
         InputError: Something of that is unknown or no good; names the field.
     """
     plan = _layouts(scenario)
-    scenario_from_mapping(plan.base).require_one_robot("a comparison of laws")
+    base = scenario_from_mapping(plan.base)
+    _require_one_law(base)
+    if laws is None:
+        on_route = [name for name, law in LAWS.items() if law.on_route]
+        routed = any(robot.route for robot in base.all_robots.values())
+        laws = on_route if routed else FORCE_LAWS
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
     fields |= {
         "set": plan.set | (settings or {}),
@@ -145,6 +151,17 @@ def comparison_plan(
         return SweepPlan.model_validate(fields)
     except ValidationError as error:
         raise explain(error, SweepPlan, "a comparison") from None
+
+
+def _require_one_law(base: Scenario) -> None:
+    """Refuses what a comparison could not set: all robots get its law."""
+    for name, changes in base.robots.items():
+        if "law" in changes:
+            raise InputError(
+                f"robots.{name}.law",
+                f"is {changes['law']!r}, but a comparison gives all robots its laws; "
+                "leave it out",
+            )
 
 
 def comparison_plans(
@@ -161,7 +178,7 @@ def comparison_plans(
 
     Args:
         scenarios: See ``comparison_plan``; none: the papers' experiments.
-        laws: Names parted by commas; none: the papers' and no avoidance.
+        laws: Names parted by commas; none: see ``comparison_plan``.
         velocity_terms: ``printed``, ``closing``, or both parted by a comma.
         runs: Layouts a scenario.
         seed: A whole number.
@@ -189,7 +206,7 @@ def comparison_plans(
             raise InputError("scenario", f"{name} stands there twice; drop one")
         plans[name] = comparison_plan(
             scenario,
-            laws=laws.split(",") if laws is not None else FORCE_LAWS,
+            laws=None if laws is None else laws.split(","),
             runs=runs,
             seed=_seed(seed),
             settings=fields,

@@ -15,6 +15,7 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from analysis.comparison.all_robots import with_all_robots
 from analysis.comparison.cells import LawCell, make_cell
 from analysis.comparison.paired_statistics import (
     PairedMedian,
@@ -31,6 +32,7 @@ from analysis.runs.run_table import (
 )
 from analysis.sweeps.estimates import by_cell
 from analysis.sweeps.plan import SweepPlan
+from diagrams.loading import scenario_from_mapping
 
 __all__ = ["Comparison", "Pair", "compare_runs", "pooled_pairs"]
 
@@ -108,7 +110,8 @@ class _Neighbours:
 
 def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
     """Each cell's rows in the order of the layouts."""
-    return by_cell(plan, table.sort_values("run"))
+    robots = list(scenario_from_mapping(plan.base).robots)
+    return by_cell(plan, with_all_robots(table, robots).sort_values("run"))
 
 
 def _neighbours(plan: SweepPlan, table: pd.DataFrame) -> Iterator[_Neighbours]:

@@ -118,8 +118,8 @@ def _example(axes: Axes, result: RunResult) -> None:
     end = result.simulated_s
     draw_obstacles(axes, result)
     draw_sources(axes, result, [end])
-    (look,) = looks(result)
-    draw_robot(axes, look, [0.0, end])
+    for look in looks(result):
+        draw_robot(axes, look, [0.0, end])
     draw_collision(axes, result)
     for obstacle in result.scenario.obstacles:
         path = obstacle.path()

@@ -19,13 +19,16 @@ from diagrams import RunResult, dump_scenario, simulate
 
 __all__ = ["compare_summary", "compare_text", "write_comparison"]
 
-#: Columns of the printed table: heading, metric, unit's factor, format.
+#: Columns of the printed table, those that a law has: heading, metric, unit's factor,
+#: format.
 _COLUMNS = (
     ("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
     ("jerk m/s^3", "jerk_rms_m_s3", 1.0, ".2f"),
     ("SPARC", "sparc", 1.0, ".2f"),
     ("reacts m", "reaction_distance_m", 1.0, ".2f"),
     ("error m", "following_error_rms_m", 1.0, ".2f"),
+    ("off the way m", "route_deviation_max_m", 1.0, ".2f"),
+    ("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
 )
 #: Metrics whose paired differences are printed.
 _PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
@@ -140,7 +143,7 @@ def compare_text(
     lines = [
         f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
         "In brackets: 95 % intervals.",
-        "Clearance and reaction: medians of all runs; the rest of successful ones.",
+        "Clearance, reaction, way, ripple: medians of all runs; the rest of successes.",
     ]
     for name, comparison in comparisons.items():
         lines += ["", name, *_cell_lines(comparison.cells)]
@@ -158,12 +161,15 @@ def compare_text(
 
 def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
     width = max(len("law"), *(len(cell.label) for cell in cells))
-    headings = "".join(f"{title:>21}" for title, *_ in _COLUMNS)
+    columns = [
+        column for column in _COLUMNS if any(column[1] in c.metrics for c in cells)
+    ]
+    headings = "".join(f"{title:>21}" for title, *_ in columns)
     yield f"{'law':<{width}}{'success %':>17}{'collision %':>17}{headings}"
     for cell in cells:
         row = f"{cell.label:<{width}}{_rate(cell.success):>17}"
         row += f"{_rate(cell.collision):>17}"
-        for _, metric, factor, form in _COLUMNS:
+        for _, metric, factor, form in columns:
             row += f"{_median(cell.metrics.get(metric), factor, form):>21}"
         yield row
     for cell in cells:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from analysis.runs.collision_warning import collision_warning
 from analysis.runs.proximity import Proximity
+from analysis.runs.route_metrics import route_metrics
 from analysis.runs.shortest_path import shortest_path_length
 from analysis.runs.smoothness import (
     jerk,
@@ -55,7 +56,7 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
     return {
         **_proximity_metrics(proximity),
         **_goal_metrics(result),
-        **_following_metrics(result),
+        **_way_metrics(proximity),
         **_smoothness_metrics(result),
         **_effort_metrics(result),
         **_odometry_metrics(result),
@@ -145,6 +146,13 @@ def _spl(cause: str, length: float, shortest: float) -> float:
         return 0.0
     longest = max(length, shortest)
     return shortest / longest if longest > 0.0 else 1.0
+
+
+def _way_metrics(proximity: Proximity) -> dict[str, float | None]:
+    """Of a sound that is followed, or of a route."""
+    if proximity.result.scenario.route is None:
+        return _following_metrics(proximity.result)
+    return route_metrics(proximity)
 
 
 def _following_metrics(result: RunResult) -> dict[str, float | None]:

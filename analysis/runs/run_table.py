@@ -26,6 +26,12 @@ ALL_RUNS = (
     "minimum_obstacle_clearance_m",
     "minimum_time_to_contact_s",
     "reaction_distance_m",
+    "yaw_ripple_rad_s",
+    "route_deviation_m",
+    "route_deviation_max_m",
+    "replans",
+    "greatest_stiffness_n_m",
+    "last_stiffness_n_m",
 )
 #: Figures that a collision or a jam would cut short: of successful runs alone.
 SUCCESSES = (

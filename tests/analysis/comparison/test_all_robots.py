@@ -1,0 +1,60 @@
+"""Figures of several robots together, and comparisons of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from analysis.comparison.all_robots import with_all_robots
+from analysis.comparison.compare import comparison_plan, prepare_comparison
+from systems.framework.input_error import InputError
+
+
+def test_worst_last_and_mean():
+    table = pd.DataFrame(
+        {
+            "a.minimum_clearance_m": [0.3, 0.1],
+            "b.minimum_clearance_m": [0.2, np.nan],
+            "a.time_to_goal_s": [10.0, 11.0],
+            "b.time_to_goal_s": [14.0, 9.0],
+            "a.route_deviation_max_m": [0.5, 0.2],
+            "b.route_deviation_max_m": [0.4, 0.9],
+            "a.path_length_m": [6.0, 7.0],
+            "b.path_length_m": [8.0, 7.0],
+        }
+    )
+    pooled = with_all_robots(table, ["a", "b"])
+    assert pooled["minimum_clearance_m"].tolist()[0] == 0.2
+    assert np.isnan(pooled["minimum_clearance_m"][1])
+    assert pooled["time_to_goal_s"].tolist() == [14.0, 11.0]
+    assert pooled["route_deviation_max_m"].tolist() == [0.5, 0.9]
+    assert pooled["path_length_m"].tolist() == [7.0, 7.0]
+    assert with_all_robots(table, []) is table
+
+
+def test_two_robots_are_compared(tmp_path):
+    """All of them drive by the law; what they did together is in the cells."""
+    plan = comparison_plan("robots_2", runs=3, settings={"duration_s": 60.0})
+    assert list(plan.grid["law"]) == [
+        "trajectory_conventional",
+        "trajectory_adaptive",
+        "trajectory_filtered",
+    ]
+    prepared = prepare_comparison({"robots_2": plan}, tmp_path / "out", workers=1)
+    comparisons, _ = prepared.run()
+    *_, filtered = comparisons["robots_2"].cells
+    assert filtered.causes == {"reached": 3}
+    assert filtered.metrics["minimum_obstacle_clearance_m"].runs == 3
+    assert filtered.metrics["minimum_obstacle_clearance_m"].median > 0.0
+    assert len(comparisons["robots_2"].pairs) == 3
+
+
+def test_a_robot_with_a_law_of_its_own_is_refused(tmp_path):
+    path = tmp_path / "two.yaml"
+    path.write_text(
+        "robots: {a: {law: none}, b: {start: {position_m: [0, 3]}}}\nhearing: ideal\n",
+        encoding="utf-8",
+    )
+    with pytest.raises(InputError, match=r"robots.a.law: is 'none', but a comparison"):
+        comparison_plan(str(path))
