@@ -43,6 +43,18 @@ def main() -> int:
                 1.5,
             ),
             Figure("compiled loop, times Drake", compiled_speed(), ">=", 30.0),
+            Figure(
+                "eight robots on routes, times real time",
+                real_time_factor((), name="robots_8"),
+                ">=",
+                4.0,
+            ),
+            Figure(
+                "the same, compiled",
+                real_time_factor((), "compiled", "robots_8"),
+                ">=",
+                500.0,
+            ),
             Figure("memory, minute 1 to 10, MB", memory_growth_mb(), "<=", 20.0),
             *frame_figures(),
         ]

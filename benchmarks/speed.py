@@ -30,9 +30,11 @@ __all__ = [
 REPEATS = 3
 
 
-def real_time_factor(overrides: tuple[str, ...], engine: Engine = "drake") -> float:
+def real_time_factor(
+    overrides: tuple[str, ...], engine: Engine = "drake", name: str = "default"
+) -> float:
     """Simulated over wall time of ``simulate``, without building the diagram."""
-    scenario = load_scenario("default", overrides)
+    scenario = load_scenario(name, overrides)
     follower = build_sound_follower(scenario, log=True)
     runs = [
         simulate(scenario, follower=follower, engine=engine) for _ in range(REPEATS + 1)

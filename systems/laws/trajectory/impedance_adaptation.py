@@ -154,15 +154,16 @@ def adaptation_step(
         at = _SENSITIVITIES + 4 * k
         if numbers.lyapunov:
             gradient = evx * source[0] + evy * source[1]
-            square = source[0] ** 2 + source[1] ** 2
+            square = source[0] * source[0] + source[1] * source[1]
         else:
             gradient = (ex + gx) * state[at] + (ey + gy) * state[at + 1]
             gradient += numbers.velocity_weight * (
                 evx * state[at + 2] + evy * state[at + 3]
             )
-            square = state[at] ** 2 + state[at + 1] ** 2
+            # A power of Python's raises where it overflows; this the next block names.
+            square = state[at] * state[at] + state[at + 1] * state[at + 1]
             square += numbers.velocity_weight * (
-                state[at + 2] ** 2 + state[at + 3] ** 2
+                state[at + 2] * state[at + 2] + state[at + 3] * state[at + 3]
             )
             advance_sensitivity(state, at, source, found, loop)
         if frozen or numbers.rates[k] == 0.0:
