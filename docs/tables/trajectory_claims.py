@@ -116,7 +116,12 @@ def _median(values: Sequence[float], form: str) -> str:
     if not len(kept):
         return "-"
     ends = median_interval(kept)
-    return with_interval(float(np.median(kept)), ends.low, ends.high, form)
+    # Adding zero makes -0 into 0.
+    median, low, high = (
+        round(float(value), int(form[1])) + 0.0
+        for value in (np.median(kept), ends.low, ends.high)
+    )
+    return with_interval(median, low, high, form)
 
 
 def claims_table(scenario: str, runs: int) -> tuple[str, dict[str, list[Ran]]]:
@@ -198,7 +203,13 @@ def pairs_table(found: Mapping[str, Mapping[str, list[Ran]]]) -> str:
                     change,
                 ]
             )
-    headings = "pair", "layouts", "collided alone", "p", "ripple less, rad/s"
+    headings = (
+        "pair",
+        "layouts",
+        "collided alone",
+        "p",
+        "ripple, first less second, rad/s",
+    )
     return markdown_table(headings, rows)
 
 
