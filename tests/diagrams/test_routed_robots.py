@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydrake.systems.framework import Diagram
 
-from diagrams import load_scenario, simulate
+from diagrams import build_sound_follower, load_scenario, simulate
 from docs.tables.object_sensing import SENSING
 from docs.tables.routes import outcomes
 from systems.framework.input_error import InputError
@@ -42,7 +43,7 @@ def test_a_goal_is_reached_at_rest():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("scenario", "runs"),
-    [("unknown_block", 60), ("crossing_obstacle", 60), ("unknown_wall", 40)],
+    [("unknown_block", 40), ("crossing_obstacle", 40), ("unknown_wall", 20)],
 )
 def test_filtered_it_touches_nothing_and_arrives(scenario, runs):
     assert outcomes(scenario, "trajectory_filtered", runs) == {"reached": runs}
@@ -52,16 +53,16 @@ def test_filtered_it_touches_nothing_and_arrives(scenario, runs):
 def test_with_72_beams_it_passes_walls_that_the_map_does_not_have():
     """What rests must rest to them, or the way is never planned anew."""
     settings = SENSING["72 beams"]
-    found = outcomes("unknown_wall", "trajectory_filtered", 20, settings=settings)
-    assert found == {"reached": 20}
+    found = outcomes("unknown_wall", "trajectory_filtered", 12, settings=settings)
+    assert found == {"reached": 12}
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("scenario", "runs"), [("robots_3", 40), ("robots_4", 40)])
+@pytest.mark.parametrize(("scenario", "runs"), [("robots_3", 15), ("robots_4", 15)])
 def test_nor_do_several(scenario, runs):
     found = outcomes(scenario, "trajectory_filtered", runs)
     assert found["collision"] == 0
-    assert found["reached"] >= 0.97 * runs
+    assert found["reached"] >= 0.9 * runs
 
 
 @pytest.mark.slow
@@ -72,6 +73,32 @@ def test_adaptation_collides_more_often_than_the_same_law_without():
         for how in ("conventional", "adaptive")
     )
     assert 10 < conventional < adaptive
+
+
+def test_four_robots_are_four_diagrams_that_see_one_another():
+    """Each has blocks of its own, and the three others' poses before its sensor."""
+    scenario = load_scenario("robots_4", ["robots.third.law=trajectory_adaptive"])
+    root = build_sound_follower(scenario).diagram
+    robots = {s.get_name(): s for s in root.GetSystems() if isinstance(s, Diagram)}
+    assert robots.keys() == {"first", "second", "third", "fourth"}
+    for name, robot in robots.items():
+        blocks = {block.get_name(): block for block in robot.GetSystems()}
+        assert len({type(block) for block in blocks.values()}) == len(blocks)
+        assert ("impedance_adaptation" in blocks) == (name == "third")
+        assert ("safety_filter" in blocks) == (name != "third")
+        sensor = blocks["ideal_object_sensor"]
+        assert sensor.GetInputPort("poses_WO").size() == 3 * 3
+        assert sensor.GetInputPort("sizes").size() == 2 * 3
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    noisy = ["objects.noise_m=0.02", "duration_s=20", "seed=5"]
+    first, second, third = (
+        simulate(load_scenario("robots_2", [*noisy, *more]), engine="compiled")
+        for more in ([], [], ["seed=6"])
+    )
+    bytes_of = [run.trajectory.to_numpy().tobytes() for run in (first, second, third)]
+    assert bytes_of[0] == bytes_of[1] != bytes_of[2]
 
 
 @pytest.mark.parametrize(
