@@ -43,6 +43,14 @@ FRAMES_PER_S = 32.0
 TRAIL_PIECE_S = 0.5
 #: Time for which one ring of the sound is seen, s.
 RING_S = 0.0625
+#: Gains that a robot shows as bars: how far to the left, m, and in which colour.
+GAIN_BARS = (
+    ("stiffness", 0.05, "source"),
+    ("damping", 0.0, "robot"),
+    ("contact_stiffness", -0.05, "obstacle"),
+)
+#: Height of a bar at the start, m, and how many times that it gets at most.
+BAR_M, MOST_HIGH = 0.15, 10.0
 #: What a robot knows of the floor is shown anew so often, s.
 KNOWN_PERIOD_S = 0.5
 #: A map takes so many ticks to enter all that was seen at the first one.
@@ -163,6 +171,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         _record_trail(meshcat, own, f"trail/{path}", p_WP, look.colour)
         if own.scenario.route is not None:
             _record_target(meshcat, own, path, frames, look.estimates)
+            _record_gains(meshcat, own, path, frames)
         if own.name in sounds:
             _record_rings(meshcat, result, path, sounds[own.name])
         _record_known_space(meshcat, result, look, path)
@@ -307,7 +316,23 @@ def _record_target(
     height = replay_scene.SOURCE_HEIGHT_M
     seen = _at_frames(result, flat, frames)
     _record_path(meshcat, estimate_path(path), frames, seen, height)
-    _record_trail(meshcat, result, f"trail/target/{path}", places, colour)
+    trail = f"trail/target/{path}"
+    _record_trail(meshcat, result, trail, places, colour, thin=True)
+
+
+def _record_gains(
+    meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
+) -> None:
+    """Bars on the back of a robot whose gains adapt: as high as they were at first."""
+    for name, aside, colour in GAIN_BARS:
+        if name not in result.columns or result.columns[name][0] <= 0.0:
+            continue
+        bar = f"{path}/{name}"
+        replay_scene.add_gain_bar(meshcat, bar, aside, colour)
+        share = result.columns[name] / result.columns[name][0]
+        heights = np.interp(frames, result.time, np.clip(share, 0.0, MOST_HIGH))
+        for time, height in zip(frames, BAR_M * heights, strict=True):
+            meshcat.SetProperty(bar, "scale", [1.0, 1.0, height], float(time))
 
 
 def _record_known_space(
@@ -407,6 +432,8 @@ def _record_trail(
     path: str,
     points: NDArray[np.float64],
     colour: str,
+    *,
+    thin: bool = False,
 ) -> None:
     """Pieces that are there from the start and seen once they are driven."""
     step = max(1, round(TRAIL_PIECE_S / result.scenario.tick_s))
@@ -415,6 +442,6 @@ def _record_trail(
         if not np.ptp(piece, axis=0).any():
             continue
         name = f"{path}/{number}"
-        replay_scene.add_trail(meshcat, name, piece, colour)
+        replay_scene.add_trail(meshcat, name, piece, colour, thin=thin)
         drawn = result.time[min(start + step, len(points) - 1)]
         _record_switch(meshcat, name, (0.0, drawn), (False, True))

@@ -27,6 +27,7 @@ __all__ = [
     "add_disc_edge",
     "add_floor",
     "add_floor_part",
+    "add_gain_bar",
     "add_obstacles",
     "add_robot",
     "add_source",
@@ -243,6 +244,19 @@ def _add_cone(meshcat: Meshcat, scenario: Scenario, path: str, sensor: int) -> N
         meshcat.SetObject(f"{path}/{look}", cone, _colour(role, alpha))
 
 
+def add_gain_bar(meshcat: Meshcat, path: str, aside: float, colour: str) -> None:
+    """A bar 1 m high on a robot's back, to be scaled to what a gain is.
+
+    Args:
+        meshcat: The scene.
+        path: Where it is in Meshcat's tree, below the robot.
+        aside: To the left of the axle, m.
+        colour: A key of ``COLOURS``.
+    """
+    _put(meshcat, f"{path}/bar", Box(0.03, 0.03, 1.0), _colour(colour), 0.0, 0.0, 0.5)
+    meshcat.SetTransform(path, upright(0.0, aside, ROBOT_HEIGHT_M))
+
+
 def add_source(meshcat: Meshcat, source: SourceParameters, path: str) -> None:
     """The master robot about the origin of S, its loudspeaker and its rings.
 
@@ -285,7 +299,12 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
 
 
 def add_trail(
-    meshcat: Meshcat, path: str, points: NDArray[np.float64], colour: str
+    meshcat: Meshcat,
+    path: str,
+    points: NDArray[np.float64],
+    colour: str,
+    *,
+    thin: bool = False,
 ) -> None:
     """One piece of a trail on the floor, through (n, 2) points in W, m.
 
@@ -294,8 +313,10 @@ def add_trail(
         path: Where it is in Meshcat's tree.
         points: (n, 2) in W, m.
         colour: As matplotlib takes it, or a key of ``COLOURS``.
+        thin: Below others, which hide it where they are one.
     """
-    _ribbon(meshcat, path, points, _colour(colour), 0.008, 0.03)
+    height, width = (0.005, 0.015) if thin else (0.008, 0.03)
+    _ribbon(meshcat, path, points, _colour(colour), height, width)
 
 
 def add_floor_part(

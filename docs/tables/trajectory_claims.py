@@ -26,7 +26,7 @@ from analysis.sweeps.plan import load_sweep
 from diagrams import Scenario, simulate
 from systems.framework.input_error import InputError
 
-__all__ = ["VARIANTS", "Ran", "blind_table", "pairs_table", "run_layouts"]
+__all__ = ["BLIND", "VARIANTS", "Ran", "blind_table", "pairs_table", "run_layouts"]
 
 _CONVENTIONAL, _ADAPTIVE = "trajectory_conventional", "trajectory_adaptive"
 
@@ -53,7 +53,7 @@ VARIANTS: Mapping[str, Mapping[str, Any]] = {
 #: What adapts without bounds has become infinite, and stopped the run.
 RAN_AWAY = "ran away"
 #: One of two robots sees nothing.
-_BLIND = {"robots.second.objects.maximum_range_m": 0.001}
+BLIND = {"robots.second.objects.maximum_range_m": 0.001}
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ def blind_table(runs: int) -> str:
     for scenario in ("robots_2", "head_on"):
         for name in ("conventional", "filtered"):
             seeing = run_layouts(scenario, VARIANTS[name], runs)
-            blind = run_layouts(scenario, {**VARIANTS[name], **_BLIND}, runs)
+            blind = run_layouts(scenario, {**VARIANTS[name], **BLIND}, runs)
             both = [r.collided for r in seeing], [r.collided for r in blind]
             own = [
                 [ran.robots[0]["minimum_obstacle_clearance_m"] for ran in rans]

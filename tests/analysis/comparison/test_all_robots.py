@@ -7,8 +7,11 @@ import pandas as pd
 import pytest
 
 from analysis.comparison.all_robots import with_all_robots
-from analysis.comparison.compare import comparison_plan, prepare_comparison
+from analysis.comparison.compare import comparison_plan
+from analysis.comparison.laws_in_pairs import compare_runs
+from analysis.sweeps.one_run import Task, results_table, run_task
 from systems.framework.input_error import InputError
+from systems.laws.catalogue import LAWS
 
 
 def test_worst_last_and_mean():
@@ -33,21 +36,31 @@ def test_worst_last_and_mean():
     assert with_all_robots(table, []) is table
 
 
-def test_two_robots_are_compared(tmp_path):
+def test_two_robots_are_compared():
     """All of them drive by the law; what they did together is in the cells."""
-    plan = comparison_plan("robots_2", runs=3, settings={"duration_s": 60.0})
-    assert list(plan.grid["law"]) == [
-        "trajectory_conventional",
-        "trajectory_adaptive",
-        "trajectory_filtered",
+    laws = "trajectory_conventional", "trajectory_filtered"
+    plan = comparison_plan("robots_2", laws=laws, runs=3)
+    tasks = [
+        Task(point, plan.scenario_of(point), "compiled", trajectory=False)
+        for point in plan.points()
     ]
-    prepared = prepare_comparison({"robots_2": plan}, tmp_path / "out", workers=1)
-    comparisons, _ = prepared.run()
-    *_, filtered = comparisons["robots_2"].cells
+    table = results_table(run_task(task).row for task in tasks)
+    comparison = compare_runs(plan, table, "robots_2")
+    _, filtered = comparison.cells
     assert filtered.causes == {"reached": 3}
-    assert filtered.metrics["minimum_obstacle_clearance_m"].runs == 3
-    assert filtered.metrics["minimum_obstacle_clearance_m"].median > 0.0
-    assert len(comparisons["robots_2"].pairs) == 3
+    each = [f"{name}.minimum_obstacle_clearance_m" for name in ("first", "second")]
+    rows = table[table["law"] == laws[1]]
+    least = np.median(rows[each].min(axis=1))
+    assert filtered.metrics["minimum_obstacle_clearance_m"].median == least > 0.0
+    assert len(comparison.pairs) == 1
+
+
+def test_laws_are_those_for_routes_where_there_are_routes():
+    plan = comparison_plan("robots_2")
+    assert all(LAWS[law].on_route for law in plan.grid["law"])
+    assert not any(
+        LAWS[law].on_route for law in comparison_plan("corridor").grid["law"]
+    )
 
 
 def test_a_robot_with_a_law_of_its_own_is_refused(tmp_path):

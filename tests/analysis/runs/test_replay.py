@@ -24,6 +24,7 @@ from analysis.runs.replay import (
 )
 from analysis.runs.replay_scene import RINGS, add_robot, floor_rectangle
 from analysis.runs.scene import looks
+from diagrams import load_scenario, simulate
 
 FRAME_S = 1.0 / 32.0
 
@@ -336,3 +337,22 @@ def test_a_guarded_page_is_little_larger(guarded_run, tmp_path, monkeypatch):
     write_replay(guarded_run, tmp_path / "without.html")
     sizes = [(tmp_path / f"{name}.html").stat().st_size for name in ("with", "without")]
     assert 2e4 < sizes[0] - sizes[1] < 2.5e5
+
+
+def test_a_robot_on_a_route_shows_its_target_and_its_gains():
+    """15 s in, between two contacts of K with 3 N/m at the start: bars of 15 cm."""
+    fields = ["law=trajectory_adaptive", "duration_s=16"]
+    run = simulate(load_scenario("unknown_block", fields), engine="compiled")
+    recorder = Recorder()
+    record_run(cast("Any", recorder), run)
+    tick, columns = 600, run.columns
+    (ball,) = (X for time, X in recorder.transforms["estimate"] if time == 15.0)
+    target = [columns["target_x"][tick], columns["target_y"][tick]]
+    np.testing.assert_allclose(ball.translation()[:2], target, atol=1e-9)
+    scales = dict(recorder.properties["robot/stiffness", "scale"])
+    assert scales[0.0] == pytest.approx([1.0, 1.0, 0.15])
+    assert scales[15.0][2] == pytest.approx(0.05 * columns["stiffness"][tick])
+    assert scales[15.0][2] > 0.151
+    add_robot(cast("Any", recorder), looks(run)[0], "robot", "estimate")
+    assert "robot/bar" not in recorder.shapes  # which carries microphones
+    assert "goals/robot" in recorder.shapes

@@ -71,12 +71,18 @@ FIELDS = {
         for field in ("stiffness_n_m", "damping_n_s_m")
     },
     # Weights, rates and shares, which may be left out.
-    "AdaptationParameters.rate": (0.0, 1e6),
-    "AdaptationParameters.contact_rate": (0.0, 1e6),
-    "AdaptationParameters.penalty": (0.0, 1e6),
-    "AdaptationParameters.leakage": (0.0, 1e6),
-    "AdaptationParameters.velocity_weight_s": (0.0, 86_400.0),
-    "AdaptationParameters.normalisation": (1e-9, 1e6),
+    **{
+        f"{which}AdaptationParameters.{field}": ends
+        for which in ("", "Printed")
+        for field, ends in {
+            "rate": (0.0, 1e6),
+            "contact_rate": (0.0, 1e6),
+            "penalty": (0.0, 1e6),
+            "leakage": (0.0, 1e6),
+            "velocity_weight_s": (0.0, 86_400.0),
+            "normalisation": (1e-9, 1e6),
+        }.items()
+    },
     "ReferenceModelParameters.natural_frequency_rad_s": (1e-9, 1e6),
     "ReferenceModelParameters.damping_ratio": (1e-9, 1e6),
     "SafetyFilterParameters.margin_m": (0.0, 1e3),
