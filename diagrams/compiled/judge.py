@@ -62,7 +62,7 @@ def contacts_of(
     return Contacts(
         rules.numbers,
         rules.scenario.size,
-        np.array([body.size for _, body, _ in rules.reach]),
+        np.reshape([body.size for _, body, _ in rules.reach], (-1, 2)).astype(float),
         np.array([reach for _, _, reach in rules.reach]),
         np.array(numbers, dtype=np.int64),
         poses,

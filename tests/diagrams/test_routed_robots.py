@@ -19,6 +19,7 @@ BEAMS = "obstacle_sensing=ultrasonic", "ultrasonic.preset=scan_7"
     [
         ("unknown_block", "trajectory_adaptive", ()),
         ("unknown_block", "trajectory_filtered", BEAMS),
+        ("unknown_block", "trajectory_filtered", ("obstacles=[]", "duration_s=5")),
         ("robots_2", "trajectory_filtered", ()),
     ],
 )
