@@ -24,11 +24,14 @@ def collision_warning(result: RunResult) -> dict[str, float | None]:
         ``contact_warning_s`` and ``contact_unseen_s``, from the first and from the
         last echo of the body to the contact, none: never heard of; and
         ``contact_push_n``, the law's push at the last tick, whatever it was that
-        pushed, none of a law that does not say. All none without a collision or cones.
+        pushed, none of a law that does not say. All none without a collision; empty
+        without cones.
     """
     hit, columns = result.collision, result.columns
+    if "range_1" not in columns:
+        return {}
     warning = unseen = push = None
-    if hit is not None and "range_1" in columns:
+    if hit is not None:
         known = result.time[_echoes(result, hit.object)]
         if len(known):
             warning, unseen = np.maximum(hit.time - known[[0, -1]], 0.0).tolist()

@@ -53,6 +53,8 @@ def test_two_robots_are_compared():
     least = np.median(rows[each].min(axis=1))
     assert filtered.metrics["minimum_obstacle_clearance_m"].median == least > 0.0
     assert len(comparison.pairs) == 1
+    # What sees bodies, not echoes, has nothing to say of mechanisms.
+    assert not any(cell.mechanisms for cell in comparison.cells)
 
 
 def test_laws_are_those_for_routes_where_there_are_routes():

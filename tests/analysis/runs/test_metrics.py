@@ -13,6 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from analysis.runs.collision_warning import collision_warning
 from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
@@ -569,3 +570,11 @@ def test_a_box_from_behind_was_never_heard_of():
     assert metrics["contact_warning_s"] is None
     assert metrics["contact_unseen_s"] is None
     assert metrics["contact_push_n"] == 0.0
+
+
+def test_without_cones_nothing_is_said_of_echoes():
+    """A wall across the way, which the law runs into."""
+    fields = ["law=trajectory_conventional"]
+    result = simulate(load_scenario("unknown_wall", fields), engine="compiled")
+    assert result.cause == "collision"
+    assert collision_warning(result) == {}
