@@ -38,7 +38,7 @@ def test_worst_last_and_mean():
 
 def test_two_robots_are_compared():
     """All of them drive by the law; what they did together is in the cells."""
-    laws = "trajectory_conventional", "trajectory_filtered"
+    laws = "trajectory_adaptive", "trajectory_filtered"
     plan = comparison_plan("robots_2", laws=laws, runs=3)
     tasks = [
         Task(point, plan.scenario_of(point), "compiled", trajectory=False)

@@ -106,7 +106,7 @@ def test_errors_are_at_the_bound_and_as_stated(shape, p_AS, snr_db):
     to_bound, to_stated, bias = [], [], []
     ranges = np.linalg.norm(shape.p_AM - p_AS, axis=1)
     common = N - np.ptp(np.rint(ranges / C * FS))
-    trials = 100
+    trials = 75
     for trial in range(trials):
         sound = Sound(trial)
         fix = refined(frame_of(sound, shape, p_AS, snr_db, generator), shape, start)
