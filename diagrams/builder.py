@@ -11,8 +11,16 @@ import numpy as np
 from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
 
-from diagrams.robot import Parts, make_robot, make_source, multiplexed, parts_of
-from diagrams.scenario import Scenario
+from diagrams.robot import (
+    Parts,
+    make_robot,
+    make_source,
+    make_world,
+    multiplexed,
+    parts_of,
+)
+from diagrams.scenario import ODOR, Scenario
+from diagrams.searching.world_blocks import WORLD
 from systems import Obstacles
 from systems.framework.input_error import InputError
 
@@ -35,6 +43,8 @@ class SoundFollower:
     sources: Mapping[str, Parts]
     """Each source's blocks: source, and with audio emitter."""
     obstacles: Obstacles
+    world: Parts | None = None
+    """What all share: wind, plume, radio and sink; none where no robot searches."""
 
     @cached_property
     def only(self) -> Parts:
@@ -123,9 +133,12 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
             log=log,
         )
     systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
+    shared = make_world(scenario, log=log)
+    if shared is not None:
+        systems.insert(0, (WORLD, shared))
     for name, system in systems:
         builder.AddNamedSystem(name, system)
-    world = _World(builder, scenario, obstacles, sources, followers)
+    world = _World(builder, scenario, obstacles, sources, followers, shared)
     for name in robots:
         world.surround(name)
     diagram = builder.Build()
@@ -136,6 +149,7 @@ def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollo
         {name: parts_of(system) for name, system in followers.items()},
         {name: parts_of(system) for name, system in sources.items()},
         obstacles,
+        parts_of(shared) if shared is not None else None,
     )
 
 
@@ -154,10 +168,17 @@ class _World:
     obstacles: Any
     sources: Mapping[str, Any]
     robots: Mapping[str, Any]
+    shared: Any
 
     def surround(self, name: str) -> None:
         """Gives a robot all that it takes."""
         around, target = self.scenario.surroundings(name), self.scenario.target(name)
+        if self.shared is not None:
+            for port in ("wind", "plume", "air"):
+                self._give(name, port, lambda p=port: self.shared.GetOutputPort(p))
+            if self.shared.HasInputPort(f"frames_{name}"):
+                frames = self.robots[name].GetOutputPort("frames")
+                self.builder.Connect(frames, self.shared.GetInputPort(f"frames_{name}"))
         self._give(name, "pose_WS", lambda: self._pose(target))
         self._give(name, "emission", lambda: self._emission(target))
         for other in self.scenario.sounds():
@@ -181,6 +202,9 @@ class _World:
     def _pose(self, name: str) -> Any:
         if name in self.sources:
             return self.sources[name].GetOutputPort("pose_WS")
+        if name == ODOR:
+            assert self.scenario.odor is not None
+            return self._constant_port(ODOR, [*self.scenario.odor.position_m, 0.0])
         return self.robots[name].GetOutputPort("pose_WB")
 
     def _emission(self, name: str) -> Any:
@@ -191,10 +215,13 @@ class _World:
     def _constant(self, name: str, sizes: list[float]) -> list[Any]:
         if not sizes:
             return []
-        values: Any = np.array(sizes)  # untyped: Drake's stubs take ndarray amiss
-        block = ConstantVectorSource(values)
-        self.builder.AddNamedSystem(f"sizes_of_others_for_{name}", block)
-        return [block.get_output_port()]
+        return [self._constant_port(f"sizes_of_others_for_{name}", sizes)]
+
+    def _constant_port(self, name: str, values: list[float]) -> Any:
+        if not self.builder.HasSubsystemNamed(name):
+            array: Any = np.array(values)  # untyped: Drake's stubs take ndarray amiss
+            self.builder.AddNamedSystem(name, ConstantVectorSource(array))
+        return self.builder.GetSubsystemByName(name).get_output_port()
 
     def _joined(self, name: str, port: str, more: list[Any]) -> Any:
         """The obstacles' port, or it and others one after the other."""

@@ -12,6 +12,7 @@ from diagrams.own_code import asked_for, import_own, made
 from diagrams.own_laws import checked_law, try_law
 from diagrams.routed_robot import make_trajectory_controller
 from diagrams.scenario import Scenario
+from diagrams.searching.searching_robot import search_controller
 from systems import (
     RadialLawController,
     TwistWheelCommand,
@@ -77,6 +78,8 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         "seed": seed,
     }
     name = scenario.law
+    if name in LAWS and LAWS[name].searches:
+        return search_controller(scenario)
     if name in LAWS and LAWS[name].on_route:
         return make_trajectory_controller(scenario)
     if name in LAWS:
@@ -87,8 +90,7 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     if ":" not in name:
         raise InputError(
             "law",
-            f"{name!r} is not known; use {', '.join(LAWS)}, package.module:Name, or "
-            "path/to/file.py:Name",
+            f"{name!r} is not known; use {', '.join(LAWS)}, or file.py:Name",
         )
     law = import_own(name, "law")
     if inspect.isclass(law):

@@ -13,20 +13,29 @@ from systems.base.robot import RobotParameters
 from systems.base.source_robot import SourceRobotParameters
 from systems.base.wheel_odometry import OdometryParameters
 from systems.framework.parameters import Angle, Parameters, Point
+from systems.heading.compass import CompassParameters
+from systems.heading.heading_controller import HeadingControlParameters
+from systems.heading.motor_driver import MotorDriverParameters
+from systems.hearing.cross_power_estimator import CrossPowerParameters
 from systems.hearing.ideal_source_sensor import IdealHearingParameters
 from systems.hearing.tdoa_estimator import TDOAParameters
 from systems.hearing.tracker_model import TrackerParameters
 from systems.laws.catalogue import LAWS
 from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
+from systems.odor.airflow_sensors import AirflowParameters
+from systems.odor.gas_sensor_array import GasSensorParameters
 from systems.planning.following import FollowingParameters
 from systems.ranging.collision_vector import CollisionVectorParameters
+from systems.ranging.contact_switches import ContactParameters
 from systems.ranging.ideal_object_sensor import ObjectSensorParameters
 from systems.ranging.object_detector import ObjectDetectorParameters
 from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.routes.global_planner import RouteParameters
 from systems.safety.free_space_map import FreeSpaceParameters
 from systems.safety.motion_guard import GuardParameters
+from systems.search.plume_search import PlumeSearchParameters
+from systems.search.sound_search import SoundSearchParameters
 from systems.sound.adc import MicArrayParameters, channel_skew
 from systems.sound.waveforms import SoundParameters
 
@@ -91,6 +100,15 @@ class FollowerParameters(Parameters):
     """Keeps the robot in space that its sensors have seen free, whatever the law; null:
     nothing does, unless the law is ``guarded``."""
     free_space: FreeSpaceParameters = FreeSpaceParameters()
+    search: PlumeSearchParameters = PlumeSearchParameters()
+    gas_sensors: GasSensorParameters = GasSensorParameters()
+    airflow_sensors: AirflowParameters = AirflowParameters()
+    contact_switches: ContactParameters = ContactParameters()
+    sound_search: SoundSearchParameters = SoundSearchParameters()
+    cross_power: CrossPowerParameters = CrossPowerParameters()
+    compass: CompassParameters = CompassParameters()
+    heading_control: HeadingControlParameters = HeadingControlParameters()
+    motor_driver: MotorDriverParameters = MotorDriverParameters()
 
     @model_validator(mode="after")
     def _check_channels(self) -> FollowerParameters:
@@ -107,7 +125,17 @@ class FollowerParameters(Parameters):
     @property
     def listens(self) -> bool:
         """Whether it hears sound waves."""
-        return self.hearing == "audio" and self.route is None
+        return self.hearing == "audio" and not self.has_goal
+
+    @property
+    def searches(self) -> Literal["odor", "sound"] | None:
+        """What it searches for step by step; none: it follows, or has a route."""
+        return LAWS[self.law].searches if self.law in LAWS else None
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether it goes to what makes no sound: a goal, or a source of odour."""
+        return self.route is not None or self.searches == "odor"
 
     @property
     def follow_distance_m(self) -> float:

@@ -18,6 +18,8 @@ from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.routed_robot import routed_blocks, trajectory_command
 from diagrams.scenario import ROBOT, SOURCE, Scenario
+from diagrams.searching.searching_robot import search_command, searching_blocks
+from diagrams.searching.world_blocks import WORLD, world_blocks
 from systems import (
     CollisionVector,
     DiffDrivePlant,
@@ -42,22 +44,25 @@ from systems.sound.mic_array import microphone_reach
 from systems.sound.waveforms import SoundParameters
 
 __all__ = [
+    "OUTSIDE",
     "Parts",
     "block_seed",
     "columns_of",
     "connect_by_name",
     "make_robot",
     "make_source",
+    "make_world",
     "multiplexed",
     "naming_sounds",
     "parts_of",
     "require_published",
     "robot_blocks",
     "seed_of",
+    "world_seeds",
 ]
 
 #: What a robot takes from the world around it; of emissions, all.
-_OUTSIDE = ("pose_WS", "poses_WO", "sizes", "emission")
+OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
 
 
 @dataclass(frozen=True)
@@ -143,6 +148,16 @@ def seed_of(scenario: Scenario, block: str, owner: str) -> int:
     return block_seed(scenario.seed, name)
 
 
+def world_seeds(scenario: Scenario) -> dict[str, int]:
+    """Seeds of the blocks that all robots share, by name.
+
+    Args:
+        scenario: The run.
+    """
+    names = "wind_field", "odor_plume", "radio_channel"
+    return {name: block_seed(scenario.seed, name) for name in names}
+
+
 def robot_blocks(
     scenario: Scenario,
     name: str = ROBOT,
@@ -168,7 +183,14 @@ def robot_blocks(
     """
     seed = seed_of(scenario, "controller", name)
     controller = make_controller(scenario, bodies=bodies, seed=seed)
-    if scenario.route is None:
+    if scenario.searches is not None:
+        sensing = searching_blocks(
+            scenario,
+            bodies=bodies,
+            others=others,
+            seed_of=lambda block: seed_of(scenario, block, name),
+        )
+    elif scenario.route is None:
         sensing = _sound_and_ranges(scenario, name, controller, bodies, others)
     else:
         with _fields_of_robot(name):
@@ -224,8 +246,9 @@ def make_robot(
 
     Input ports, as far as its blocks need them: ``pose_WS`` of what it follows,
     ``poses_WO`` and ``sizes`` of the other bodies, ``emission`` of what it follows,
-    and ``emission_<name>`` of each other source. Output ports: ``pose_WB``,
-    ``velocity_WB``, and with a loudspeaker ``own_emission``.
+    ``emission_<name>`` of each other source, and ``wind``, ``plume`` and ``air`` of
+    the world. Output ports: ``pose_WB``, ``velocity_WB``, with a loudspeaker
+    ``own_emission``, and of one that searches ``frames``.
 
     Args:
         scenario: Of this robot alone, see ``Scenario.of_robot``.
@@ -247,16 +270,56 @@ def make_robot(
     builder = DiagramBuilder()
     for block in blocks:
         builder.AddNamedSystem(block.get_name(), block)
-    connect_by_name(builder, blocks, _OUTSIDE)
+    connect_by_name(builder, blocks, OUTSIDE)
     for port in ("pose_WB", "velocity_WB"):
         builder.ExportOutput(plant.GetOutputPort(port), port)
+    if scenario.searches is not None:
+        builder.ExportOutput(by_part["controller"].GetOutputPort("frames"), "frames")
     if scenario.loudspeaker is not None:
-        emitter = _emitter(scenario, name, scenario.loudspeaker, listeners_frame_s)
+        calls = scenario.searches == "odor"
+        emitter = _emitter(
+            scenario, name, scenario.loudspeaker, listeners_frame_s, called=calls
+        )
         _carry_loudspeaker(builder, emitter, plant)
+        if calls:
+            calling = by_part["controller"].GetOutputPort("calling")
+            builder.Connect(calling, emitter.GetInputPort("calling"))
     if log:
         _add_log(builder, blocks, scenario.tick_s)
     diagram = builder.Build()
     diagram.set_name(name)
+    return diagram
+
+
+def make_world(scenario: Scenario, *, log: bool = False) -> Diagram | None:
+    """What all robots share, as a diagram with ports of its own.
+
+    Input ports: ``frames_<name>`` of each robot that searches. Output ports: what its
+    blocks put out, ``air`` among it.
+
+    Args:
+        scenario: The run.
+        log: Whether to log what its blocks name columns for, at every tick.
+
+    Returns:
+        The diagram; none where no robot searches.
+    """
+    blocks = [*world_blocks(scenario, world_seeds(scenario)).values()]
+    if not blocks:
+        return None
+    builder = DiagramBuilder()
+    for block in blocks:
+        builder.AddNamedSystem(block.get_name(), block)
+    connect_by_name(builder, blocks, ("frames",))
+    for block in blocks:
+        for index in range(block.num_output_ports()):
+            port = block.get_output_port(index)
+            if port.get_name() in OUTSIDE:
+                builder.ExportOutput(port, port.get_name())
+    if log:
+        _add_log(builder, blocks, scenario.tick_s)
+    diagram = builder.Build()
+    diagram.set_name(WORLD)
     return diagram
 
 
@@ -297,7 +360,12 @@ def make_source(
 
 
 def _emitter(
-    scenario: Scenario, name: str, sound: SoundParameters, frame_s: float
+    scenario: Scenario,
+    name: str,
+    sound: SoundParameters,
+    frame_s: float,
+    *,
+    called: bool = False,
 ) -> SoundEmitter:
     with naming_sounds(scenario, name, sound):
         return SoundEmitter(
@@ -307,6 +375,7 @@ def _emitter(
             frame_s=frame_s,
             tick_s=scenario.tick_s,
             seed=seed_of(scenario, "sound_emitter", name),
+            called=called,
         )
 
 
@@ -498,6 +567,8 @@ def _obstacle_sensing(
 
 def _driving(scenario: Scenario, controller: Any) -> Any:
     """What drives the wheels as the law commands, as far as a guard lets it."""
+    if scenario.searches is not None:
+        return search_command(scenario)
     if scenario.route is not None:
         filtering = trajectory_command(scenario)
         if filtering is not None:

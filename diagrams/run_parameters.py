@@ -13,10 +13,14 @@ from systems.framework.parameters import (
     Length,
     Parameters,
     Period,
+    Point,
     Size,
     Speed,
 )
 from systems.framework.signals import TICK_S
+from systems.odor.odor_plume import OdorParameters
+from systems.odor.wind import WindParameters
+from systems.radio.radio_channel import RadioParameters
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.room import RoomParameters
 from systems.sound.waveforms import SoundParameters
@@ -26,6 +30,7 @@ __all__ = [
     "MANY_RUNS",
     "Engine",
     "IntegratorParameters",
+    "OdorSourceParameters",
     "RunParameters",
     "StopParameters",
 ]
@@ -61,6 +66,22 @@ class StopParameters(Parameters):
     """Lost: no valid target for so long, s."""
     diverged_range_m: Length = 20.0
     """Diverged: the source is farther away than this, m."""
+    odor_within_m: Length = 0.22
+    """Found: what searches for an odour ends with its source this near to the origin
+    of B, m."""
+    odor_ahead_deg: float = Field(default=75.0, ge=0.0, le=180.0)
+    """And no farther off its heading, deg."""
+    sound_within_m: Length = 0.6
+    """Found: what searches for a sound ends this near to what it follows, m."""
+
+
+class OdorSourceParameters(OdorParameters):
+    """What smells, and where it stands."""
+
+    position_m: Point = (0.0, 0.0)
+    """Middle of the container in W, m."""
+    container_m: Size = (0.08, 0.08)
+    """Its extents along x and y of W, m: it can be touched."""
 
 
 class IntegratorParameters(Parameters):
@@ -107,4 +128,8 @@ class RunParameters(Parameters):
     stop: StopParameters = StopParameters()
     acoustics: AcousticParameters = AcousticParameters()
     room: RoomParameters | None = None
+    wind: WindParameters = WindParameters()
+    odor: OdorSourceParameters | None = None
+    """A source of odour in the wind, for robots that search for it."""
+    radio: RadioParameters = RadioParameters()
     integrator: IntegratorParameters = IntegratorParameters()

@@ -15,6 +15,7 @@ from diagrams.robot import Parts
 from diagrams.run_parameters import Engine
 from diagrams.scenario import ROBOT, Scenario
 from diagrams.stop_rules import Collision, RobotRules, decisive_robot
+from systems.search.search_ending import SEARCH_REASONS
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -35,8 +36,8 @@ class RunResult:
     scenario: Scenario
     """Of one robot among several, that of it alone (``Scenario.of_robot``)."""
     cause: str
-    """One of reached, completed, unsettled, timeout, astray, collision, stuck, no way
-    found, lost, diverged, interrupted; docs/model.md says when."""
+    """One of reached, completed, found, unsettled, timeout, astray, collision, stuck,
+    no way found, false find, lost, diverged, interrupted; docs/model.md says when."""
     collision: Collision | None
     """Set where the cause is collision."""
     columns: dict[str, NDArray[np.float64]]
@@ -54,6 +55,10 @@ class RunResult:
     """What this robot had about it, other robots on their ways included."""
     whole: Scenario | None = None
     """What was run, where that is more than ``scenario``."""
+    ended: float = 0.0
+    """Number of the ending of a search, see ``systems.search.search_ending``."""
+    world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    """Columns of what all robots share: wind, and what the sink has heard."""
 
     @property
     def full_scenario(self) -> Scenario:
@@ -72,12 +77,15 @@ class RunResult:
 
     @property
     def ending(self) -> str:
-        """Cause, and what was touched."""
-        return (
-            f"{self.cause} with {self.collision.object}"
-            if self.collision
-            else self.cause
-        )
+        """Cause, and what was touched, or why a search was given up."""
+        if self.collision:
+            return f"{self.cause} with {self.collision.object}"
+        return f"{self.cause}: {self.reason}" if self.reason else self.cause
+
+    @property
+    def reason(self) -> str:
+        """Why a search was given up; else empty."""
+        return SEARCH_REASONS.get(round(self.ended), "")
 
     @property
     def target_moves(self) -> bool:
@@ -122,6 +130,7 @@ def gather_result(
     logs: Mapping[str, dict[str, NDArray[np.float64]]],
     wall_s: float,
     engine: Engine = "drake",
+    world: dict[str, NDArray[np.float64]] | None = None,
 ) -> RunResult:
     """The result of a run that has ended.
 
@@ -131,6 +140,7 @@ def gather_result(
         logs: Each robot's columns, with the time t.
         wall_s: Time that the simulation took, s.
         engine: What carried the run out.
+        world: Columns of what all robots share.
 
     Returns:
         Of the only robot, or of all with each in ``several``.
@@ -154,6 +164,8 @@ def gather_result(
             engine,
             others=around,
             whole=None if own is scenario else scenario,
+            ended=rules[name].ended,
+            world=world or {},
         )
     if not several:
         return next(iter(results.values()))
@@ -172,6 +184,8 @@ def gather_result(
         decisive.name,
         engine,
         several=results,
+        ended=decisive.ended,
+        world=world or {},
     )
 
 
@@ -210,7 +224,7 @@ def _completed(
     columns["p_WP_x"], columns["p_WP_y"] = x_P, y_P
     columns["source_range_true"] = np.sqrt(dx * dx + dy * dy)
     columns["source_bearing_true"] = np.arctan2(left, ahead)
-    if "detected" not in columns:  # it drives to a goal
+    if "detected" not in columns:  # it drives to a goal, or smells
         return columns
     x, y = columns["p_PS_B_x"], columns["p_PS_B_y"]
     heard, ranged = columns["detected"] > 0.5, columns["range_valid"] > 0.5

@@ -29,6 +29,7 @@ from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
 from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
+from diagrams.search_checks import check_searches
 from systems.base.source_robot import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
@@ -38,12 +39,14 @@ from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import rectangle_clearance
 from systems.world.paths import WaypointPath
 
-__all__ = ["GOAL", "ROBOT", "SOURCE", "Scenario"]
+__all__ = ["GOAL", "ODOR", "ROBOT", "SOURCE", "Scenario"]
 
 #: Names of the robot and of the source where there is one of each.
 ROBOT, SOURCE = "robot", "source"
 #: Name of what a robot with a route drives to.
 GOAL = "goal"
+#: Name of what smells.
+ODOR = "odor"
 
 _P = TypeVar("_P", bound=Parameters)
 
@@ -73,7 +76,10 @@ class Scenario(FollowerParameters, RunParameters):
     @cached_property
     def all_sources(self) -> dict[str, SourceParameters]:
         """Each source with all that it has, by name."""
-        if not self.sources and all(map(_has_goal, self.all_robots.values())):
+        robots = self.all_robots.values()
+        if not self.sources and all(
+            r.has_goal or r.follows in self.robots for r in robots
+        ):
             return {}
         base = self.source.model_dump() | {"sound": self.sound.model_dump()}
         return {
@@ -96,9 +102,10 @@ class Scenario(FollowerParameters, RunParameters):
 
     def target(self, robot: str) -> str:
         """Name of what a robot follows, or of its goal."""
-        if _has_goal(self.all_robots[robot]):
-            return GOAL
-        return self.all_robots[robot].follows or next(iter(self.all_sources))
+        own = self.all_robots[robot]
+        if own.has_goal:
+            return GOAL if own.route is not None else ODOR
+        return own.follows or next(iter(self.all_sources))
 
     def of_robot(self, name: str) -> Scenario:
         """The scenario as if a robot were alone with the source that it follows.
@@ -109,7 +116,7 @@ class Scenario(FollowerParameters, RunParameters):
             return self
         robot, target = self.all_robots[name], self.target(name)
         own = {key: getattr(robot, key) for key in FollowerParameters.model_fields}
-        if _has_goal(robot):
+        if robot.has_goal:
             return self.model_copy(update=own | {"robots": {}, "sources": {}})
         if target in self.all_sources:
             fields = SourceRobotParameters.model_fields
@@ -186,6 +193,9 @@ class Scenario(FollowerParameters, RunParameters):
         for name, source in self.all_sources.items():
             if source.body:
                 bodies[name] = Body(source.path(), (source.length_m, source.width_m))
+        if self.odor is not None:
+            still = WaypointPath((self.odor.position_m,), speed=0.0)
+            bodies[ODOR] = Body(still, self.odor.container_m)
         route = self.all_robots[robot].route
         if route is not None:
             return Surroundings(bodies, GOAL, WaypointPath((route.goal_m,), speed=0.0))
@@ -265,7 +275,7 @@ class Scenario(FollowerParameters, RunParameters):
     def _check_targets(self) -> Scenario:
         played, sources = self.sounds(), self.all_sources
         for name, robot in self.all_robots.items():
-            if _has_goal(robot):
+            if robot.has_goal:
                 continue
             field = f"robots.{name}.follows" if self.robots else "follows"
             target = self.target(name)
@@ -307,7 +317,7 @@ class Scenario(FollowerParameters, RunParameters):
     def _check_goals(self) -> Scenario:
         for prefix, robot in self._robot_fields():
             law = LAWS.get(robot.law)
-            if _has_goal(robot):
+            if robot.route is not None:
                 if law is not None and not law.on_route:
                     can = [name for name, each in LAWS.items() if each.on_route]
                     raise InputError(
@@ -322,6 +332,9 @@ class Scenario(FollowerParameters, RunParameters):
                     f"{prefix}route.goal_m",
                 )
         check_goals(dict(self._robot_fields()), self.stop.diverged_range_m)
+        check_searches(
+            dict(zip(self.all_robots, self._robot_fields(), strict=True)), self
+        )
         return self
 
     @model_validator(mode="after")
@@ -435,10 +448,6 @@ class Scenario(FollowerParameters, RunParameters):
         """Each robot, with what its fields begin with in a message."""
         for name, robot in self.all_robots.items():
             yield (f"robots.{name}." if self.robots else ""), robot
-
-
-def _has_goal(robot: FollowerParameters) -> bool:
-    return robot.route is not None
 
 
 def _check_schedule(

@@ -13,10 +13,11 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.compiled.loop import CompiledLoop, compile_loop
-from diagrams.compiled.loop_blocks import shared_blocks
+from diagrams.compiled.loop_blocks import shared_blocks, shared_world
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import Scenario
+from diagrams.searching.world_blocks import WORLD
 from diagrams.stop_rules import RunRules, StopRules
 from systems.framework.input_error import InputError
 
@@ -107,7 +108,12 @@ def simulate(
         log = parts.log.FindLog(simulator.get_context())
         times, rows = np.array(log.sample_times()), np.array(log.data())
         columns[name] = logged_columns(parts, times, rows)
-    return gather_result(scenario, rules.robots, columns, wall_s)
+    world = {}
+    if follower.world is not None and follower.world.log is not None:
+        log = follower.world.log.FindLog(simulator.get_context())
+        times, rows = np.array(log.sample_times()), np.array(log.data())
+        world = logged_columns(follower.world, times, rows)
+    return gather_result(scenario, rules.robots, columns, wall_s, world=world)
 
 
 def prepared_loop(scenario: Scenario) -> CompiledLoop:
@@ -116,17 +122,23 @@ def prepared_loop(scenario: Scenario) -> CompiledLoop:
     Raises:
         InputError: As ``simulate``.
     """
-    loop = compile_loop(scenario, shared_blocks(scenario), RunRules(scenario))
+    loop = _new_loop(scenario)
     loop.prepare()
     audio = any(robot.listens for robot in scenario.all_robots.values())
     kind = "compiled", *_kind(scenario)
     if audio and kind not in _LOADED:
         # What it calls in Python is compiled, too; errors are the run's to raise.
-        aside = compile_loop(scenario, shared_blocks(scenario), RunRules(scenario))
+        aside = _new_loop(scenario)
         with suppress(ValueError):
             aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
         _LOADED.add(kind)
     return loop
+
+
+def _new_loop(scenario: Scenario) -> CompiledLoop:
+    return compile_loop(
+        scenario, shared_blocks(scenario), RunRules(scenario), shared_world(scenario)
+    )
 
 
 def _run_compiled(
@@ -143,7 +155,8 @@ def _run_compiled(
     wall_s = perf_counter() - start
     robots = loop.rules.robots
     columns = {name: loop.logged(name) for name in robots}
-    return gather_result(scenario, robots, columns, wall_s, "compiled")
+    world = loop.logged(WORLD) if WORLD in loop.columns else {}
+    return gather_result(scenario, robots, columns, wall_s, "compiled", world)
 
 
 def _python_views(follower: SoundFollower, context: Any) -> list[Any]:

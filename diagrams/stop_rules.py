@@ -24,10 +24,13 @@ from systems.world.geometry import (
 
 __all__ = [
     "BETWEEN_TICKS",
+    "CONTACT",
     "DIVERGED",
     "GIVES_UP",
     "ROUNDING_S",
+    "SEARCH_REPORT",
     "SUCCESSFUL",
+    "TOUCHED",
     "UNJUDGED",
     "Collision",
     "JudgedTick",
@@ -36,11 +39,12 @@ __all__ = [
     "Seen",
     "StopRules",
     "decisive_robot",
+    "judge_search",
     "judge_tick",
 ]
 
 #: Causes of runs that did what they should.
-SUCCESSFUL = ("reached", "completed")
+SUCCESSFUL = ("reached", "completed", "found")
 #: Causes that end the run of all robots.
 ENDING = ("collision", "diverged")
 #: Cause of a robot whose run another's end has cut short.
@@ -56,6 +60,10 @@ BETWEEN_TICKS = 5
 
 #: Port of a law that says when it has found that there is no way, 0 or 1.
 GIVES_UP = "gives_up"
+#: Port of a search that says how it ended.
+SEARCH_REPORT = "search_report"
+#: Ports of what the bumper of a searching robot feels, and of what there is to feel.
+CONTACT, TOUCHED = "contact", "touched"
 
 _Places = Mapping[str, tuple[float, float, float]]
 _GO_ON = EventStatus.DidNothing()
@@ -105,6 +113,10 @@ class Seen(NamedTuple):
     """Whether there is a target."""
     gives_up: bool = False
     """Whether the law says that there is no way to it."""
+    ended: float = 0.0
+    """Number of the ending of a search, 0 while it goes on."""
+    feels: bool = False
+    """Whether a contact switch is closed, and by a body."""
 
 
 class RunRules:
@@ -199,27 +211,31 @@ class _View:
     """Reads a robot in the diagram's context."""
 
     def __init__(self, parts: Parts) -> None:
-        self._blocks: tuple[Any, ...] = parts.blocks["plant"], parts.blocks["tracker"]
-        self._pose = parts.port("plant", "pose_WB")
-        self._velocity = parts.port("plant", "velocity_WB")
-        self._valid = parts.port("tracker", "target_valid")
-        for block in parts.blocks.values():
-            if block.HasOutputPort(GIVES_UP):
-                self._blocks += (block,)
-                self._gives_up = block.GetOutputPort(GIVES_UP)
+        plant = parts.blocks["plant"]
+        self._ports = [
+            (plant, plant.GetOutputPort(name)) for name in ("pose_WB", "velocity_WB")
+        ]
+        for name in ("target_valid", GIVES_UP, SEARCH_REPORT, CONTACT, TOUCHED):
+            having = [b for b in parts.blocks.values() if b.HasOutputPort(name)]
+            self._ports += [(block, block.GetOutputPort(name)) for block in having[:1]]
         self._root: Any = None
         self._contexts: list[Any] = []
 
     def at(self, context: Any) -> Seen:
         if context is not self._root:
             self._root = context
-            self._contexts = [b.GetMyContextFromRoot(context) for b in self._blocks]
-        plant, tracker, *law = self._contexts
+            self._contexts = [b.GetMyContextFromRoot(context) for b, _ in self._ports]
+        seen = {
+            port.get_name(): port.Eval(own).tolist()
+            for (_, port), own in zip(self._ports, self._contexts, strict=True)
+        }
         return Seen(
-            self._pose.Eval(plant).tolist(),
-            self._velocity.Eval(plant).tolist(),
-            self._valid.Eval(tracker)[0] > 0.5,
-            any(self._gives_up.Eval(each)[0] > 0.5 for each in law),
+            seen["pose_WB"],
+            seen["velocity_WB"],
+            seen.get("target_valid", [0.0])[0] > 0.5,
+            seen.get(GIVES_UP, [0.0])[0] > 0.5,
+            seen.get(SEARCH_REPORT, [0.0])[0],
+            max(seen.get(CONTACT, [0.0])) > 0.5 and seen[TOUCHED][0] >= 0.0,
         )
 
 
@@ -232,10 +248,21 @@ class RuleNumbers(NamedTuple):
     follow_distance_m: float
     goal_radius_m: float
     source_rests: bool
+    searches: int = 0
+    """1 for an odour, 2 for a sound; 0: it does not search."""
 
 
 #: Causes that ``judge_tick`` finds, by their numbers.
-FOUND = ("", "diverged", "reached", "lost", "stuck", "no way found")
+FOUND = (
+    "",
+    "diverged",
+    "reached",
+    "lost",
+    "stuck",
+    "no way found",
+    "found",
+    "false find",
+)
 DIVERGED = FOUND.index("diverged")
 
 #: State of ``judge_tick`` before the first tick: time and place of P from which it has
@@ -304,6 +331,34 @@ def judge_tick(
     return 5 if gives_up else 4
 
 
+def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
+    """Why a run of a search ends at a tick, contacts apart.
+
+    Args:
+        ended: Number of the search's ending, see ``systems.search.search_ending``.
+        pose: (x, y, theta) of the robot, m and rad.
+        p_WS: What it searches for, m.
+        numbers: ``RuleNumbers``.
+
+    Returns:
+        Place of the cause in ``FOUND``; 0 where the run goes on.
+    """
+    dx, dy = p_WS[0] - pose[0], p_WS[1] - pose[1]
+    distance = math.hypot(dx, dy)
+    if not distance <= numbers.stop.diverged_range_m:
+        return 1
+    if ended < 0.5:
+        return 0
+    if ended > 1.5:
+        return 3
+    if numbers.searches == 2:
+        return 6 if distance <= numbers.stop.sound_within_m else 7
+    off = math.atan2(dy, dx) - pose[2]
+    off = abs(math.degrees(math.atan2(math.sin(off), math.cos(off))))
+    ahead = off <= numbers.stop.odor_ahead_deg
+    return 6 if ahead and distance <= numbers.stop.odor_within_m else 7
+
+
 class JudgedTick(NamedTuple):
     """A robot's last tick in a compiled loop."""
 
@@ -321,6 +376,8 @@ class JudgedTick(NamedTuple):
     """What that has returned, at this tick or before."""
     touched: bool
     """Whether a body was touched since the tick before."""
+    ended: float = 0.0
+    """Number of the ending of a search."""
 
 
 @dataclass
@@ -333,6 +390,8 @@ class RobotRules:
     """What it can hit, and what it follows."""
     cause: str = ""
     collision: Collision | None = None
+    ended: float = 0.0
+    """Number of the ending of a search."""
     _pose: Sequence[float] | None = None
     """At the last tick."""
     _valid: bool = False
@@ -348,6 +407,7 @@ class RobotRules:
             scenario.follow_distance_m,
             scenario.goal_radius(moves=not self._source_rests),
             self._source_rests,
+            {None: 0, "odor": 1, "sound": 2}[scenario.searches],
         )
         # Farther than this from the robot's centre, a body does not touch it.
         size = scenario.size
@@ -367,9 +427,16 @@ class RobotRules:
         """
         places = {name: body.path.pose(time) for name, body, _ in self.reach}
         ended, self._valid = self.cause, seen.valid
-        self.collision = self._find_collision(time, seen.pose, places)
+        self.collision = None
+        if not seen.feels:  # what the bumper feels is no accident
+            self.collision = self._find_collision(time, seen.pose, places)
         if self.collision is not None:
             self.cause = "collision"
+        elif self.numbers.searches and not ended:
+            self.ended = seen.ended
+            target = self.surroundings.followed.path.pose(time)
+            found = judge_search(seen.ended, seen.pose, target, self.numbers)
+            self.cause = FOUND[found]
         elif not ended:
             found = judge_tick(
                 time,
@@ -392,7 +459,7 @@ class RobotRules:
         """
         self._state, self._valid = tick.state, tick.valid
         self._pose, self._time = tick.pose_before, tick.time_before
-        self.cause = FOUND[tick.found]
+        self.cause, self.ended = FOUND[tick.found], tick.ended
         if tick.touched:
             places = {name: body.path.pose(tick.time) for name, body, _ in self.reach}
             self.collision = self._find_collision(tick.time, tick.pose, places)
@@ -402,6 +469,8 @@ class RobotRules:
         """Cause of the run, once the simulator has returned."""
         if self.cause:
             return self.cause
+        if self.numbers.searches:
+            return "timeout"
         if not self._source_rests and self._has_followed():
             return "completed"
         if not self._valid:
@@ -420,9 +489,13 @@ class RobotRules:
     ) -> Collision | None:
         """First contact since the last tick, looked for between ticks if near."""
         first = None
+        mine = robot_rectangle(pose, self.scenario.robot)
         for name, body, reach in self.reach:
-            x, y, _ = places[name]
+            x, y, theta = places[name]
             if math.hypot(x - pose[0], y - pose[1]) > reach:
+                continue
+            now = np.array([x, y, theta, *body.size])
+            if rectangle_clearance(mine, now) > NEAR_M:  # as of a long wall
                 continue
             instant = self._first_contact(time, pose, body)
             if instant is not None and (first is None or instant < first.time):

@@ -16,6 +16,10 @@ from systems.base.wheel_speed_command import (
     WheelSpeedCommand,
     WheelSpeedCommand_,
 )
+from systems.heading.compass import MagneticHeading
+from systems.heading.heading_controller import HeadingController
+from systems.heading.motor_driver import MotorDriver
+from systems.hearing.cross_power_estimator import CrossPowerEstimator
 from systems.hearing.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
 from systems.hearing.source_tracker import SourceTracker, SourceTracker_
 from systems.hearing.tdoa_estimator import TDOAEstimator
@@ -48,8 +52,16 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
     TrajectoryImpedanceController,
     TrajectoryImpedanceController_,
 )
+from systems.odor.airflow_sensors import AirflowSensors
+from systems.odor.gas_sensor_array import GasSensorArray
+from systems.odor.odor_plume import OdorPlume
+from systems.odor.wind import WindField
 from systems.planning.safety_filter import SafetyFilter
+from systems.radio.radio_channel import RadioChannel
+from systems.radio.radio_range import RadioRange
+from systems.radio.sink_monitor import SinkMonitor
 from systems.ranging.collision_vector import CollisionVector, CollisionVector_
+from systems.ranging.contact_switches import ContactSwitches
 from systems.ranging.ideal_object_sensor import IdealObjectSensor
 from systems.ranging.ideal_obstacle_sensor import (
     IdealObstacleSensor,
@@ -62,6 +74,8 @@ from systems.routes.path_target import PathTarget
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.sensing_monitor import SensingMonitor
+from systems.search.plume_search import PlumeSearch
+from systems.search.sound_search import SoundSearch
 from systems.sound.mic_array import MicArray
 from systems.sound.sound_emitter import SoundEmitter
 from systems.world.obstacles import Obstacles, Obstacles_
@@ -71,38 +85,51 @@ __all__ = [
     "ActiveImpedance2017Controller_",
     "ActiveImpedanceController",
     "ActiveImpedanceController_",
+    "AirflowSensors",
     "CollisionVector",
     "CollisionVector_",
+    "ContactSwitches",
     "ConventionalImpedance2017Controller",
     "ConventionalImpedance2017Controller_",
     "ConventionalImpedanceController",
     "ConventionalImpedanceController_",
+    "CrossPowerEstimator",
     "DiffDrivePlant",
     "DiffDrivePlant_",
     "DynamicWindowController",
     "FreeSpaceMap",
+    "GasSensorArray",
     "GlobalPlanner",
     "GuardedController",
+    "HeadingController",
     "IdealObjectSensor",
     "IdealObstacleSensor",
     "IdealObstacleSensor_",
     "IdealSourceSensor",
     "IdealSourceSensor_",
     "ImpedanceAdaptation",
+    "MagneticHeading",
     "MicArray",
     "MotionGuard",
+    "MotorDriver",
     "ObjectDetector",
     "Obstacles",
     "Obstacles_",
+    "OdorPlume",
     "PathIntegralController",
     "PathTarget",
+    "PlumeSearch",
     "RadialLawController",
     "RadialLawController_",
+    "RadioChannel",
+    "RadioRange",
     "ReciprocalAvoidanceController",
     "ReferenceModel",
     "SafetyFilter",
     "SensingMonitor",
+    "SinkMonitor",
     "SoundEmitter",
+    "SoundSearch",
     "SourceRobot",
     "SourceRobot_",
     "SourceTracker",
@@ -121,4 +148,5 @@ __all__ = [
     "WheelOdometry_",
     "WheelSpeedCommand",
     "WheelSpeedCommand_",
+    "WindField",
 ]

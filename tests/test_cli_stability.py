@@ -19,7 +19,7 @@ MASS = Criterion("mass", "kg", "at most", 4.0, "light", "heavy", "a test")
 
 
 def quick_parts(
-    *, full: bool, guarded: bool = False, routed: bool = False
+    *, full: bool, guarded: bool = False, routed: bool = False, searching: bool = False
 ) -> tuple[Part, ...]:
     """Stand-ins for analyses that take their time."""
 

@@ -69,7 +69,8 @@ EXPORTED = {
 }
 
 UNITS = {
-    "0 or 1", "m", "m/s", "m/s^2", "m^2", "N", "number", "rad", "rad/s", "s"
+    "0 or 1", "1", "dBm", "deg", "m", "m/s", "m/s^2", "m^2", "N", "number", "rad",
+    "rad/s", "s"
 }  # fmt: skip
 UNIT = re.compile(f"(?:{'|'.join(map(re.escape, UNITS))})(?=,| |$)")
 DIRECTIVE = re.compile(

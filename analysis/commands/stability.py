@@ -58,6 +58,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         full=options.full,
         guarded=any(each.own_guard is not None for each in scenarios),
         routed=scenario.route is not None,
+        searching=scenario.searches is not None,
     )
 
     def run(progress: Progress) -> list[LawAnalysis]:

@@ -155,6 +155,12 @@ def comparison_plan(
 
 def _require_one_law(base: Scenario) -> None:
     """Refuses what a comparison could not set: all robots get its law."""
+    if base.searches is not None:
+        raise InputError(
+            "scenario",
+            f"{base.name!r} is a search by law {base.law!r}, for which no other law "
+            "stands in; sweep its fields, as search.rules (docs/olfaction.md)",
+        )
     for name, changes in base.robots.items():
         if "law" in changes:
             raise InputError(

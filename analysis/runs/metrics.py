@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from analysis.runs.collision_warning import collision_warning
 from analysis.runs.proximity import Proximity
 from analysis.runs.route_metrics import route_metrics
+from analysis.runs.search_metrics import search_metrics
 from analysis.runs.shortest_path import shortest_path_length
 from analysis.runs.smoothness import (
     jerk,
@@ -53,6 +54,8 @@ def run_metrics(result: RunResult) -> dict[str, float | None]:
             for metric, value in run_metrics(own).items()
         }
     proximity = Proximity(result)
+    if result.scenario.searches is not None:
+        return search_metrics(proximity)
     return {
         **_proximity_metrics(proximity),
         **_goal_metrics(result),

@@ -6,7 +6,7 @@ import html
 import logging
 import math
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import Meshcat, MeshcatParams
 
+from analysis.plumes.search_panels import call_time
+from analysis.plumes.search_replay import record_searches, record_switch
 from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
 from analysis.runs.floor_layers import clipped, floor_layers
@@ -72,8 +74,9 @@ def write_replay(result: RunResult, path: str | Path) -> None:
     echoes came from, and a circle about the place where it could rest by now: the
     edge of what the guard keeps free, grey where it passed what the law commanded,
     orange where it gave less, red where it braked. Of the guarded law also a ring about
-    each body that it takes to move, as wide as it is unsure of its place. The page
-    needs a browser with WebGL, but no network.
+    each body that it takes to move, as wide as it is unsure of its place. Of searches
+    also the plume, and a lamp over each robot (``analysis.plumes.search_replay``). The
+    page needs a browser with WebGL, but no network.
 
     Args:
         result: The run.
@@ -173,10 +176,12 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
             _record_target(meshcat, own, path, frames, look.estimates)
             _record_gains(meshcat, own, path, frames)
         if own.name in sounds:
-            _record_rings(meshcat, result, path, sounds[own.name])
+            _record_rings(meshcat, result, path, _called_on(own, sounds[own.name]))
         _record_known_space(meshcat, result, look, path)
         _record_guard(meshcat, own, f"guard/{path}", frames)
         _record_tracked_bodies(meshcat, own, f"tracked/{path}", frames)
+    paths = {name: robot_path(own, result) for name, own in result.robots.items()}
+    record_searches(meshcat, result, paths)
     for name, source in scenario.all_sources.items():
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
@@ -208,22 +213,6 @@ def _record_path(
         meshcat.SetTransform(path, upright(x, y, height, theta), float(time))
 
 
-def _record_switch(
-    meshcat: Meshcat, path: str, times: Iterable[float], states: Iterable[bool]
-) -> None:
-    """Records visibility where it changes; the first state counts from 0 s."""
-    last: bool | None = None
-    for time, state in zip(times, states, strict=True):
-        if state != last:
-            meshcat.SetProperty(
-                path,
-                "visible",
-                value=bool(state),
-                time_in_recording=0.0 if last is None else float(time),
-            )
-            last = state
-
-
 def _record_robot(
     meshcat: Meshcat, result: RunResult, path: str, frames: NDArray[np.float64]
 ) -> None:
@@ -238,8 +227,8 @@ def _record_robot(
         if f"echo_{number}" in result.columns:
             echo = result.columns[f"echo_{number}"] > 0.5
             cone = f"{path}/cone_{number}"
-            _record_switch(meshcat, f"{cone}/echo", result.time, echo)
-            _record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
+            record_switch(meshcat, f"{cone}/echo", result.time, echo)
+            record_switch(meshcat, f"{cone}/empty", result.time, ~echo)
 
 
 def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
@@ -256,6 +245,15 @@ def wheel_angles(result: RunResult) -> dict[str, NDArray[np.float64]]:
     }
 
 
+def _called_on(own: RunResult, sound: SoundParameters) -> SoundParameters:
+    """The sound of a robot's loudspeaker, from its call on if it calls."""
+    if own.scenario.searches != "odor":
+        return sound
+    since = call_time(own)
+    start = own.simulated_s if since is None else since + sound.start_s
+    return sound.model_copy(update={"start_s": start})
+
+
 def _record_rings(
     meshcat: Meshcat, result: RunResult, path: str, sound: SoundParameters
 ) -> None:
@@ -263,7 +261,7 @@ def _record_rings(
     times = np.arange(0.0, result.simulated_s, RING_S / 2.0)
     for number in range(len(replay_scene.RINGS)):
         seen = [ring_at(time, bursts) == number for time in times]
-        _record_switch(meshcat, f"{path}/ring_{number + 1}", times, seen)
+        record_switch(meshcat, f"{path}/ring_{number + 1}", times, seen)
 
 
 def ring_at(time: float, bursts: list[tuple[float, float]]) -> int | None:
@@ -287,7 +285,7 @@ def _record_estimate(meshcat: Meshcat, result: RunResult, path: str) -> None:
     if "p_WS_estimated_x" not in result.columns:
         return
     valid = result.columns["target_valid"] > 0.5
-    _record_switch(meshcat, path, result.time, valid)
+    record_switch(meshcat, path, result.time, valid)
     height = replay_scene.SOURCE_HEIGHT_M + 0.12
     places = result.vector("p_WS_estimated").T
     for tick in np.flatnonzero(valid):
@@ -361,7 +359,7 @@ def _record_known_space(
                 meshcat, part, rectangles, colour, height + above
             )
             states = [layer.begin <= k < layer.end for k in range(len(known.times))]
-            _record_switch(meshcat, part, known.times, states)
+            record_switch(meshcat, part, known.times, states)
 
 
 def known_times(result: RunResult) -> list[float]:
@@ -389,7 +387,7 @@ def _record_guard(
         edge = f"{path}/{name}"
         replay_scene.add_disc_edge(meshcat, edge, motion.keep_m, colour)
         seen = np.isin(motion.actions, numbers)
-        _record_switch(meshcat, edge, result.time, seen)
+        record_switch(meshcat, edge, result.time, seen)
 
 
 #: Edges of the guarded disc, their colours, and what the guard did meanwhile.
@@ -423,7 +421,7 @@ def _record_tracked_bodies(
             states = seen & (wide > least) & (wide <= radius)
             if states.any():
                 replay_scene.add_disc_edge(meshcat, ring, radius, "tracked")
-                _record_switch(meshcat, ring, tracked.times, states)
+                record_switch(meshcat, ring, tracked.times, states)
 
 
 def _record_trail(
@@ -444,4 +442,4 @@ def _record_trail(
         name = f"{path}/{number}"
         replay_scene.add_trail(meshcat, name, piece, colour, thin=thin)
         drawn = result.time[min(start + step, len(points) - 1)]
-        _record_switch(meshcat, name, (0.0, drawn), (False, True))
+        record_switch(meshcat, name, (0.0, drawn), (False, True))

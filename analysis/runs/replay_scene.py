@@ -185,16 +185,17 @@ def add_robot(meshcat: Meshcat, look: Look, path: str, estimate: str) -> None:
     for side, y in (("left", 0.5), ("right", -0.5)):
         place = y * robot.wheel_separation_m
         _add_wheel(meshcat, scenario, f"{path}/{side}", place)
-    if scenario.route is None:
+    if not scenario.has_goal:
         _add_microphones(meshcat, scenario, path)
-    else:
+    elif scenario.route is not None:
         _add_goal(meshcat, scenario.route.goal_m, look.colour, path)
-    if scenario.obstacle_sensing == "ultrasonic":
+    if scenario.obstacle_sensing == "ultrasonic" and scenario.searches is None:
         for sensor in range(scenario.ultrasonic.count):
             _add_cone(meshcat, scenario, f"{path}/cone_{sensor + 1}", sensor)
     if scenario.loudspeaker is not None:
         _add_loudspeaker(meshcat, path, ROBOT_HEIGHT_M, look.colour)
-    meshcat.SetObject(estimate, Sphere(0.06), _colour(look.estimates))
+    if scenario.searches is None:
+        meshcat.SetObject(estimate, Sphere(0.06), _colour(look.estimates))
 
 
 def _add_wheel(meshcat: Meshcat, scenario: Scenario, path: str, y: float) -> None:

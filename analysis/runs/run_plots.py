@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import textwrap
+from collections.abc import Callable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -10,6 +11,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.plumes.plume_history import concentration_map, plume_history
+from analysis.plumes.search_panels import call_time, search_panels
 from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
 from analysis.runs.known_space import known_space
@@ -58,6 +61,8 @@ def plot_trajectory(result: RunResult) -> Figure:
             # What the cones have seen: they would hide it.
             draw_known_space(axes, look, known)
     draw_obstacles(axes, result)
+    if result.full_scenario.odor is not None:
+        _draw_odor(axes, result)
     shown = looks(result)
     draw_sources(axes, result, times_apart(shown[0].result))
     for look in shown:
@@ -75,6 +80,38 @@ def plot_trajectory(result: RunResult) -> Figure:
         frameon=False,
     )
     return figure
+
+
+def _draw_odor(axes: Axes, result: RunResult) -> None:
+    """The plume at the end, and what smells."""
+    odor = result.full_scenario.odor
+    assert odor is not None
+    last = None
+    for instant in plume_history(result.full_scenario, result.simulated_s):
+        last = instant
+    x = np.linspace(*axes.get_xlim(), 121)
+    y = np.linspace(*axes.get_ylim(), 81)
+    if last is not None:
+        dense = concentration_map(last.plume, x, y)
+        levels = [0.1, 0.3, 1.0, 3.0, 1e9]
+        tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
+        axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
+        label = "odour at the end (0.1, 0.3, 1, 3 times C1)"
+        axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
+    place = odor.position_m
+    axes.plot(*place, "*", color="#772266", ms=12, ls="none", label="source of odour")
+
+
+def _bursts(result: RunResult) -> list[tuple[float, float]]:
+    """When what a robot hears sounds; what is called on from the call on."""
+    sound, whole = result.scenario.sound, result.full_scenario
+    caller = whole.all_robots.get(whole.target(result.name))
+    if caller is not None and caller.searches == "odor":
+        since = call_time(result)
+        if since is None:
+            return []
+        sound = sound.model_copy(update={"start_s": since + sound.start_s})
+    return sound_bursts(sound, result.simulated_s)
 
 
 def _map(result: RunResult) -> tuple[Figure, Axes]:
@@ -118,8 +155,12 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
-    hears = result.scenario.route is None
+    searches = result.scenario.searches
+    hears = not result.scenario.has_goal
+    panels: list[Callable[[Axes, RunResult], None]]
     panels = [_range, _bearing] if hears else [_goal]
+    if searches is not None:
+        panels = search_panels(result)
     if "attraction_x" in result.columns:  # a law may tell no forces
         panels.append(_forces)
     if "stiffness" in result.columns:
@@ -141,7 +182,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
         panel(axes, result)
     if distance is not None:
         _clearance(all_axes[-1], result, distance)
-    bursts = sound_bursts(result.scenario.sound, result.simulated_s) if hears else []
+    bursts = _bursts(result) if hears else []
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)

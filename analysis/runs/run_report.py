@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, dump_scenario
 from diagrams.stop_rules import SUCCESSFUL
+from systems.search.search_ending import fault_names
 
 __all__ = ["run_summary", "summary_text", "write_run"]
 
@@ -56,7 +58,15 @@ def _outcome(result: RunResult) -> dict[str, Any]:
     hit = result.collision
     collision = hit and {"object": hit.object, "fault": hit.fault, "time_s": hit.time}
     halts = [asdict(halt) for halt in halts_of(result)]
-    return {"cause": result.cause, "collision": collision, "halts": halts}
+    ended: dict[str, Any] = {
+        "cause": result.cause,
+        "collision": collision,
+        "halts": halts,
+    }
+    if result.scenario.searches is not None:
+        faults = fault_names(result.columns["search_fault"][-1])
+        ended |= {"reason": result.reason or None, "faults": faults}
+    return ended
 
 
 def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
@@ -146,7 +156,9 @@ def _robot_rows(
         "distance at the end": _metres(metric("final_distance_m")),
         "path length": _metres(metric("path_length_m")),
     }
-    if result.scenario.route is None:
+    if result.scenario.searches is not None:
+        rows |= _search_rows(result, metric)
+    elif result.scenario.route is None:
         rows |= {
             "follow distance": _metres(attraction.follow_distance_m),
             "following": _percent(metric("following_fraction"))
@@ -163,6 +175,18 @@ def _robot_rows(
     if halts := halts_of(result):
         rows["halted by the guard"] = "; ".join(map(str, halts))
     return {f"{prefix}{name}": value for name, value in rows.items()}
+
+
+def _search_rows(result: RunResult, metric: Callable[[str], Any]) -> dict[str, str]:
+    """What a search took, and what it found to be broken."""
+    efficiency = metric("path_efficiency")
+    rows = {
+        "steps": f"{metric('search_steps'):.0f} in {metric('search_time_s'):.0f} s",
+        "straight over driven": "-" if efficiency is None else f"{efficiency:.2f}",
+    }
+    if broken := fault_names(result.columns["search_fault"][-1]):
+        rows["broken"] = ", ".join(broken)
+    return rows
 
 
 def _metres(value: float | None) -> str:

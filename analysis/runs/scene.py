@@ -92,7 +92,7 @@ def looks(result: RunResult) -> list[Look]:
     """Each robot of a run, in colours of its own where there are several."""
     if not result.several:
         look = Look(result, COLOURS["robot"], COLOURS["estimate"])
-        deaf = result.scenario.route is not None
+        deaf = result.scenario.has_goal
         return [look._replace(body_label="robot") if deaf else look]
     colours = cycle(ROBOT_COLOURS)
     return [
@@ -101,7 +101,7 @@ def looks(result: RunResult) -> list[Look]:
             colour,
             colour,
             f"{name}, path of P" if own.scenario.route else f"path of {name}'s P",
-            "" if own.scenario.route else f"{name} with its microphones",
+            "" if own.scenario.has_goal else f"{name} with its microphones",
             f"{name}'s estimates, faint: early",
             colour,
             colour,

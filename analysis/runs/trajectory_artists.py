@@ -97,7 +97,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
             label=(look.body_label or None) if index == 0 else None,
             zorder=3,
         )
-        if scenario.route is None:
+        if scenario.route is None and scenario.searches != "odor":
             bar = microphones_W(pose, scenario.robot).T
             axes.plot(*bar, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
         _write_time(axes, pose, -0.42, time, colour)
@@ -205,7 +205,7 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         look: The robot's run, colours and labels.
     """
     result, columns = look.result, look.result.columns
-    if "detected" not in columns:
+    if "target_valid" not in columns:
         return
     heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
     if not heard.any():

@@ -145,6 +145,8 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
         for name, law in LAWS.items()
         if (law.on_route if routed else name in FORCE_LAWS and name != "none")
     ]
+    if scenario.searches is not None:
+        every = [scenario.law]
     laws = [law for name in names for law in (every if name == "all" else [name])]
     for law in laws or [scenario.law]:
         if routed and law not in every:
@@ -152,6 +154,14 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
                 "law",
                 f"is {law!r}, but the robot has a route; use {', '.join(every)}",
             )
+        if scenario.searches is not None:
+            if law != scenario.law:
+                raise InputError(
+                    "law",
+                    f"is {law!r}, but the robot searches by law {scenario.law!r}; "
+                    "leave --law out",
+                )
+            continue
         if not routed and law in LAWS and LAWS[law].plans:
             raise InputError(
                 "law",

@@ -151,25 +151,40 @@ class ModelSheet:
 def model_sheet(scenario: Scenario) -> ModelSheet:
     """Collects the model sheet of a scenario's law."""
     law, routed = LAWS.get(scenario.law), scenario.route is not None
+    motion: tuple[Equation, ...]
+    assumptions: tuple[str, ...]
+    envelope: tuple[Limit, ...]
+    latencies: tuple[Latency, ...]
+    if scenario.searches is not None:
+        motion = _SEARCH_MOTION
+        envelope, latencies = _search_envelope(scenario), _search_latencies(scenario)
+        assumptions = _SEARCH_ASSUMPTIONS
+    elif routed:
+        motion, assumptions = _route_motion(scenario.tick_s), _ROUTE_ASSUMPTIONS
+        envelope, latencies = _route_envelope(scenario), _route_latencies(scenario)
+    else:
+        motion, assumptions = _motion(scenario.tick_s), _ASSUMPTIONS
+        envelope, latencies = _envelope(scenario), _latencies(scenario)
     return ModelSheet(
         scenario=scenario.name,
         description=scenario.description,
         law=scenario.law,
         seed=scenario.seed,
         scenario_sha256=hashlib.sha256(dump_scenario(scenario).encode()).hexdigest(),
-        motion=_route_motion(scenario.tick_s) if routed else _motion(scenario.tick_s),
+        motion=motion,
         law_equations=law.equations if law else (),
         parameters=tuple(_parameters(scenario)),
-        envelope=_route_envelope(scenario) if routed else _envelope(scenario),
-        latencies=_route_latencies(scenario) if routed else _latencies(scenario),
-        assumptions=_ROUTE_ASSUMPTIONS if routed else _ASSUMPTIONS,
+        envelope=envelope,
+        latencies=latencies,
+        assumptions=assumptions,
         versions=versions(),
     )
 
 
 def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
     others = {f"repulsion.{law}." for law in LAWS if law != scenario.law}
-    for part in _ROUTE_PARTS if scenario.route is not None else _PARTS:
+    own = _ROUTE_PARTS if scenario.route is not None else _PARTS
+    for part in own if scenario.searches is None else _SEARCH_PARTS[scenario.searches]:
         for row in _rows(getattr(scenario, part), f"{part}."):
             if row.field not in _OTHERS and not row.field.startswith(tuple(others)):
                 yield row
@@ -225,6 +240,58 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
         Latency("obstacle", "echo measured", 0.0, "travelling time not modelled"),
         Latency("obstacle", hold.part, hold.mean_s, hold.remark),
         Latency("obstacle", motor.part, motor.mean_s, motor.remark),
+    )
+
+
+#: What a searching robot's report shows of the scenario.
+_SEARCH_PARTS = {
+    "odor": ("robot", "plant", "compass", "heading_control", "motor_driver", "search"),
+    "sound": (
+        "robot",
+        "plant",
+        "compass",
+        "heading_control",
+        "motor_driver",
+        "sound_search",
+        "cross_power",
+    ),
+}
+
+_SEARCH_MOTION = (
+    Equation(
+        "Deviation from the expected heading",
+        r"\gamma=\mathrm{wrap}(\beta-\alpha),\quad"
+        r"\epsilon=2\gamma+0.5\int\,\,\gamma\,dt+0.01\,\dot{\gamma}",
+        "gamma = wrap(beta - alpha), "
+        "eps = 2 gamma + 0.5 integral of gamma + 0.01 gamma'",
+    ),
+    Equation(
+        "Duties of the motors",
+        r"d_{l,r}=\max(0,1-|\epsilon|/L)\pm 0.01\,\epsilon",
+        "d_l, d_r = max(0, 1 - |eps|/L) +- 0.01 eps",
+    ),
+)
+
+_SEARCH_ASSUMPTIONS = (
+    "Margins are those of the heading loop while it drives ahead, within all limits.",
+    "What a step decides is no part of a linear model.",
+)
+
+
+def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
+    motors = scenario.motor_driver.full_speed_m_s
+    beyond = scenario.heading_control.turning_beyond_deg
+    return (
+        Limit("speed of a wheel", motors, "m/s", "at full duty"),
+        Limit("output of the PID", beyond, "deg", "beyond it turns on the spot"),
+    )
+
+
+def _search_latencies(scenario: Scenario) -> tuple[Latency, ...]:
+    held = scenario.tick_s / 2.0
+    return (
+        Latency("heading", "duties held for a tick", held, "MotorDriver"),
+        Latency("heading", "motor lag", scenario.plant.motor_lag_s, "first order"),
     )
 
 

@@ -11,13 +11,18 @@ from analysis.stability.route_parts import route_parts
 from analysis.stability.route_readings import ROUTE_CRITERIA
 from analysis.stability.safety_parts import safety_parts
 from analysis.stability.sampling_parts import gain_parts, sampling_parts
+from analysis.stability.search_parts import SEARCH_CRITERIA, search_parts
 from analysis.stability.verdict_parts import verdict_parts
 
 __all__ = ["parts"]
 
 
 def parts(
-    *, full: bool, guarded: bool = False, routed: bool = False
+    *,
+    full: bool,
+    guarded: bool = False,
+    routed: bool = False,
+    searching: bool = False,
 ) -> tuple[Part, ...]:
     """The parts of a report.
 
@@ -25,13 +30,16 @@ def parts(
         full: Also those that take minutes.
         guarded: Also that of a robot's guard.
         routed: Those of a robot on a route, in the place of one that follows a sound.
+        searching: Those of a robot that searches step by step.
 
     Returns:
         In the report's order.
     """
     guard = safety_parts() if guarded else ()
+    left_out = [part.title for part in _sound_parts(full=full)]
+    if searching:
+        return (*search_parts(left_out), *verdict_parts(SEARCH_CRITERIA))
     if routed:
-        left_out = [part.title for part in _sound_parts(full=full)]
         return (*route_parts(left_out), *guard, *verdict_parts(ROUTE_CRITERIA))
     return (*_sound_parts(full=full), *guard, *verdict_parts())
 

@@ -9,9 +9,15 @@ import numpy as np
 from pydantic import Field, Strict, model_validator
 
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Coordinate, Length, Parameters
+from systems.framework.parameters import (
+    Angle,
+    Coordinate,
+    Length,
+    Parameters,
+    Point,
+)
 
-__all__ = ["Boxes", "Distribution"]
+__all__ = ["Boxes", "Distribution", "Sector"]
 
 #: Differences of such numbers are finite, and such integers are exact as floats.
 Number = Annotated[float, Field(ge=-1e300, le=1e300)]
@@ -72,6 +78,42 @@ class Boxes(Parameters):
         ]
 
 
+class Sector(Parameters):
+    """Points evenly spread over the area of a sector of a ring."""
+
+    about_m: Point
+    """Middle of the ring in W, m."""
+    range_m: Sides
+    """[low, high]: distance from it, m."""
+    bearing_deg: Annotated[tuple[Angle, Angle], Strict(False)] = (-180.0, 180.0)
+    """[low, high]: CCW from the x axis of W, deg."""
+
+    @model_validator(mode="after")
+    def _check(self) -> Sector:
+        for name in ("range_m", "bearing_deg"):
+            low, high = getattr(self, name)
+            if low > high:
+                raise InputError(
+                    name, f"{[low, high]} is empty; give [low, high] with low <= high"
+                )
+        return self
+
+    def draw(self, generator: np.random.Generator) -> list[float]:
+        """A place.
+
+        Args:
+            generator: Where the numbers come from.
+
+        Returns:
+            x and y in W, m.
+        """
+        low, high = self.range_m
+        distance = math.sqrt(generator.uniform(low**2, high**2))
+        bearing = math.radians(generator.uniform(*self.bearing_deg))
+        x, y = self.about_m
+        return [x + distance * math.cos(bearing), y + distance * math.sin(bearing)]
+
+
 #: Fields of a distribution that are none themselves.
 _CHANGES = ("each", "either_sign")
 
@@ -91,6 +133,8 @@ class Distribution(Parameters):
     """Values of any kind, each as likely."""
     boxes: Boxes | None = None
     """A list of resting boxes, for ``obstacles``."""
+    sector: Sector | None = None
+    """A place, for ``position_m`` and its like."""
     each: Pairs | None = None
     """[a, b] for each path of the key, in its order: it gets a times the number that
     was drawn, plus b."""
@@ -139,8 +183,8 @@ class Distribution(Parameters):
 
     @property
     def numeric(self) -> bool:
-        """Whether what is drawn has an order: all but ``choice`` and ``boxes``."""
-        return self.choice is None and self.boxes is None
+        """Whether what is drawn has an order, as numbers have."""
+        return self.choice is None and self.boxes is None and self.sector is None
 
     def draw(self, generator: np.random.Generator, count: int = 1) -> list[Any]:
         """Draws once.
@@ -154,6 +198,8 @@ class Distribution(Parameters):
         """
         if self.boxes is not None:
             return [self.boxes.draw(generator)] * count
+        if self.sector is not None:
+            return [self.sector.draw(generator)] * count
         if self.choice is not None:
             return [self.choice[int(generator.integers(len(self.choice)))]] * count
         value = self._number(generator)

@@ -15,11 +15,16 @@ from diagrams.stop_rules import (
     DIVERGED,
     RobotRules,
     RuleNumbers,
+    judge_search,
     judge_tick,
 )
 from systems.world.geometry import rectangle_clearance
 
 __all__ = ["Contacts", "contacts_of", "judge_all"]
+
+
+#: Place of the pose at the tick before among what is watched.
+BEFORE = 8
 
 
 class Contacts(NamedTuple):
@@ -70,6 +75,7 @@ def contacts_of(
 
 
 _judge_tick = njit(judge_tick)
+_judge_search = njit(judge_search)
 
 
 @njit
@@ -82,7 +88,8 @@ def judge_all(
         tick: Its number.
         tick_s: s.
         watched: Of each robot its pose, velocity, what it follows, whether it has a
-            target, whether its law gives up, and its pose at the tick before.
+            target, whether its law gives up, how its search ended, what its switches
+            feel and which body that is, and its pose at the tick before.
         contacts: ``Contacts`` of each.
         judged: (robots, 8) states of ``judge_tick``, changed.
         ended: (robots, 2) what that has returned, and whether a body is touched;
@@ -93,9 +100,13 @@ def judge_all(
     """
     all_ended, over = True, False
     for k in range(len(contacts)):
-        pose, velocity, pose_WS, valid, gives_up, _ = watched[k]
-        if _touches(tick, k, watched, contacts[k]):
+        pose, velocity, pose_WS, valid, gives_up, report, feels, body, _ = watched[k]
+        felt = (feels[0] > 0.5 or feels[1] > 0.5) and body[0] >= 0.0
+        if not felt and _touches(tick, k, watched, contacts[k]):
             ended[k, 1] = 1
+        elif ended[k, 0] == 0 and contacts[k].rules.searches > 0:
+            rules = contacts[k].rules
+            ended[k, 0] = _judge_search(report[0], pose, pose_WS, rules)
         elif ended[k, 0] == 0:
             ended[k, 0] = _judge_tick(
                 tick * tick_s,
@@ -113,7 +124,7 @@ def judge_all(
     if not over:
         for k in range(len(contacts)):
             for j in range(3):
-                watched[k][5][j] = watched[k][0][j]
+                watched[k][BEFORE][j] = watched[k][0][j]
     return over
 
 
@@ -122,7 +133,8 @@ def _touches(
     tick: int, number: int, watched: Any, contacts: Contacts
 ) -> bool:  # pragma: no cover  (compiled)
     """Whether a robot has touched a body since the last tick."""
-    pose, before, at = watched[number][0], watched[number][5], BETWEEN_TICKS * tick
+    pose, before = watched[number][0], watched[number][BEFORE]
+    at = BETWEEN_TICKS * tick
     mine, other = np.empty(5), np.empty(5)
     mine[3], mine[4] = contacts.size
     for body in range(len(contacts.reach)):
@@ -139,7 +151,7 @@ def _touches(
             for k in range(3):
                 mine[k] = before[k] + part * (pose[k] - before[k])
                 if robot >= 0:
-                    then, now = watched[robot][5][k], watched[robot][0][k]
+                    then, now = watched[robot][BEFORE][k], watched[robot][0][k]
                     other[k] = then + part * (now - then)
                 elif tick > 0:
                     other[k] = contacts.poses[body, at - BETWEEN_TICKS + fifth, k]

@@ -20,9 +20,10 @@ from numpy.typing import NDArray
 
 from diagrams.compiled.loop_blocks import LoopBlocks
 from diagrams.compiled.parts import run_parts
-from diagrams.compiled.plan import LoopPlan, LoopRobot
+from diagrams.compiled.plan import LoopPlan, LoopRobot, LoopWorld
 from diagrams.compiled.sounds import sounds_of_a_run
 from diagrams.scenario import Scenario
+from diagrams.searching.world_blocks import WORLD
 from diagrams.stop_rules import JudgedTick, RunRules
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
@@ -128,11 +129,16 @@ class CompiledLoop:
             before * self.tick_s,
             self.log[last, pose].tolist(),
             self.log[before, pose].tolist(),
-            bool(self.log[last, columns["target_valid"]] > 0.5),
+            bool(self._value(columns, "target_valid") > 0.5),
             self.plan.judged[number].tolist(),
             found,
             bool(touched),
+            self._value(columns, "search_ended"),
         )
+
+    def _value(self, columns: Mapping[str, int], name: str) -> float:
+        """Of a column in the last row; 0 where it is none."""
+        return float(self.log[self.done - 1, columns[name]]) if name in columns else 0.0
 
 
 def _complaint(error: Exception) -> str:
@@ -144,7 +150,10 @@ def _complaint(error: Exception) -> str:
 
 
 def compile_loop(
-    scenario: Scenario, blocks: Mapping[str, LoopBlocks], rules: RunRules
+    scenario: Scenario,
+    blocks: Mapping[str, LoopBlocks],
+    rules: RunRules,
+    shared: LoopBlocks | None = None,
 ) -> CompiledLoop:
     """The loop of a scenario that has one.
 
@@ -152,6 +161,7 @@ def compile_loop(
         scenario: What to run.
         blocks: Of each robot; they may be made for another start or seed.
         rules: When the run ends.
+        shared: What all robots share, if they share anything.
 
     Returns:
         The loop, before its first tick.
@@ -163,8 +173,9 @@ def compile_loop(
     ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
     times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
     sounds = sounds_of_a_run(scenario, times)
+    world = LoopWorld(scenario, shared, ticks) if shared is not None else None
     robots = {
-        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name])
+        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], world)
         for name, own in blocks.items()
     }
     plan = LoopPlan(robots, times)
@@ -172,12 +183,16 @@ def compile_loop(
         plan.surround(name, rules.robots[name].surroundings)
     for name, function in sounds.carried.items():
         plan.remember(name, function)
-    for name in robots:
-        plan.add(name)
+    for each in (*((world,) if world else ()), *robots.values()):
+        plan.add(each)
     plan.judge(rules, scenario.tick_s)
     width, columns = 0, {}
-    for name, own in blocks.items():
-        plan.logged += [robots[name].view(port) for _, port in own.columns]
+    logged: dict[str, LoopRobot | LoopWorld] = {**robots}
+    if world is not None:
+        logged[WORLD] = world
+    for name, each in logged.items():
+        own = each.made
+        plan.logged += [each.view(port) for _, port in own.columns]
         wanted = [text for texts in own.columns.values() for text in texts]
         columns[name] = {text: width + k for k, text in enumerate(wanted)}
         width += len(wanted)

@@ -6,15 +6,22 @@ from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from typing import Any
 
-from diagrams.robot import columns_of, require_published, robot_blocks
+from diagrams.robot import (
+    OUTSIDE,
+    columns_of,
+    require_published,
+    robot_blocks,
+    world_seeds,
+)
 from diagrams.scenario import Scenario
+from diagrams.searching.world_blocks import radio_nodes, world_blocks
 from systems.framework.input_error import InputError
 from systems.framework.step_block import RunFacts, Step
 
-__all__ = ["LoopBlocks", "shared_blocks"]
+__all__ = ["LoopBlocks", "shared_blocks", "shared_world"]
 
-#: What a robot takes from the world.
-_WORLD = "pose_WS", "poses_WO", "sizes", "emission"
+#: What blocks take from elsewhere: robots from the world, and it from them.
+_WORLD = *OUTSIDE, "frames"
 #: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
 _NO_BLOCKS = {
     "name",
@@ -29,6 +36,8 @@ _NO_BLOCKS = {
     "robots",
     "sources",
     "source",
+    "wind",
+    "odor",
 }
 #: Blocks by what they were made from, the last used ones last.
 _SHARED: dict[str, LoopBlocks] = {}
@@ -127,14 +136,37 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
             blocks[name] = LoopBlocks(made())
             continue
         made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
-        key = f"{name} {bodies} {robots} {others} {own.source_size} {made_from}"
-        found = _SHARED.pop(key, None)
-        if found is None:
-            found = LoopBlocks(made())
-        blocks[name] = _SHARED[key] = found
-        if len(_SHARED) > _MOST_SHARED:
-            del _SHARED[next(iter(_SHARED))]
+        sizes = own.source_size, own.odor and own.odor.container_m
+        key = f"{name} {bodies} {robots} {others} {sizes} {made_from}"
+        blocks[name] = _shared(key, made)
     return blocks
+
+
+def shared_world(scenario: Scenario) -> LoopBlocks | None:
+    """What all robots share, as ``shared_blocks`` has what each of them has.
+
+    Args:
+        scenario: What to run.
+
+    Returns:
+        None where no robot searches.
+    """
+    nodes = radio_nodes(scenario)
+    if not nodes:
+        return None
+    made_from = scenario.model_dump_json(include={"wind", "odor", "radio", "tick_s"})
+    made = partial(world_blocks, scenario, world_seeds(scenario))
+    return _shared(f"{nodes} {made_from}", made)
+
+
+def _shared(key: str, made: Callable[[], Mapping[str, Any]]) -> LoopBlocks:
+    found = _SHARED.pop(key, None)
+    if found is None:
+        found = LoopBlocks(made())
+    _SHARED[key] = found
+    if len(_SHARED) > _MOST_SHARED:
+        del _SHARED[next(iter(_SHARED))]
+    return found
 
 
 def _without_goal(own: Scenario) -> Scenario:

@@ -15,16 +15,56 @@ from diagrams.compiled.judge import contacts_of, judge_all
 from diagrams.compiled.loop_blocks import LoopBlocks
 from diagrams.compiled.parts import PUBLISH
 from diagrams.compiled.source import LoopPart, address_of, compiled_part
-from diagrams.robot import seed_of
+from diagrams.robot import block_seed, seed_of
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import GIVES_UP, UNJUDGED, RunRules
+from diagrams.stop_rules import (
+    CONTACT,
+    GIVES_UP,
+    SEARCH_REPORT,
+    TOUCHED,
+    UNJUDGED,
+    RunRules,
+)
 from systems.framework.host_step import HostCall, HostFunction, host_step
 from systems.framework.step_block import RunFacts, Step
 
-__all__ = ["LoopPlan", "LoopRobot"]
+__all__ = ["LoopPlan", "LoopRobot", "LoopWorld"]
 
-#: What a robot is judged by, and its pose at the tick before.
-_WATCHED = "pose_WB", "velocity_WB", "pose_WS", "target_valid", GIVES_UP
+#: What a robot is judged by, and sizes of what not every robot has.
+_WATCHED = {
+    "pose_WB": 3,
+    "velocity_WB": 3,
+    "pose_WS": 3,
+    "target_valid": 1,
+    GIVES_UP: 1,
+    SEARCH_REPORT: 4,
+    CONTACT: 2,
+    TOUCHED: 1,
+    "calling": 1,
+}
+#: Of these, what it is judged by.
+_JUDGED = [name for name in _WATCHED if name != "calling"]
+
+
+class LoopWorld:
+    """What all robots of a run share: its blocks' steps, and what their ports carry."""
+
+    def __init__(self, scenario: Scenario, made: LoopBlocks, ticks: int) -> None:
+        run = RunFacts(
+            ticks,
+            scenario.tick_s,
+            (0.0, 0.0, 0.0),
+            scenario.integrator.scheme,
+            scenario.integrator.step_s,
+            partial(block_seed, scenario.seed),
+            {},
+        )
+        self.made, self.steps = made, made.steps(run)
+        self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
+
+    def view(self, port: str) -> NDArray[np.float64]:
+        """What a port carries."""
+        return self._views[port]
 
 
 class LoopRobot:
@@ -37,6 +77,7 @@ class LoopRobot:
         made: LoopBlocks,
         ticks: int,
         heard: Mapping[str, Callable[[int], Any]],
+        world: LoopWorld | None = None,
     ) -> None:
         own = scenario.all_robots[name]
         self.facts = RunFacts(
@@ -51,8 +92,13 @@ class LoopRobot:
             own.route.goal_m if own.route is not None else None,
         )
         self.made, self.steps = made, made.steps(self.facts)
-        sizes = {GIVES_UP: 1, "pose_WS": 3, **made.sizes}
+        sizes = {**_WATCHED, **made.sizes}
         self._views = {port: np.zeros(size) for port, size in sizes.items()}
+        if world is not None:
+            given = made.outside.intersection(world.made.sizes)
+            self._views |= {port: world.view(port) for port in given}
+            if f"frames_{name}" in world.made.sizes:
+                self._views["frames"] = world.view(f"frames_{name}")
 
     def view(self, port: str) -> NDArray[np.float64]:
         """What a port carries."""
@@ -86,9 +132,8 @@ class LoopPlan:
         self._late: list[int] = []
         self._plants: list[int] = []
 
-    def add(self, name: str) -> None:
-        """A robot's blocks."""
-        robot = self._robots[name]
+    def add(self, robot: LoopRobot | LoopWorld) -> None:
+        """The blocks of a robot, or what robots share."""
         early, late = robot.made.order(robot.steps)
         for part in (*early, *late):
             step, made = robot.steps[part], robot.made
@@ -105,9 +150,10 @@ class LoopPlan:
 
         Args:
             name: Of the robot.
-            function: Takes its pose and velocity.
+            function: Takes its pose and velocity, and whether it calls.
         """
-        motion = tuple(map(self._robots[name].view, ("pose_WB", "velocity_WB")))
+        ports = "pose_WB", "velocity_WB", "calling"
+        motion = tuple(map(self._robots[name].view, ports))
         step = host_step(function, sum(map(len, motion)), 0, 1)
         self._filled.append(self._step(step, motion, ()))
 
@@ -171,7 +217,7 @@ class LoopPlan:
         """
         robots = self._robots
         watched = tuple(
-            (*map(robot.view, _WATCHED), np.array(robot.facts.initial_pose))
+            (*map(robot.view, _JUDGED), np.array(robot.facts.initial_pose))
             for robot in robots.values()
         )
         contacts = tuple(

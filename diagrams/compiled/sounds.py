@@ -54,16 +54,22 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
     )
     for source, sound in scenario.sounds().items() if hearing else ():
         p_WS, v_WS = np.zeros((2, ticks + len(times), 2))
+        on_since: Callable[[], float | None] | None = None
         if source in robots:
             p_WS[:] = robots[source].start.position_m
-            sounds.carried[source] = _remembering(p_WS[ticks:], v_WS[ticks:])
+            motion, calls = (p_WS[ticks:], v_WS[ticks:]), CalledOn()
+            sounds.carried[source] = _remembering(*motion, calls, scenario.tick_s)
+            if robots[source].searches == "odor":
+                on_since = calls.since
         else:
             path = scenario.all_sources[source].path()
             p_WS[ticks:] = path.poses(times)[:, :2]
             p_WS[:ticks] = p_WS[ticks]
             v_WS[ticks:] = [path.velocity(time)[:2] for time in times.tolist()]
         waveform = _waveform(scenario, source, sound)
-        emission = emissions_along(p_WS, v_WS, waveform, sound, ticks, scenario.tick_s)
+        emission = emissions_along(
+            p_WS, v_WS, waveform, sound, ticks, scenario.tick_s, on_since
+        )
         for name in hearing:
             followed = scenario.target(name) == source
             sounds.heard[name]["emission" if followed else f"emission_{source}"] = (
@@ -72,11 +78,29 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
     return sounds
 
 
-def _remembering(p_WS: NDArray[np.float64], v_WS: NDArray[np.float64]) -> HostFunction:
-    """Writes a robot's places and velocities."""
+class CalledOn:
+    """When a loudspeaker was called on."""
+
+    def __init__(self) -> None:
+        self.time_s: float | None = None
+
+    def since(self) -> float | None:
+        """s; None: not yet."""
+        return self.time_s
+
+
+def _remembering(
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
+    calls: CalledOn,
+    tick_s: float,
+) -> HostFunction:
+    """Writes a robot's places and velocities, and when it first called."""
 
     def remember(tick: int, motion: Any, _: Any) -> None:
         p_WS[tick], v_WS[tick] = motion[:2], motion[3:5]
+        if calls.time_s is None and motion[6] > 0.5:
+            calls.time_s = tick * tick_s
 
     return remember
 

@@ -7,7 +7,19 @@ from typing import Any, Literal
 
 __all__ = ["ROBOT_PRESETS", "RobotPreset"]
 
-RobotPreset = Literal["han2019", "turtlebot3_burger"]
+RobotPreset = Literal[
+    "han2019", "turtlebot3_burger", "song2011_olfactory", "song2011_hearing"
+]
+
+_SONG: Mapping[str, Any] = {
+    "length_m": 0.14,
+    "width_m": 0.2,
+    "control_point_m": 0.01,
+    "wheel_radius_m": 0.03,
+    "wheel_separation_m": 0.2,
+    "mass_kg": 2.0,
+    "top_speed_m_s": 0.2,
+}
 
 #: Fields of ``RobotParameters`` that differ from the slave robot of Han 2019.
 ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
@@ -25,5 +37,19 @@ ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
         "wheel_separation_m": 0.16,
         "mass_kg": 1.0,
         "top_speed_m_s": 0.22,
+    },
+    # Song 2011: neither sizes nor track are printed; these are ours. P is over the axle
+    # but for a centimetre: nothing is steered by it. The smelling robot has no use for
+    # microphones.
+    "song2011_olfactory": _SONG,
+    # A microphone in the middle and three on arms of 15 cm (3.1), one of them ahead.
+    "song2011_hearing": {
+        **_SONG,
+        "microphones_m": (
+            (-0.01, 0.0),
+            (0.14, 0.0),
+            (-0.085, 0.15 * 3.0**0.5 / 2.0),
+            (-0.085, -0.15 * 3.0**0.5 / 2.0),
+        ),
     },
 }

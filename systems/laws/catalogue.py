@@ -16,6 +16,7 @@ from systems.laws.conventional_impedance_controller import CONVENTIONAL
 from systems.laws.guarded_controller import GUARDED
 from systems.laws.law import Law
 from systems.laws.no_avoidance import NONE
+from systems.laws.search_laws import PLUME_SEARCH, SOUND_SEARCH
 from systems.laws.trajectory.trajectory_laws import (
     TRAJECTORY_ADAPTIVE,
     TRAJECTORY_CONVENTIONAL,
@@ -42,6 +43,8 @@ LAWS: Mapping[str, Law] = {
         TRAJECTORY_CONVENTIONAL,
         TRAJECTORY_ADAPTIVE,
         TRAJECTORY_FILTERED,
+        PLUME_SEARCH,
+        SOUND_SEARCH,
     )
 }
 

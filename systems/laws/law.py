@@ -79,6 +79,9 @@ class Law:
     on_route: bool = False
     """Whether it drives to a goal on a planned way, in the place of following a
     sound; it then ``plans``, too."""
+    searches: Literal["odor", "sound"] | None = None
+    """What it searches for step by step, in the place of following a sound; it then
+    ``plans``, too."""
     guarded: bool = False
     """Whether its robot is always guarded."""
     colour: str | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numba import njit
@@ -21,7 +21,24 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 
-__all__ = ["MicArrayParameters", "channel_skew", "convert"]
+__all__ = [
+    "MicArrayParameters",
+    "MicrophoneFaultParameters",
+    "channel_skew",
+    "check_faults",
+    "convert",
+]
+
+
+class MicrophoneFaultParameters(Parameters):
+    """A microphone that fails in a run, and how."""
+
+    microphone: int = Field(default=1, ge=1, le=64)
+    """Which one, from 1."""
+    kind: Literal["dead", "frozen"] = "dead"
+    """``dead``: its counts are 0; ``frozen``: they rest at a quarter of full scale."""
+    start_s: Time = 0.0
+    """When that begins, s."""
 
 
 class MicArrayParameters(Parameters):
@@ -72,6 +89,10 @@ class MicArrayParameters(Parameters):
     """Each channel is sampled up to this earlier or later, s."""
     gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
     """The gain of each channel, noise included, is off by up to this, dB."""
+    faults: Annotated[
+        tuple[MicrophoneFaultParameters, ...], Strict(False), Field(max_length=64)
+    ] = ()
+    """Microphones that fail in a run."""
 
     @model_validator(mode="after")
     def _check(self) -> MicArrayParameters:
@@ -86,6 +107,11 @@ class MicArrayParameters(Parameters):
                 "sample_rate_hz",
                 f"{self.sample_rate_hz:g} Hz gives {samples:.4f} samples in a frame of "
                 f"{self.frame_s:g} s; use {round(samples) / self.frame_s:g}",
+            )
+        failing = [fault.microphone for fault in self.faults]
+        if len({*failing}) < len(failing):
+            raise InputError(
+                "faults", f"microphones {failing}: two faults of one; leave one of each"
             )
         return self
 
@@ -127,6 +153,24 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
             "microphones; give one for each, or []",
         )
     return np.array(skew) if skew else np.zeros(count)
+
+
+def check_faults(parameters: MicArrayParameters, count: int) -> None:
+    """Refuses faults of microphones that are not there.
+
+    Args:
+        parameters: Have the faults.
+        count: Number of microphones.
+
+    Raises:
+        InputError: One is beyond the last microphone.
+    """
+    beyond = [f.microphone for f in parameters.faults if f.microphone > count]
+    if beyond:
+        raise InputError(
+            "microphones.faults",
+            f"microphone {beyond[0]} of {count}; give a number from 1 to {count}",
+        )
 
 
 @njit(cache=True)

@@ -232,15 +232,22 @@ class MicArray(LeafSystem):
         """What the block does in each frame of a compiled loop, ``Step``."""
         recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
         emitted = [run.carried[port.get_name()] for port in self._sources]
-        memory = recorder.blank
-        frame: AudioFrame | None = None
+        memory = before = recorder.blank
+        now = np.zeros(3), np.zeros(3)
 
-        def record(tick: int, inputs: Any, _: Any) -> None:
-            nonlocal memory, frame
-            time, now = tick * run.tick_s, (inputs[:3], inputs[3:])
+        def remember(tick: int, inputs: Any, _: Any) -> None:
+            nonlocal memory, before, now
+            time, now = tick * run.tick_s, (inputs[:3].copy(), inputs[3:].copy())
+            emissions: list[Emission] = []
+            if memory.places is not None and recorder.updates(time):
+                emissions = [emission(tick) for emission in emitted]
+            before, memory = memory, recorder.remembered(emissions, time, now, memory)
+
+        def audio(tick: int) -> AudioFrame:
+            """Made when it is asked for: not everybody listens all the time."""
             emissions = [emission(tick) for emission in emitted]
-            frame = recorder.record(emissions, time, now, memory, recorder.array)
-            memory = recorder.remembered(emissions, time, now, memory)
+            time = tick * run.tick_s
+            return recorder.record(emissions, time, now, before, recorder.array)
 
-        run.carried["audio"] = lambda _: frame
-        return host_step(record, 6, 0, round(self._parameters.frame_s / run.tick_s))
+        run.carried["audio"] = audio
+        return host_step(remember, 6, 0, round(self._parameters.frame_s / run.tick_s))

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from systems.base.robot import RobotParameters
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import AudioFrame, Emission, read_only
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import MicArrayParameters, check_faults, convert
 from systems.sound.array_tolerances import RealArray, draw_tolerances, real_array
 from systems.sound.ego_noise import EgoNoise, driving_share
 from systems.sound.propagation import check_reach, microphone_paths, propagate
@@ -72,6 +72,10 @@ def record_frame(
         noise += np.float32(snr) * ego_noise
     noise_pa = emissions[0].level_pa / snr
     counts = convert(pressure, noise, noise_pa, parameters, array.gains)
+    for fault in parameters.faults:
+        if time > fault.start_s and fault.microphone <= len(counts):
+            rest = parameters.full_scale // 4 if fault.kind == "frozen" else 0
+            counts[fault.microphone - 1] = rest
     read_only(counts)
     return AudioFrame(
         counts=counts,
@@ -149,6 +153,7 @@ class Recorder:
         sources: int,
         seed: int,
     ) -> None:
+        check_faults(parameters, len(robot.microphones_m))
         self._parameters, self._robot, self._c = parameters, robot, c
         self._reverberation, self._ego_noise, places = None, None, None
         self._rise = room.rise_m if room else 0.0

@@ -21,6 +21,7 @@ from systems.sound.waveforms import SoundParameters, make_waveform
 __all__ = [
     "MAXIMUM_RANGE_M",
     "SoundEmitter",
+    "called_sound",
     "emissions_along",
     "emitted_samples",
     "history_ticks",
@@ -29,6 +30,9 @@ __all__ = [
 
 #: Farthest way of sound without a room, m.
 MAXIMUM_RANGE_M = 30.0
+
+#: Start of what never sounds, s.
+_NEVER_S = 86_400.0
 
 #: Samples before and after what the delays need, for the interpolation.
 MARGIN = 64
@@ -126,6 +130,7 @@ def emissions_along(
     sound: SoundParameters,
     ticks: int,
     tick_s: float = TICK_S,
+    on_since_s: Callable[[], float | None] | None = None,
 ) -> Callable[[int], Emission]:
     """What a ``SoundEmitter`` puts out at each tick of a motion.
 
@@ -137,6 +142,7 @@ def emissions_along(
         sound: The gate.
         ticks: How far back, from ``history_ticks``.
         tick_s: From one tick to the next, s.
+        on_since_s: Of a loudspeaker that is called on: when it was, s, or None.
 
     Returns:
         A function of the tick, below n.
@@ -145,7 +151,8 @@ def emissions_along(
     def emission(tick: int) -> Emission:
         known = slice(tick, tick + ticks + 1)
         path = p_WS[known], v_WS[known]
-        return make_emission(tick * tick_s, waveform, sound, *path, tick_s)
+        played = called_sound(sound, on_since_s()) if on_since_s else sound
+        return make_emission(tick * tick_s, waveform, played, *path, tick_s)
 
     return emission
 
@@ -160,6 +167,21 @@ def _history(ticks: int, tick_s: float) -> tuple[NDArray[np.float64], int]:
 @cache
 def _silence(count: int) -> NDArray[np.float32]:
     return np.zeros(count, dtype=np.float32)
+
+
+@cache
+def called_sound(sound: SoundParameters, on_since_s: float | None) -> SoundParameters:
+    """The sound of a loudspeaker that is called on, as one that plays by the clock.
+
+    Args:
+        sound: What it plays; its first burst is ``start_s`` after the call.
+        on_since_s: When it was called, s; None: not yet.
+
+    Returns:
+        The same with another start: a day after all runs where it is not called.
+    """
+    since = _NEVER_S if on_since_s is None else on_since_s + sound.start_s
+    return sound.model_copy(update={"start_s": since})
 
 
 def history_ticks(
@@ -194,7 +216,9 @@ class SoundEmitter(LeafSystem):
     Discrete state, every tick: position and velocity of the source at the last
     ticks, as far back as sound from the maximum range was emitted; before
     time zero the source rests where it starts. The output is a function of
-    time, state and present input: no latency. Before time zero it is silent.
+    time, state and present input: no latency. Before time zero it is silent. One that
+    is ``called`` remembers when it was first called, too: from that tick on it plays,
+    its schedule counted from there; it has an input port ``calling`` (0 or 1).
 
     Args:
         sound: What to play.
@@ -203,6 +227,7 @@ class SoundEmitter(LeafSystem):
         frame_s: Longest frame of a listener, s.
         seed: Seed of noise-like waveforms.
         tick_s: Period of the update, s.
+        called: Whether it is silent until its input ``calling`` is 1.
 
     Raises:
         ValueError: The sound file cannot be played, or the range is not finite.
@@ -221,6 +246,7 @@ class SoundEmitter(LeafSystem):
         frame_s: float = TICK_S,
         seed: int = 0,
         tick_s: float = TICK_S,
+        called: bool = False,
     ) -> None:
         super().__init__()
         self._sound = sound or SoundParameters()
@@ -234,7 +260,12 @@ class SoundEmitter(LeafSystem):
             self.DeclareVectorInputPort(name=name, size=3)
             for name in ("pose_WS", "v_WS")
         ]
+        self._calling: Any = None
         self.DeclareDiscreteState(4 * self._ticks)
+        if called:
+            self._calling = self.DeclareVectorInputPort(name="calling", size=1)
+            never: Any = np.array([-1.0])  # untyped: Drake's stubs take ndarray amiss
+            self.DeclareDiscreteState(never)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=tick_s, offset_sec=0.0, update=self._remember
@@ -253,19 +284,30 @@ class SoundEmitter(LeafSystem):
     def _start(self, context: Any, discrete_state: Any) -> None:
         path = np.zeros((2, self._ticks, 2))
         path[0] = read_arrays(context, self._inputs)[0][:2]
-        discrete_state.set_value(path.ravel())
+        discrete_state.set_value(0, path.ravel())
 
     def _remember(self, context: Any, discrete_state: Any) -> None:
         emission = self._emission.Eval(context)
         path = np.concatenate((emission.p_WS[1:], emission.v_WS[1:]))
-        discrete_state.set_value(path.ravel())
+        discrete_state.set_value(0, path.ravel())
+        if self._calling is None or self._on_since(context) is not None:
+            return
+        if self._calling.Eval(context)[0] > 0.5:
+            discrete_state.set_value(1, np.array([context.get_time()]))
+
+    def _on_since(self, context: Any) -> float | None:
+        """When it was called, s."""
+        since = float(context.get_discrete_state(1).value()[0])
+        return None if since < 0.0 else since
 
     def _emit(self, context: Any, output: Any) -> None:
         held, split = context.get_discrete_state(0).value(), 2 * self._ticks
         pose_WS, velocity = read_arrays(context, self._inputs)
         p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)
         v_WS = np.concatenate((held[split:], velocity[:2])).reshape(-1, 2)
-        time = context.get_time()
+        time, sound = context.get_time(), self._sound
+        if self._calling is not None:
+            sound = called_sound(sound, self._on_since(context))
         output.set_value(
-            make_emission(time, self._waveform, self._sound, p_WS, v_WS, self._tick_s)
+            make_emission(time, self._waveform, sound, p_WS, v_WS, self._tick_s)
         )

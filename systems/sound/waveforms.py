@@ -45,7 +45,7 @@ _NOISE_SECONDS = 2.0
 class SoundParameters(Parameters):
     """What is played, how loud, and when (Han 2019, 4.1: 0.5 s in every 2 s)."""
 
-    kind: Literal["chirp", "band_noise", "tone", "horn", "wav"] = "chirp"
+    kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
     """Waveform; ``wav`` plays ``file``."""
     file: str | None = None
     """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
@@ -171,6 +171,18 @@ def _horn(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     return total
 
 
+def _siren(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
+    """A square wave that sweeps from 600 to 1500 Hz and back twice a second."""
+    import scipy.signal
+
+    time = _time(max(sound.on_s, 1.0))
+    low, high = 600.0, 1_500.0
+    sweep = 0.5 * (scipy.signal.sawtooth(4.0 * np.pi * time, 0.5) + 1.0)
+    phase = 2.0 * np.pi * np.cumsum(low + (high - low) * sweep) / SAMPLE_RATE_HZ
+    odd = range(1, 12, 2)
+    return np.sum([np.sin(number * phase) / number for number in odd], axis=0)
+
+
 def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
     channels, rate = read_sound(sound.file or "", "sound.file")
     if len(channels) != 1:
@@ -218,5 +230,6 @@ _SYNTHESES = {
     "band_noise": _band_noise,
     "tone": _tone,
     "horn": _horn,
+    "siren": _siren,
     "wav": _file,
 }

@@ -95,6 +95,23 @@ def test_library_loads_and_says_what_it_is(name):
     assert "\n" not in scenario.description
 
 
+#: What only robots that search have.
+SEARCHING = {
+    "airflow_sensors",
+    "compass",
+    "contact_switches",
+    "cross_power",
+    "gas_sensors",
+    "heading_control",
+    "motor_driver",
+    "odor",
+    "radio",
+    "search",
+    "sound_search",
+    "wind",
+}
+
+
 def test_one_of_everything_runs(tmp_path):
     scenario = load_scenario(write(tmp_path, ONE_OF_EVERYTHING))
     untouched = {
@@ -111,6 +128,7 @@ def test_one_of_everything_runs(tmp_path):
         "sound",
         "microphones",
         "tdoa",
+        *SEARCHING,
     }
     assert simulate(scenario).simulated_s == pytest.approx(0.1)
 

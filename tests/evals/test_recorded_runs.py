@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagrams import library_scenarios, load_scenario, simulate
+from diagrams import Scenario, library_scenarios, load_scenario, simulate
 from systems.laws.catalogue import FORCE_LAWS
 
 pytestmark = pytest.mark.slow
@@ -33,7 +33,7 @@ TOLERANCE = 1e-9
 def builds() -> list[tuple[str, ...]]:
     """Scenario and settings: each by ear and exactly, laws, models of sensors."""
     loaded = {name: load_scenario(name) for name in sorted(library_scenarios())}
-    names = [n for n, each in loaded.items() if not each.robots and not each.route]
+    names = [n for n, each in loaded.items() if _follows_alone(each)]
     return [
         *((name,) for name in names),
         *((name, "hearing=ideal") for name in names),
@@ -56,6 +56,10 @@ def builds() -> list[tuple[str, ...]]:
             "duration_s=4",
         ),
     ]
+
+
+def _follows_alone(scenario: Scenario) -> bool:
+    return not (scenario.robots or scenario.route or scenario.searches)
 
 
 def record_of(build: tuple[str, ...]) -> dict[str, Any]:

@@ -34,7 +34,17 @@ SAMPLED: dict[str, dict[str, Any]] = {
     "VelocityWheelCommand": {},
     "WheelOdometry": {},
     "WheelSpeedCommand": {},
+    "CrossPowerEstimator": {},
+    "GasSensorArray": {},
+    "MotorDriver": {},
+    "PlumeSearch": {},
+    "RadioChannel": {},
+    "RadioRange": {},
+    "SinkMonitor": {},
+    "SoundSearch": {},
 }
+#: The air changes more slowly than robots do.
+OF_THE_AIR = {"OdorPlume", "WindField"}
 # What plans remembers more than numbers: its update is none of a discrete state; what
 # stops when something is near, or is pulled and pushed, remembers nothing.
 LAWS = {
@@ -63,6 +73,7 @@ TOLD: dict[str, dict[str, Any]] = {
     "IdealSourceSensor": {"frame_s": 0.1},
     "MicArray": {"parameters": SLOW},
     "TDOAEstimator": {"microphones": SLOW},
+    "CrossPowerEstimator": {"microphones": SLOW},
 }
 
 
@@ -82,4 +93,10 @@ def test_other_blocks_are_functions_of_now():
         and issubclass(block, LeafSystem)
         and block(**SAMPLED.get(name, {})).GetUniquePeriodicDiscreteUpdateAttribute()
     }
-    assert sampled == SAMPLED.keys() | LAWS
+    assert sampled == SAMPLED.keys() | LAWS | OF_THE_AIR
+
+
+@pytest.mark.parametrize("name", sorted(OF_THE_AIR))
+def test_wind_and_plume_change_ten_times_a_second(name):
+    timing = getattr(systems, name)().GetUniquePeriodicDiscreteUpdateAttribute()
+    assert (timing.period_sec(), timing.offset_sec()) == (0.1, 0.0)

@@ -36,7 +36,7 @@ def test_layouts_of_the_library_are_valid_and_differ(name):
     laws = ("none", "active")
     if load_scenario(plan.scenario).route is not None:
         laws = ("trajectory_conventional", "trajectory_filtered")
-    if load_scenario(plan.scenario).robots:
+    if (scenario := load_scenario(plan.scenario)).robots or scenario.searches:
         plan = plan.model_copy(update={"runs": 20})
     else:
         plan = comparison_plan(name, laws=laws, runs=20)

@@ -44,7 +44,8 @@ def test_fingerprint_is_of_everything_in_the_scenario() -> None:
 
 @pytest.mark.parametrize("law", LAWS)
 def test_every_law_has_its_equations(law: str) -> None:
-    name = "unknown_block" if LAWS[law].on_route else "default"
+    searched = {"odor": "odor_search", "sound": "sound_search", None: "default"}
+    name = "unknown_block" if LAWS[law].on_route else searched[LAWS[law].searches]
     sheet = model_sheet(load_scenario(name, [f"law={law}"]))
     assert sheet.law_equations
     for k, formula in enumerate((*sheet.motion, *sheet.law_equations)):

@@ -118,3 +118,30 @@ def test_either_sign_is_as_likely():
 def test_impossible_distribution_is_refused(distribution, hint):
     with pytest.raises(ValidationError, match=hint):
         Distribution.model_validate(distribution)
+
+
+def test_a_sector_is_evenly_filled():
+    """Half of the area of a ring from 1 to 3 m lies within sqrt(5) m."""
+    drawn = Distribution.model_validate(
+        {
+            "sector": {
+                "about_m": [1.0, -2.0],
+                "range_m": [1.0, 3.0],
+                "bearing_deg": [0, 90],
+            }
+        }
+    )
+    generator = np.random.default_rng(1)
+    x, y = np.array([drawn.draw(generator)[0] for _ in range(4000)]).T
+    away, bearing = np.hypot(x - 1.0, y + 2.0), np.degrees(np.arctan2(y + 2.0, x - 1.0))
+    assert away.min() >= 1.0
+    assert away.max() <= 3.0
+    assert np.mean(away < np.sqrt(5.0)) == pytest.approx(0.5, abs=0.03)
+    assert bearing.min() >= 0.0
+    assert np.mean(bearing < 45.0) == pytest.approx(0.5, abs=0.03)
+
+
+def test_an_empty_sector_is_refused():
+    data = {"sector": {"about_m": [0.0, 0.0], "range_m": [2.0, 1.0]}}
+    with pytest.raises(ValidationError, match="is empty"):
+        Distribution.model_validate(data)

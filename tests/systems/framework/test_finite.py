@@ -65,8 +65,8 @@ def emission() -> Emission:
     return make_emission(0.0, waveform, SoundParameters(start_s=0.0), *path)
 
 
-def audio() -> AudioFrame:
-    counts = np.zeros((3, FRAME_SAMPLES), dtype=np.int16)
+def audio(channels: int = 3) -> AudioFrame:
+    counts = np.zeros((channels, FRAME_SAMPLES), dtype=np.int16)
     return AudioFrame(counts, 512, float(SAMPLE_RATE_HZ), 0.0)
 
 
@@ -84,7 +84,10 @@ def good_value(port: Any, level: float) -> Any:
     if port.get_name() == "free_space":
         return make_free_space(100, 0.05, 3, 17)
     if port.get_data_type() == PortDataType.kAbstractValued:
-        return audio() if port.get_name() == "audio" else emission()
+        heard = audio(4 if port.get_system().HasInputPort("listening") else 3)
+        return heard if port.get_name() == "audio" else emission()
+    if port.get_name() == "listening":
+        level += 1.0
     if port.get_name() == "range_ages":
         level *= TICK_S
     return [level] * port.size()

@@ -157,6 +157,81 @@ FIELDS = {
     "RoomParameters.absorption": (ABOVE_0, 1.0),
     "RoomParameters.maximum_order": (1, 150),
     "SensorFaultParameters.sensor": (1, 360),
+    # Robots that search: shares, ratios, angles within what they can be, addresses.
+    "StopParameters.odor_ahead_deg": (0.0, 180.0),
+    "WindParameters.speed_m_s": (0.0, 20.0),
+    "WindParameters.meander_intensity": (0.0, 1.0),
+    "WindParameters.meander_time_s": (0.1, 3600.0),
+    "WindParameters.jet_origin_m": (-1e3, 1e3),
+    "WindParameters.jet_growth": (0.0, 1.0),
+    "OdorSourceParameters.ratio_at_2_m": (1e-3, 0.999),
+    "OdorSourceParameters.height_m": (0.0, 1e3),
+    "OdorSourceParameters.puffs_per_s": (1.0, 50.0),
+    "OdorSourceParameters.level_growth": (1e-3, 1.0),
+    "OdorSourceParameters.upright_growth": (1e-3, 1.0),
+    "OdorSourceParameters.own_intensity": (0.0, 1.0),
+    "OdorSourceParameters.own_time_s": (0.01, 3600.0),
+    "OdorSourceParameters.mean_intensity": (1e-3, 1.0),
+    "OdorSourceParameters.reach_m": (0.5, 1e3),
+    "OdorSourceParameters.age_s": (0.0, 86_400.0),
+    "OdorSourceParameters.room_volume_m3": (1.0, 1e6),
+    "AirflowParameters.gain_s_m": (1e-9, 1e6),
+    "AirflowParameters.noise": (0.0, 1.0),
+    "GasSensorParameters.height_m": (0.0, 1e3),
+    "GasSensorParameters.exponent": (1e-9, 1e6),
+    "GasSensorParameters.noise": (0.0, 1.0),
+    "GasSensorParameters.mismatch": (0.0, 0.1),
+    "GasSensorParameters.slope_mismatch": (0.0, 0.15),
+    "GasSensorParameters.drift_per_h": (-0.03, 0.03),
+    "GasSensorFaultParameters.sensor": (1, 3),
+    "ContactFaultParameters.switch": (1, 2),
+    "MicrophoneFaultParameters.microphone": (1, 64),
+    "CompassParameters.hard_iron": (-0.9, 0.9),
+    "CompassParameters.soft_iron": (0.1, 10.0),
+    "CompassParameters.noise_deg": (0.0, 90.0),
+    **{
+        f"HeadingControlParameters.{field}": (0.0, 1e6)
+        for field in (
+            "proportional",
+            "integral",
+            "differential",
+            "integral_within_deg",
+            "largest_integral_deg",
+            "largest_differential_deg",
+        )
+    },
+    "HeadingControlParameters.largest_error_deg": (1e-9, 1e6),
+    "HeadingControlParameters.turning_beyond_deg": (1e-9, 1e6),
+    "RadioParameters.latency_s": (0.0, 86_400.0),
+    "RadioParameters.loss": (0.0, 1.0),
+    "RadioParameters.byte_error": (0.0, 1.0),
+    "RadioParameters.level_at_1_m_dbm": (-150.0, 50.0),
+    "RadioParameters.path_loss_exponent": (1.0, 10.0),
+    "RadioParameters.fading_db": (0.0, 30.0),
+    "CrossPowerParameters.ambiguous_share": (0.0, 1.0),
+    "PlumeSearchParameters.wait_s": (0.0, 86_400.0),
+    "PlumeSearchParameters.most_steps": (1, 1000),
+    "PlumeSearchParameters.gate_share": (0.0, 1.0),
+    "PlumeSearchParameters.address": (1, 3),
+    **{
+        f"SongRuleParameters.{field}_threshold": (0.0, 2.0)
+        for field in ("initial", "turning", "reverse")
+    },
+    "SongRuleParameters.airflow_threshold": (1e-9, 1e6),
+    **{
+        f"SongRuleParameters.{field}_turn_deg": (0.0, 180.0)
+        for field in ("upwind", "gradient", "local")
+    },
+    "UpwindGradientParameters.largest_lean_deg": (0.0, 90.0),
+    "UpwindGradientParameters.lost_share": (0.0, 1.0),
+    "UpwindGradientParameters.cast_deg": (45.0, 180.0),
+    "UpwindGradientParameters.still_air": (1e-9, 1e6),
+    "SoundSearchParameters.caller": (1, 3),
+    "SoundSearchParameters.address": (1, 3),
+    "SoundSearchParameters.waits_for": (0, 3),
+    "SoundSearchParameters.noise_s": (0.0, 86_400.0),
+    "SoundSearchParameters.tries": (1, 100),
+    "SoundSearchParameters.most_steps": (1, 1000),
 }
 #: Least and greatest length of texts and lists.
 LENGTHS = {
@@ -173,6 +248,9 @@ LENGTHS = {
     "ObstacleParameters.waypoints_m": (None, 1000),
     "SourceRobotParameters.waypoints_m": (None, 1000),
     "RobotParameters.microphones_m": (3, None),
+    "ContactParameters.faults": (None, 2),
+    "GasSensorParameters.faults": (None, 8),
+    "MicArrayParameters.faults": (None, 64),
 }
 #: A room, an obstacle and a guard of which nothing is said.
 DEFAULTS = {

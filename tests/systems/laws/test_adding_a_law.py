@@ -123,10 +123,11 @@ def answers(tmp_path_factory: pytest.TempPathFactory) -> Any:
 OURS = ["conventional", "active", "conventional2017", "active2017"]
 BASELINES = ["stop_when_near", "dwa", "vfh_plus", "mppi", "orca"]
 ON_ROUTES = [f"trajectory_{how}" for how in ("conventional", "adaptive", "filtered")]
+SEARCHES = ["plume_search", "sound_search"]
 
 
 def test_commands_name_it(answers):
-    names = ["none", *OURS, "gaussian", "guarded", *BASELINES, *ON_ROUTES]
+    names = ["none", *OURS, "gaussian", "guarded", *BASELINES, *ON_ROUTES, *SEARCHES]
     assert [law["name"] for law in answers["listed"]] == names
     assert answers["listed"][len(OURS) + 1]["title"] == "Gaussian law"
     assert ", ".join(names) in answers["unknown"]

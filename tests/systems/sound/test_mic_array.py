@@ -7,11 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame, Emission
 from systems.sound.acoustics import AcousticParameters
+from systems.sound.adc import MicrophoneFaultParameters
 from systems.sound.mic_array import MicArray, MicArrayParameters
 from systems.sound.recorder import microphones_B
 
@@ -302,3 +305,35 @@ def test_source_out_of_reach_is_refused(sounding):
     """In silence, too: sound from before the emission might arrive."""
     with pytest.raises(ValueError, match=r"MicArray.*maximum_range_m"):
         recorded(emission((60.0, 0.0), sounding=sounding))
+
+
+def test_dead_and_frozen_microphones_fail_from_their_time_on():
+    """Dead is 0, frozen a quarter of full scale; the others do not change."""
+    faults = (
+        MicrophoneFaultParameters(microphone=1, start_s=0.4),
+        MicrophoneFaultParameters(microphone=2, kind="frozen"),
+        MicrophoneFaultParameters(microphone=3, start_s=TIME),
+    )
+    sound = recorded(emission((1.5, 1.2)), parameters=quiet())
+    faulty = recorded(emission((1.5, 1.2)), parameters=quiet(faults=faults))
+    assert np.all(faulty.counts[0] == 0)
+    assert np.all(faulty.counts[1] == 2**13)
+    np.testing.assert_array_equal(faulty.counts[2], sound.counts[2])
+
+
+def test_faults_of_no_microphone_or_twice_of_one_are_refused():
+    fault = MicrophoneFaultParameters(microphone=4)
+    with pytest.raises(InputError, match="4 of 3; give a number from 1 to 3"):
+        MicArray(parameters=quiet(faults=(fault,)))
+    with pytest.raises(ValidationError, match="two faults of one"):
+        quiet(faults=(fault, fault))
+
+
+def test_frames_of_32_khz_hold_the_same_sound():
+    """800 samples in 25 ms: each is that of 100 kHz, wherever the instants meet."""
+    fine, coarse = (
+        recorded(emission((1.5, 1.2)), parameters=quiet(sample_rate_hz=rate))
+        for rate in (96_000.0, 32_000.0)
+    )
+    assert coarse.counts.shape == (3, 800)
+    np.testing.assert_allclose(coarse.counts, fine.counts[:, ::3], atol=2)

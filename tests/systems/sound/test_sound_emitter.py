@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
@@ -9,7 +11,14 @@ from pydrake.systems.framework import DiagramBuilder
 
 from systems.base.source_robot import SourceRobot, SourceRobotParameters
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.sound_emitter import SoundEmitter, emitted_samples
+from systems.sound.adc import MicArrayParameters
+from systems.sound.mic_array import MicArray
+from systems.sound.sound_emitter import (
+    SoundEmitter,
+    emissions_along,
+    emitted_samples,
+    history_ticks,
+)
 from systems.sound.waveforms import SoundParameters, make_waveform
 
 FS = 100_000
@@ -112,3 +121,97 @@ def test_emission_cannot_be_changed():
     for array in (emission.samples, emission.p_WS, emission.v_WS):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 1.0
+
+
+def test_called_on_it_plays_from_that_tick_as_one_that_starts_then():
+    """Called at 0.1 s: nothing has left it before, and then its schedule begins."""
+    sound = SoundParameters(on_s=0.2, period_s=0.4)
+    late = SoundParameters(on_s=0.2, period_s=0.4, start_s=0.1)
+    emissions: dict[str, Any] = {}
+    for name, own, called in (("called", sound, True), ("clock", late, False)):
+        block = SoundEmitter(sound=own, called=called)
+        context = block.CreateDefaultContext()
+        for port in ("pose_WS", "v_WS"):
+            block.GetInputPort(port).FixValue(context, [0.0] * 3)
+        simulator = Simulator(block, context)
+        if called:
+            block.GetInputPort("calling").FixValue(context, [0.0])
+            simulator.AdvanceTo(0.09)
+            quiet: Any = block.GetOutputPort("emission").Eval(context)
+            assert not quiet.sounding
+            block.GetInputPort("calling").FixValue(context, [1.0])
+        simulator.AdvanceTo(0.28)
+        emissions[name] = block.GetOutputPort("emission").Eval(context)
+    assert np.any(emissions["clock"].samples)
+    assert np.array_equal(emissions["called"].samples, emissions["clock"].samples)
+
+
+def heard_1_7_m_away(emitter, calling_from_s=None):
+    """Counts at ticks of 25 ms of a robot that stands 1.7 m from a loudspeaker."""
+    builder = DiagramBuilder()
+    quiet = MicArrayParameters(snr_db_at_1m=150.0, adc_bits=16)
+    source, array = (
+        builder.AddSystem(emitter),
+        builder.AddSystem(MicArray(parameters=quiet)),
+    )
+    builder.Connect(source.GetOutputPort("emission"), array.GetInputPort("emission"))
+    simulator = Simulator(builder.Build())
+    contexts = [
+        block.GetMyMutableContextFromRoot(simulator.get_mutable_context())
+        for block in (source, array)
+    ]
+    # The middle microphone stands 0.175 m ahead of the axle.
+    source.GetInputPort("pose_WS").FixValue(contexts[0], [1.875, 0.0, 0.0])
+    source.GetInputPort("v_WS").FixValue(contexts[0], [0.0] * 3)
+    for name in ("pose_WB", "velocity_WB"):
+        array.GetInputPort(name).FixValue(contexts[1], [0.0] * 3)
+    frames = []
+    for tick in range(12):
+        if calling_from_s is not None:
+            on = tick * 0.025 > calling_from_s - 1e-9
+            source.GetInputPort("calling").FixValue(contexts[0], [float(on)])
+        simulator.AdvanceTo(tick * 0.025)
+        audio: Any = array.GetOutputPort("audio").Eval(contexts[1])
+        simulator.AdvancePendingEvents()
+        frames.append(audio.counts)
+    return np.concatenate(frames, axis=1)
+
+
+def test_a_call_is_heard_once_it_has_travelled_and_as_exactly_as_a_clock():
+    """1.7 m take 5 ms; the second tick of 25 ms begins the call at 0.1 s."""
+    sound = SoundParameters(on_s=0.05, period_s=0.1)
+    late = sound.model_copy(update={"start_s": 0.1})
+    called = heard_1_7_m_away(SoundEmitter(sound=sound, called=True), 0.1)
+    clock = heard_1_7_m_away(SoundEmitter(sound=late))
+    np.testing.assert_array_equal(called, clock)
+    # The first frame ends at 0 s.
+    times = (np.arange(called.shape[1]) - 2_500) / FS
+    assert not called[:, times < 0.1049].any()
+    assert called[1, (times > 0.1052) & (times < 0.11)].any()
+
+
+def test_a_called_sound_of_a_loop_is_that_of_the_block():
+    """What a compiled run hears, at every tick, from when the call was noted."""
+    sound = SoundParameters(on_s=0.2, period_s=0.4)
+    block = SoundEmitter(sound=sound, called=True)
+    context = block.CreateDefaultContext()
+    for port in ("pose_WS", "v_WS"):
+        block.GetInputPort(port).FixValue(context, [0.0] * 3)
+    ticks = history_ticks(30.0, 340.0)
+    since: list[float | None] = [None]
+    path = np.zeros((ticks + 12, 2))
+    emission = emissions_along(
+        path, path, make_waveform(sound), sound, ticks, on_since_s=lambda: since[0]
+    )
+    simulator = Simulator(block, context)
+    for tick in range(12):
+        block.GetInputPort("calling").FixValue(context, [float(tick >= 5)])
+        simulator.AdvanceTo(0.025 * tick)
+        simulator.AdvancePendingEvents()
+        if tick == 5:
+            since[0] = 0.125
+        own: Any = block.GetOutputPort("emission").Eval(context)
+        loop = emission(tick)
+        np.testing.assert_array_equal(own.samples, loop.samples)
+        assert own.start_time == loop.start_time
+        assert own.sounding == loop.sounding == (tick >= 5)

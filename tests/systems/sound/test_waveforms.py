@@ -13,7 +13,7 @@ from scipy.special import j0
 from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
 
 FS = 100_000
-KINDS = ("chirp", "band_noise", "tone", "horn")
+KINDS = ("chirp", "band_noise", "tone", "horn", "siren")
 EDGE = round(EDGE_S * FS)
 
 
@@ -75,6 +75,24 @@ def test_horn_is_two_reeds_a_major_third_apart():
     expected = n**-0.7 * np.abs(j0(2 * np.pi * f * 0.004 / 11.0))
     found = lines(samples, *f)
     np.testing.assert_allclose(found / found[0], expected / expected[0], rtol=0.01)
+
+
+@pytest.mark.parametrize(
+    ("time", "frequency"), [(0.0625, 825.0), (0.125, 1050.0), (0.375, 1050.0)]
+)
+def test_siren_sweeps_up_and_down_twice_a_second(time, frequency):
+    """600 to 1500 Hz in 0.25 s, and back; a square wave's third is a third."""
+    samples = make_waveform(SoundParameters(kind="siren", on_s=1.0))
+    middle = round(time * FS)
+    part = samples[middle - 2_000 : middle + 2_000] * np.hanning(4_000)
+    power = np.abs(np.fft.rfft(part)) ** 2
+    f = np.fft.rfftfreq(4_000, 1.0 / FS)
+    near = abs(f - frequency) < 0.5 * frequency
+    third = abs(f - 3.0 * frequency) < 0.9 * frequency
+    mean = np.sum(f[near] * power[near]) / power[near].sum()
+    assert mean == pytest.approx(frequency, abs=5.0)
+    share = power[third].sum() / power[near].sum()
+    assert share == pytest.approx(1.0 / 9.0, rel=0.05)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -1,0 +1,151 @@
+"""Panels of a search for the picture over time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from analysis.reporting.palette import COLOURS
+from diagrams import RunResult
+
+__all__ = ["call_time", "search_panels"]
+
+#: Names of what a robot is at, by number, of each kind of search.
+_PHASES = {
+    "song2011": ("", "1 initial", "2 upwind", "3 gradient", "4 local"),
+    "upwind_gradient": ("", "upwind", "across"),
+    "sound": ("", "waits", "holds", "listens", "computes", "moves", "over"),
+}
+
+
+def search_panels(result: RunResult) -> list[Callable[[Axes, RunResult], None]]:
+    """What a robot sensed and did, above its speeds.
+
+    Args:
+        result: Of one robot that searches.
+
+    Returns:
+        Panels, each called with its axes and the result.
+    """
+    if result.scenario.searches == "odor":
+        return [_distance, _gas, _airflow, _heading, _phase]
+    return [_distance, _bearing, _level, _heading, _phase]
+
+
+def call_time(result: RunResult) -> float | None:
+    """When a robot was called, as the sink has heard it.
+
+    Args:
+        result: Of one robot, or of all.
+
+    Returns:
+        s; None where nobody calls.
+    """
+    times = [
+        float(result.time[np.argmax(values > 0.5)])
+        for name, values in result.world.items()
+        if name.endswith(".result") and (values > 0.5).any()
+    ]
+    return min(times, default=None)
+
+
+def _distance(axes: Axes, result: RunResult) -> None:
+    columns, stop = result.columns, result.scenario.stop
+    smells = result.scenario.searches == "odor"
+    away = np.hypot(*(result.vector("p_WB") - result.vector("p_WS")))
+    axes.plot(result.time, away, color=COLOURS["source"], label="true")
+    if "source_range" in columns:
+        heard = columns["source_range"]
+        axes.plot(
+            result.time, heard, ".", ms=3, color=COLOURS["estimate"], label="heard"
+        )
+    found = stop.odor_within_m if smells else stop.sound_within_m
+    axes.axhline(found, color="black", ls="--", lw=1.0, label="found within")
+    axes.set_ylabel("range of\nsource (m)")
+    axes.set_ylim(0.0, 1.1 * max(found, float(np.max(away))))
+
+
+def _gas(axes: Axes, result: RunResult) -> None:
+    for name, label, colour in (
+        ("gas_left", "R3, left", "left"),
+        ("gas_right", "R1, right", "right"),
+        ("gas_rear", "R2, rear", "empty"),
+    ):
+        values = result.columns[name]
+        axes.plot(result.time, values, color=COLOURS[colour], lw=0.9, label=label)
+    axes.set_ylabel("gas, Rs/R0")
+
+
+def _airflow(axes: Axes, result: RunResult) -> None:
+    for name, label, colour in (
+        ("airflow_left", "F1, left", "left"),
+        ("airflow_right", "F2, right", "right"),
+    ):
+        values = result.columns[name]
+        axes.plot(result.time, values, color=COLOURS[colour], lw=0.7, label=label)
+    if result.scenario.search.rules == "song2011":
+        threshold = result.scenario.search.song2011.airflow_threshold
+        axes.axhline(threshold, color="black", ls="--", lw=1.0, label="threshold")
+    axes.set_ylabel("airflow")
+    axes.set_ylim(bottom=0.0)
+
+
+def _bearing(axes: Axes, result: RunResult) -> None:
+    columns = result.columns
+    true = np.degrees(columns["source_bearing_true"])
+    true[1:][np.abs(np.diff(true)) > 180.0] = np.nan
+    axes.plot(result.time, true, color=COLOURS["source"], label="true")
+    heard = np.degrees(columns["source_bearing"])
+    axes.plot(result.time, heard, ".", ms=3, color=COLOURS["estimate"], label="heard")
+    axes.set_ylabel("bearing of\nsource (deg)")
+
+
+def _level(axes: Axes, result: RunResult) -> None:
+    level = result.columns["rssi_dbm"]
+    axes.plot(result.time, level, color=COLOURS["empty"], lw=0.6, label="radio")
+    axes.set_ylabel("level (dBm)")
+
+
+def _heading(axes: Axes, result: RunResult) -> None:
+    for name, label, colour, width in (
+        ("expected_heading_deg", "expected", "source", 1.4),
+        ("heading_deg", "compass", "robot", 0.7),
+    ):
+        values = result.columns[name].copy()
+        values[1:][np.abs(np.diff(values)) > 180.0] = np.nan
+        axes.plot(result.time, values, color=COLOURS[colour], lw=width, label=label)
+    axes.set_ylabel("heading\n(deg from north)")
+
+
+def _phase(axes: Axes, result: RunResult) -> None:
+    smells = result.scenario.searches == "odor"
+    names = _PHASES[result.scenario.search.rules if smells else "sound"]
+    phase = result.columns["search_phase"]
+    axes.plot(result.time, phase, color=COLOURS["robot"], lw=1.2, label="phase")
+    moves = result.columns["move"] > 0.5
+    axes.fill_between(
+        result.time,
+        0.5,
+        len(names) - 0.5,
+        where=moves.tolist(),
+        color=COLOURS["seen"],
+        alpha=0.2,
+        lw=0.0,
+        label="moves",
+    )
+    if "listening" in result.columns:
+        listens = result.columns["listening"] > 1.5
+        axes.fill_between(
+            result.time,
+            0.5,
+            len(names) - 0.5,
+            where=listens.tolist(),
+            color=COLOURS["echo"],
+            alpha=0.3,
+            lw=0.0,
+            label="listens",
+        )
+    axes.set_yticks(range(1, len(names)), names[1:])
+    axes.set_ylim(0.5, len(names) - 0.5)

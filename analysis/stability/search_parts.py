@@ -1,0 +1,103 @@
+"""Parts of the stability report of a robot that searches step by step."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+from analysis.linear.heading_loop import HeadingLoopMargins, heading_loop_margins
+from analysis.reporting.html_page import bullets, number, paragraph, table
+from analysis.stability.law_analysis import Part, Study
+from analysis.stability.verdict_readings import Reading
+from analysis.stability.verdicts import Criterion
+
+__all__ = ["SEARCH_CRITERIA", "search_parts"]
+
+_MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
+
+
+def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
+    """The heading loop; and what the report has not.
+
+    Args:
+        left_out: Titles of the parts of a robot that follows a sound.
+
+    Returns:
+        In the report's order.
+    """
+    titles = tuple(left_out)
+    return (
+        Part("heading_loop", "The loop of the heading", _heading_loop, _render),
+        Part("left_out", "What this report has not", lambda _: titles, _render_left),
+    )
+
+
+def _heading_loop(study: Study) -> HeadingLoopMargins:
+    scenario = study.scenario
+    return heading_loop_margins(
+        scenario.heading_control,
+        scenario.motor_driver,
+        scenario.robot,
+        scenario.plant.motor_lag_s,
+        scenario.tick_s,
+    )
+
+
+def _render(data: HeadingLoopMargins, name: str) -> list[str]:
+    return [
+        paragraph(
+            "A searching robot stands, decides on a heading, and turns to it while it "
+            "drives: compass, PID, pulse widths, motors and the heading that comes of "
+            "the wheels, with the PID and the motors held over a tick. The loop is cut "
+            "at the deviation. Within L and all limits it is linear; a larger one "
+            "turns on the spot, slower than the linear loop would. Steps, phases and "
+            "finds are no matter of linear models: docs/olfaction.md has their shares."
+        ),
+        table(
+            ["crossover (rad/s)", "phase margin (deg)", "delay margin (s)",
+             "delay margin (ticks)", "gain margin (dB)", "lost by sampling (deg)"],
+            [[data.crossover_rad_s, data.phase_margin_deg, data.delay_margin_s,
+              data.delay_margin_ticks, data.gain_margin_db, data.phase_lost_deg]],
+            caption=f"At a tick of {number(1e3 * data.tick_s)} ms",
+        ),
+    ]  # fmt: skip
+
+
+def _render_left(data: Sequence[str], name: str) -> list[str]:
+    return [
+        paragraph(
+            "A search has no virtual mass, no springs and no equilibrium: the parts of "
+            "robots that follow a sound do not apply."
+        ),
+        bullets(list(data)),
+    ]
+
+
+def _of(name: str) -> Callable[[Study], Reading]:
+    def read(study: Study) -> Reading:
+        data = study.found.get("heading_loop")
+        return float(getattr(data, name)) if data else "it was not computed"
+
+    return read
+
+
+#: What is asked of the heading loop, and what is read for it.
+SEARCH_CRITERIA: Mapping[Criterion, Callable[[Study], Reading]] = {
+    Criterion(
+        "phase margin of the heading", "deg", "at least", 45.0,
+        "it turns to its heading without swinging",
+        "it swings about its heading",
+        _MARGINS,
+    ): _of("phase_margin_deg"),
+    Criterion(
+        "gain margin of the heading", "dB", "at least", 6.0,
+        "motors may be twice as strong",
+        "motors of less than twice the strength make it unstable",
+        _MARGINS,
+    ): _of("gain_margin_db"),
+    Criterion(
+        "delay margin of the heading", "ticks", "at least", 4.0,
+        "four more ticks of delay do no harm",
+        "less than four more ticks of delay make it oscillate",
+        "ours: four ticks",
+    ): _of("delay_margin_ticks"),
+}  # fmt: skip

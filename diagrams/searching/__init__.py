@@ -1,0 +1,3 @@
+"""Robots that search step by step, and what they share."""
+
+__all__: list[str] = []

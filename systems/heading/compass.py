@@ -1,0 +1,155 @@
+"""The magnetic compass: heading from two components of the field."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from pydantic import Field, Strict
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.parameters import Angle, Parameters
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step, StepBlock
+
+__all__ = [
+    "CompassParameters",
+    "MagneticHeading",
+    "field_in_body",
+    "heading_of_field",
+    "magnetic_heading_step",
+]
+
+_Part = Annotated[float, Field(ge=-0.9, le=0.9)]
+_Gain = Annotated[float, Field(ge=0.1, le=10.0)]
+
+
+class CompassParameters(Parameters):
+    """Where north is, and what bends the field; nothing of it is printed."""
+
+    north_deg: Angle = 90.0
+    """Direction of magnetic north in W, deg CCW from its x axis."""
+    hard_iron: Annotated[tuple[_Part, _Part], Strict(False)] = (0.0, 0.0)
+    """Field of the robot itself along x and y of B, as a share of the earth's level
+    one: 0.02, 0.05, 0.1 turn the heading by up to 1.1, 2.9, 5.7 deg."""
+    soft_iron: Annotated[tuple[_Gain, _Gain], Strict(False)] = (1.0, 1.0)
+    """By what the components along x and y of B are multiplied."""
+    noise_deg: float = Field(default=0.5, ge=0.0, le=90.0)
+    """Standard deviation of the heading, deg."""
+
+
+@register_jitable
+def field_in_body(theta: float, numbers: Any) -> tuple[float, float]:
+    """The level field that the sensor feels.
+
+    Args:
+        theta: Heading of B in W, rad CCW.
+        numbers: Has ``north_deg``, ``hard_iron`` and ``soft_iron``.
+
+    Returns:
+        (Hx, Hy) along x and y (left) of B, as shares of the earth's.
+    """
+    north = math.radians(numbers.north_deg) - theta
+    hx = numbers.soft_iron[0] * math.cos(north) + numbers.hard_iron[0]
+    hy = numbers.soft_iron[1] * math.sin(north) + numbers.hard_iron[1]
+    return hx, hy
+
+
+@register_jitable
+def heading_of_field(hx: float, hy: float) -> float:
+    """Heading from the field (Song 2011, eq. 7).
+
+    The printed ratio alone is wrong in two quadrants.
+
+    Args:
+        hx: Component ahead.
+        hy: Component to the left.
+
+    Returns:
+        Clockwise from magnetic north, (-180, 180] deg.
+    """
+    return math.degrees(math.atan2(hy, hx))
+
+
+class CompassNumbers(NamedTuple):
+    """What the step of ``MagneticHeading`` depends on."""
+
+    own: CompassParameters
+    noise: TickNoise
+
+
+@register_jitable
+def magnetic_heading_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: CompassNumbers
+) -> None:
+    """Heading of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: None.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``CompassNumbers``.
+    """
+    hx, hy = field_in_body(inputs[0][2], numbers.own)
+    heading = heading_of_field(hx, hy)
+    if numbers.own.noise_deg > 0.0:
+        normals = np.empty((1, 2), dtype=np.float32)
+        fill_with_tick_noise(numbers.noise, tick, normals)
+        heading += numbers.own.noise_deg * float(normals[0, 0])
+    heading = 180.0 - (180.0 - heading) % 360.0
+    outputs[0][0] = heading
+
+
+class MagneticHeading(LeafSystem, StepBlock):
+    """Measures the heading by the earth's magnetic field.
+
+    .. pydrake_system::
+
+        name: MagneticHeading
+        input_ports:
+        - pose_WB [m, m, rad]
+        output_ports:
+        - heading_deg [deg, clockwise from north]
+
+    Song's headings are clockwise; this block and ``HeadingController`` are the only
+    ones that turn between them and the counter-clockwise angles of W.
+
+    No state; noise is drawn every tick. Latency: none.
+
+    Args:
+        parameters: ``CompassParameters``.
+        seed: Of the noise.
+        tick_s: Period of the robot, s.
+
+    Reference: Song 2011, eq. 7, by an arctangent of two arguments.
+    """
+
+    FACTS = BlockFacts("compass", "control", columns={"heading_deg": ("heading_deg",)})
+
+    def __init__(
+        self,
+        *,
+        parameters: CompassParameters | None = None,
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        numbers = CompassNumbers(parameters or CompassParameters(), tick_noise(seed))
+        self.set_name("magnetic_heading")
+        self.declare_step(
+            float,
+            Step(magnetic_heading_step, numbers),
+            (("pose_WB", 3),),
+            (("heading_deg", 1),),
+            tick_s,
+        )
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        noise = tick_noise(run.seed_of(self.get_name()))
+        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))

@@ -1,0 +1,211 @@
+"""From a wanted heading to the motors' duties: PID and pulse widths."""
+
+from __future__ import annotations
+
+from typing import Any, Literal, NamedTuple
+
+from numba.extending import register_jitable
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import NonNegative, Parameters, Positive
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
+
+__all__ = [
+    "PULSE_WIDTHS",
+    "HeadingControlParameters",
+    "HeadingController",
+    "heading_controller_step",
+    "heading_error",
+    "motor_duties",
+    "wrapped_deg",
+]
+
+#: How an error becomes duties: mended, as printed, and with the missing ``else`` alone.
+PULSE_WIDTHS = ("mended", "printed", "else_only")
+_MENDED, _PRINTED, _ELSE_ONLY = range(len(PULSE_WIDTHS))
+
+
+class HeadingControlParameters(Parameters):
+    """Gains and limits (Song 2011, 2.3.2 and tables 1 and 2)."""
+
+    proportional: NonNegative = 2.0
+    """K_P."""
+    integral: NonNegative = 0.5
+    """K_I, 1/s."""
+    differential: NonNegative = 0.01
+    """K_D, s."""
+    integral_within_deg: NonNegative = 20.0
+    """The integral grows where the deviation is smaller, deg; else it is 0."""
+    largest_integral_deg: NonNegative = 30.0
+    """Limit of the integral part, deg."""
+    largest_differential_deg: NonNegative = 20.0
+    """Limit of the differential part, deg."""
+    largest_error_deg: Positive = 100.0
+    """Limit of the output, deg: in the text, not in table 1."""
+    turning_beyond_deg: Positive = 50.0
+    """L: beyond, the wheels turn against one another, deg."""
+    pulse_widths: Literal["mended", "printed", "else_only"] = "mended"
+    """``mended``: duties go from full ahead to turning on the spot without a jump;
+    ``printed``: table 2, which drives backwards; ``else_only``: with its missing
+    ``else`` alone."""
+
+
+@register_jitable
+def wrapped_deg(angle: float) -> float:
+    """An angle in (-180, 180] deg.
+
+    Args:
+        angle: deg.
+    """
+    return 180.0 - (180.0 - angle) % 360.0
+
+
+@register_jitable
+def _limited(value: float, largest: float) -> float:
+    return min(max(value, -largest), largest)
+
+
+@register_jitable
+def heading_error(
+    deviation: float, change: float, integral: float, tick_s: float, own: Any
+) -> tuple[float, float]:
+    """Output of the PID (Song 2011, table 1).
+
+    Args:
+        deviation: gamma, expected less present heading, (-180, 180] deg.
+        change: Of it since the last tick, wrapped, deg.
+        integral: I of the last tick, deg.
+        tick_s: s.
+        own: ``HeadingControlParameters``.
+
+    Returns:
+        epsilon, deg, and I.
+    """
+    if abs(deviation) < own.integral_within_deg:
+        integral += own.integral * deviation * tick_s
+        integral = _limited(integral, own.largest_integral_deg)
+    else:
+        integral = 0.0
+    rate = own.differential * change / tick_s
+    rate = _limited(rate, own.largest_differential_deg)
+    total = own.proportional * deviation + integral + rate
+    return _limited(total, own.largest_error_deg), integral
+
+
+@register_jitable
+def motor_duties(error: float, limit: float, kind: int) -> tuple[float, float]:
+    """Duties of the motors (Song 2011, table 2).
+
+    Mended it is v = max(0, 1 - |e|/L), w = 0.01 e, left and right v + w and v - w.
+
+    Args:
+        error: epsilon, clockwise, deg.
+        limit: L, deg.
+        kind: Place in ``PULSE_WIDTHS``.
+
+    Returns:
+        Left and right; beyond -1 to 1 as printed.
+    """
+    if kind == _MENDED:
+        ahead, turn = max(0.0, 1.0 - abs(error) / limit), 0.01 * error
+        return ahead + turn, ahead - turn
+    left, right = 0.01 * error, -0.01 * error
+    if kind == _ELSE_ONLY and abs(error) > limit:
+        return left, right
+    if error >= 0.0:
+        left = (0.01 - 1.0) / limit * error + 1.0
+        right = -(0.01 + 1.0 / limit) * error + 1.0
+    else:
+        left = (0.01 + 1.0) / limit * error + 1.0
+        right = (-0.01 + 1.0 / limit) * error + 1.0
+    return left, right
+
+
+class HeadingNumbers(NamedTuple):
+    """What the step of ``HeadingController`` depends on."""
+
+    own: HeadingControlParameters
+    kind: int
+    tick_s: float
+
+
+@register_jitable
+def heading_controller_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: HeadingNumbers
+) -> None:
+    """Duties of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: Integral, deviation at the last tick, both in deg, and whether it moved.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``HeadingNumbers``.
+    """
+    expected, heading, move = inputs
+    duty = outputs[0]
+    if move[0] < 0.5:
+        state[0], state[2] = 0.0, 0.0
+        duty[0], duty[1] = 0.0, 0.0
+        return
+    deviation = wrapped_deg(expected[0] - heading[0])
+    change = wrapped_deg(deviation - state[1]) if state[2] > 0.5 else 0.0
+    own = numbers.own
+    error, state[0] = heading_error(deviation, change, state[0], numbers.tick_s, own)
+    state[1], state[2] = deviation, 1.0
+    left, right = motor_duties(error, own.turning_beyond_deg, numbers.kind)
+    duty[0], duty[1] = _limited(left, 1.0), _limited(right, 1.0)
+
+
+class HeadingController(LeafSystem, StepBlock):
+    """Turns the robot to a heading, and drives it on as it comes near to it.
+
+    .. pydrake_system::
+
+        name: HeadingController
+        input_ports:
+        - expected_heading_deg [deg, clockwise from north]
+        - heading_deg [deg, clockwise from north]
+        - move [0 or 1]
+        output_ports:
+        - duty [1, left and right, -1 to 1]
+
+    A PID of the deviation, and a map from its output to the motors' duties; while
+    ``move`` is 0 they rest. The deviation's change is wrapped, and 0 at the first tick
+    of a move, so that the differential part has no kick there; the integral begins
+    anew.
+
+    Discrete state, every tick: integral, last deviation, and whether it moved. Latency:
+    none. The paper's period is 10 ms; the tick's 25 ms cost a degree of margin
+    (``analysis.linear.heading_loop``).
+
+    Args:
+        parameters: ``HeadingControlParameters``.
+        tick_s: Period of the control, s.
+
+    Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata of docs/errata.md.
+    """
+
+    FACTS = BlockFacts(
+        "heading", "control", columns={"duty": ("duty_left", "duty_right")}
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: HeadingControlParameters | None = None,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own = parameters or HeadingControlParameters()
+        numbers = HeadingNumbers(own, PULSE_WIDTHS.index(own.pulse_widths), tick_s)
+        self.set_name("heading_controller")
+        self.declare_step(
+            float,
+            Step(heading_controller_step, numbers, [0.0] * 3),
+            (("expected_heading_deg", 1), ("heading_deg", 1), ("move", 1)),
+            (("duty", 2),),
+            tick_s,
+        )

@@ -1,0 +1,520 @@
+"""Hears where a source is from spectra gathered while the robot stands and listens."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.systems.framework import LeafSystem
+
+from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
+from systems.framework.finite import check_record, read_arrays
+from systems.framework.host_step import host_step
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Fraction, Frequency, Parameters
+from systems.framework.signals import AudioFrame
+from systems.framework.step_block import RunFacts, Step
+from systems.hearing.cross_powers import (
+    FINE,
+    CrossPowers,
+    FrameSpectra,
+    cross_correlations,
+    gather_frame,
+    signal_powers,
+)
+from systems.hearing.spherical_interpolation import (
+    interpolate_sphere,
+    near_or_far,
+    plane_wave_bearing,
+)
+from systems.hearing.steer_near import near_grid, steer
+from systems.sound.acoustics import AcousticParameters
+from systems.sound.adc import MicArrayParameters
+
+__all__ = [
+    "ArrayListener",
+    "CrossPowerEstimator",
+    "CrossPowerParameters",
+    "Direction",
+]
+
+#: Sound that fills fewer Hz than this repeats within the array: any bearing fits. A
+#: steady tone fills up to 310 Hz by its ends and its echoes, a siren some thousand.
+_LEAST_BANDWIDTH_HZ = 600.0
+#: Loudest and faintest channel that still hears, as a share of the median power.
+_DEAF = 1e-4
+#: Of what the occupied bins of all pairs would sum up to if they came from one place,
+#: sound reaches more than this,
+_COHERENT = 0.15
+#: and more than n bins of chance do: 4.6 over the root of 2 n, at most, in 30 silences.
+_CHANCE = 5.5
+#: Fewer frames than this are no estimate.
+_LEAST_FRAMES = 4
+
+
+class CrossPowerParameters(Parameters):
+    """How gathered spectra become a bearing."""
+
+    method: Literal["srp_near", "gcc_plane", "gcc_si"] = "srp_near"
+    """``srp_near``: steers all pairs at places near and far; ``gcc_plane``: delays of
+    all pairs between samples, a place where one can be believed, else a plane wave;
+    ``gcc_si``: whole samples, three pairs and spherical interpolation, as printed."""
+    low_hz: Frequency = 200.0
+    """Lower edge of what is heard, Hz (Song 2011, 4.3)."""
+    high_hz: Frequency = 8_000.0
+    """Upper edge, Hz (4.3)."""
+    noise_cross_power: bool = True
+    """Whether the cross powers of the noise before are subtracted (4.3)."""
+    ambiguous_share: Fraction = 0.9
+    """Another direction whose response is this share of the strongest is as good."""
+
+
+class Direction(NamedTuple):
+    """What was heard."""
+
+    bearing: float
+    """From the middle microphone, CCW from x of B, rad."""
+    place: NDArray[np.float64] | None = None
+    """(2,) from the middle microphone in B, m; None where only the bearing is known."""
+    ambiguous: bool = False
+    """Whether other directions fit as well."""
+    other: float = 0.0
+    """The best of them, rad."""
+
+
+class ArrayListener:
+    """Gathers and estimates, without a context.
+
+    Args:
+        parameters: How.
+        robot: Places of the microphones, the first one in the middle.
+        c: Speed of sound, m/s.
+        microphones: Rate and length of the frames.
+
+    Raises:
+        InputError: There are fewer than four microphones, or the band is none.
+    """
+
+    def __init__(
+        self,
+        parameters: CrossPowerParameters,
+        robot: RobotParameters,
+        c: float,
+        microphones: MicArrayParameters,
+    ) -> None:
+        places = np.array(robot.microphones_m)
+        if len(places) < 4:
+            raise InputError(
+                "robot.microphones_m",
+                f"has {len(places)} microphones; give four or more, the first in the "
+                "middle",
+            )
+        top = min(parameters.high_hz, 0.5 * microphones.sample_rate_hz)
+        if parameters.low_hz >= top:
+            raise InputError(
+                "cross_power.low_hz",
+                f"{parameters.low_hz:g} Hz is not below {top:g} Hz, the upper edge or "
+                "half the sample rate; lower it",
+            )
+        self._own, self._c = parameters, c
+        self.band_hz = parameters.low_hz, top
+        self.p_PR_B = places[0]
+        """(2,) of the middle microphone from P in B axes, m."""
+        self.p_RM = places - places[0]
+        """(n, 2) microphones from that one, m."""
+        self.facts = FrameSpectra(
+            len(places), microphones.frame_samples, microphones.sample_rate_hz, top
+        )
+        self.sample_rate_hz = microphones.sample_rate_hz
+
+    @cached_property
+    def sums_size(self) -> int:
+        """Numbers of one ``CrossPowers``."""
+        facts = self.facts
+        return 1 + facts.bins * (2 * len(facts.pairs) + facts.channels)
+
+    def pack(self, sums: CrossPowers) -> NDArray[np.float64]:
+        """Sums as (sums_size,) numbers."""
+        pairs = np.ascontiguousarray(sums.pairs).view(np.float64).ravel()
+        return np.concatenate(([sums.frames], pairs, sums.own.ravel()))
+
+    def unpack(self, numbers: NDArray[np.float64]) -> CrossPowers:
+        """Sums from (sums_size,) numbers."""
+        facts = self.facts
+        split = 1 + 2 * len(facts.pairs) * facts.bins
+        pairs = np.ascontiguousarray(numbers[1:split]).view(np.complex128)
+        return CrossPowers(
+            pairs.reshape(-1, facts.bins),
+            numbers[split:].reshape(-1, facts.bins),
+            float(numbers[0]),
+        )
+
+    def lost(self, sound: CrossPowers) -> list[int]:
+        """Channels that hear nothing at all.
+
+        Args:
+            sound: Gathered while it sounded.
+
+        Returns:
+            Their numbers, from 0.
+        """
+        power = sound.own.sum(axis=1)
+        return np.flatnonzero(power <= _DEAF * np.median(power)).tolist()
+
+    def direction(self, sound: CrossPowers, noise: CrossPowers) -> Direction | None:
+        """Where the sound comes from.
+
+        Args:
+            sound: Gathered while it sounded.
+            noise: Gathered before; it may hold no frame.
+
+        Returns:
+            None where nothing is heard, or too few microphones are left.
+        """
+        lost, facts = self.lost(sound), self.facts
+        if sound.frames < _LEAST_FRAMES or facts.channels - len(lost) < 3:
+            return None
+        heard = [
+            k for k, pair in enumerate(facts.pairs) if not {*pair}.intersection(lost)
+        ]
+        subtracted = noise if self._own.noise_cross_power else None
+        mean, occupied = signal_powers(facts, sound, subtracted, self.band_hz)
+        if not occupied[heard].any():
+            return None
+        narrow = self._bandwidth(occupied[heard]) < _LEAST_BANDWIDTH_HZ
+        size = np.maximum(np.abs(mean), 1e-300)
+        if self._own.method == "gcc_si":
+            inside = facts.frequencies_hz >= self.band_hz[0]
+            return self._printed(np.where(inside, mean / size, 0.0), lost)
+        weighted = np.where(occupied, mean / size, 0.0)
+        correlations = cross_correlations(facts, weighted)[heard]
+        pairs = [facts.pairs[k] for k in heard]
+        found = steer(
+            near_grid(self.p_RM, pairs, self._c),
+            correlations,
+            FINE * facts.rate_hz,
+        )
+        bins = 2.0 * float(occupied[heard].sum())
+        chance = 0.0 if narrow else _CHANCE * math.sqrt(bins)
+        if found.response < max(_COHERENT * bins, chance):
+            return None
+        delays = self._refined(correlations, found.delays)
+        bearing, place = self._interpolated(pairs, delays, lost)
+        if self._own.method == "srp_near":
+            bearing = found.bearing
+        ambiguous = narrow or found.other_share >= self._own.ambiguous_share
+        return Direction(bearing, place, ambiguous, found.other)
+
+    def _bandwidth(self, occupied: NDArray[np.bool_]) -> float:
+        """Hz that the sound fills, on the median pair."""
+        width = self.facts.rate_hz / self.facts.length
+        return float(np.median(occupied.sum(axis=1))) * width
+
+    def _refined(
+        self, correlations: NDArray[np.float64], delays: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(pairs,) delays of the peaks next to given ones, s."""
+        rate, length = FINE * self.facts.rate_hz, correlations.shape[1]
+        around = np.arange(-2 * FINE, 2 * FINE + 1)
+        refined = np.empty(len(delays))
+        for k, (pair, delay) in enumerate(zip(correlations, delays, strict=True)):
+            at = round(delay * rate) + around
+            values = pair[at % length]
+            m = min(max(int(values.argmax()), 1), len(values) - 2)
+            bend = values[m - 1] - 2.0 * values[m] + values[m + 1]
+            shift = 0.5 * (values[m - 1] - values[m + 1]) / bend if bend < 0.0 else 0.0
+            refined[k] = (at[m] + min(max(shift, -1.0), 1.0)) / rate
+        return refined
+
+    def _interpolated(
+        self,
+        pairs: list[tuple[int, int]],
+        delays: NDArray[np.float64],
+        lost: list[int],
+    ) -> tuple[float, NDArray[np.float64] | None]:
+        """Bearing and place from delays of pairs t_j - t_i, s."""
+        others = [k for k in range(self.facts.channels) if k not in lost]
+        base, *rest = others
+        rows = np.zeros((len(pairs), len(rest)))
+        for row, (i, j) in zip(rows, pairs, strict=True):
+            if j != base:
+                row[rest.index(j)] += 1.0
+            if i != base:
+                row[rest.index(i)] -= 1.0
+        d = self._c * (np.linalg.pinv(rows) @ delays)
+        p_RM = self.p_RM[rest] - self.p_RM[base]
+        if lost:  # three microphones know no range, and the middle may be gone
+            return plane_wave_bearing(p_RM, d), None
+        return near_or_far(p_RM, d)
+
+    def _printed(
+        self, weighted: NDArray[np.complex128], lost: list[int]
+    ) -> Direction | None:
+        """Whole samples, pairs with the middle, spherical interpolation."""
+        if lost:
+            return None
+        facts = self.facts
+        correlations = cross_correlations(facts, weighted, 1)
+        most = math.ceil(
+            np.linalg.norm(self.p_RM, axis=1).max() / self._c * facts.rate_hz
+        )
+        lags = np.arange(-most, most + 1)
+        d = []
+        for k, (i, _) in enumerate(facts.pairs):
+            if i == 0:
+                best = lags[int(correlations[k][lags].argmax())]
+                d.append(self._c * best / facts.rate_hz)
+        place, distance = interpolate_sphere(self.p_RM[1:], d)
+        if not math.isfinite(distance):
+            return Direction(plane_wave_bearing(self.p_RM[1:], d))
+        bearing = math.atan2(place[1], place[0])
+        known = place if distance > 0.0 else None
+        return Direction(bearing, known)
+
+
+#: Output ports and their sizes.
+_PORTS = (
+    ("source_bearing", 1),
+    ("source_range", 1),
+    ("p_PS_B", 2),
+    ("detected", 1),
+    ("range_valid", 1),
+    ("ambiguous", 1),
+    ("alternative_bearing", 1),
+    ("lost_microphone", 1),
+)
+_OUTPUTS = sum(size for _, size in _PORTS)
+_NOTHING, _NOISE, _SOUND = range(3)
+
+
+class _Memory(NamedTuple):
+    """What a frame leaves behind."""
+
+    asked: int
+    """What was asked for at the last frame."""
+    before: NDArray[np.float64]
+    """(channels, samples) the last frame, if it was gathered."""
+    noise: CrossPowers
+    sound: CrossPowers
+    outputs: NDArray[np.float64]
+
+
+class CrossPowerEstimator(LeafSystem):
+    """Hears where the source is, while it is told to listen.
+
+    .. pydrake_system::
+
+        name: CrossPowerEstimator
+        input_ports:
+        - audio [AudioFrame]
+        - listening [number, 0 nothing, 1 noise alone, 2 sound]
+        output_ports:
+        - source_bearing [rad]
+        - source_range [m]
+        - p_PS_B [m, m]
+        - detected [0 or 1]
+        - range_valid [0 or 1]
+        - ambiguous [0 or 1]
+        - alternative_bearing [rad]
+        - lost_microphone [number, 0 none]
+
+    Frames are gathered as cross-power spectra as long as ``listening`` asks for it,
+    those of noise and of sound apart; when it no longer asks for sound, the estimate of
+    what was gathered is put out, and stands until it asks again. Then, and where
+    nothing was heard, all outputs are zero but ``lost_microphone``, the first channel
+    that hears nothing at all. Bearing and range count from the middle microphone, the
+    first; p_PS_B from P, a unit vector where the range is not known. ``ambiguous`` says
+    that another direction, ``alternative_bearing``, fits as well, or that the sound
+    fills so little of the band that any would.
+
+    While it is not asked for, ``audio`` is not evaluated, and nobody has to make it.
+
+    State: the outputs, a group each, and sums of spectra. Rate and latency: updated
+    every ``frame_s`` of the microphones, and visible after it.
+
+    Args:
+        parameters: ``CrossPowerParameters``.
+        robot: Places of the microphones.
+        acoustics: Speed of sound.
+        microphones: Rate and length of the frames.
+
+    Raises:
+        InputError: As ``ArrayListener``.
+
+    Reference: Song 2011, 3.2, 4.3, eq. 9 to 17; the first two methods are ours.
+    """
+
+    FACTS = BlockFacts(
+        "hearing",
+        "hearing",
+        columns={
+            "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
+            "detected": ("detected",),
+            "range_valid": ("range_valid",),
+            "ambiguous": ("ambiguous",),
+            "lost_microphone": ("lost_microphone",),
+        },
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: CrossPowerParameters | None = None,
+        robot: RobotParameters | None = None,
+        acoustics: AcousticParameters | None = None,
+        microphones: MicArrayParameters | None = None,
+    ) -> None:
+        super().__init__()
+        self._microphones = microphones or MicArrayParameters()
+        self._listener = ArrayListener(
+            parameters or CrossPowerParameters(),
+            robot or RobotParameters(preset="song2011_hearing"),
+            (acoustics or AcousticParameters()).c,
+            self._microphones,
+        )
+        self.set_name("cross_power_estimator")
+        self._audio = self.DeclareAbstractInputPort(
+            name="audio", model_value=Value(object())
+        )
+        self._listening = self.DeclareVectorInputPort(name="listening", size=1)
+        for name, size in _PORTS:
+            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
+        facts = self._listener.facts
+        self.DeclareDiscreteState(1 + facts.channels * facts.samples)
+        self.DeclareDiscreteState(self._listener.sums_size)
+        self.DeclareDiscreteState(self._listener.sums_size)
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=self._microphones.frame_s, offset_sec=0.0, update=self._listen
+        )
+
+    def _blank(self) -> _Memory:
+        listener, facts = self._listener, self._listener.facts
+        none = listener.unpack(np.zeros(listener.sums_size))
+        frame = np.zeros((facts.channels, facts.samples))
+        return _Memory(_NOTHING, frame, none, none, np.zeros(_OUTPUTS))
+
+    def hear(self, asked: int, audio: Any, memory: _Memory) -> _Memory:
+        """What a frame leaves behind, whatever context the block is in.
+
+        Args:
+            asked: What ``listening`` says.
+            audio: Gives the frame; called only if it is asked for.
+            memory: What the last frame left.
+
+        Returns:
+            The new memory.
+
+        Raises:
+            InputError: The frame has another rate.
+        """
+        if asked == _NOTHING and memory.asked == _NOTHING:
+            return memory
+        blank = self._blank()
+        noise, sound, outputs = memory.noise, memory.sound, memory.outputs
+        if memory.asked == _SOUND and asked != _SOUND:
+            outputs = self._estimate(sound, noise)
+        if asked == _NOTHING:
+            return memory._replace(asked=asked, outputs=outputs)
+        frame = self._counts(audio())
+        if asked != memory.asked:  # the first frame has none before it
+            if asked == _NOISE:
+                return memory._replace(
+                    asked=asked, before=frame, noise=blank.noise, outputs=outputs
+                )
+            return _Memory(asked, frame, noise, blank.sound, blank.outputs)
+        facts = self._listener.facts
+        if asked == _NOISE:
+            noise = gather_frame(facts, noise, memory.before, frame)
+        else:
+            sound = gather_frame(facts, sound, memory.before, frame)
+        return _Memory(asked, frame, noise, sound, outputs)
+
+    def _counts(self, audio: AudioFrame) -> NDArray[np.float64]:
+        rate = self._microphones.sample_rate_hz
+        if audio.sample_rate_hz != rate:
+            raise InputError(
+                "CrossPowerEstimator",
+                f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate:g} "
+                "Hz",
+            )
+        return audio.counts.astype(np.float64)
+
+    def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
+        outputs, listener = np.zeros(_OUTPUTS), self._listener
+        if sound.frames > 0.0 and (lost := listener.lost(sound)):
+            outputs[8] = 1.0 + lost[0]
+        found = listener.direction(sound, noise)
+        if found is None:
+            return outputs
+        outputs[0], outputs[4] = found.bearing, 1.0
+        outputs[2:4] = math.cos(found.bearing), math.sin(found.bearing)
+        if found.place is not None:
+            outputs[1], outputs[5] = float(np.linalg.norm(found.place)), 1.0
+            outputs[2:4] = listener.p_PR_B + found.place
+        outputs[6], outputs[7] = float(found.ambiguous), found.other
+        return outputs
+
+    def _listen(self, context: Any, discrete_state: Any) -> None:
+        memory = self._remembered(context)
+        asked = round(float(read_arrays(context, [self._listening])[0][0]))
+
+        def frame() -> AudioFrame:
+            audio = self._audio.Eval(context)
+            if not isinstance(audio, AudioFrame):
+                raise TypeError(
+                    f"CrossPowerEstimator: port audio carries a {type(audio).__name__};"
+                    " connect the audio of a MicArray"
+                )
+            check_record(context, self._audio, audio)
+            return audio
+
+        after = self.hear(asked, frame, memory)
+        if after is memory:
+            return
+        first = 0
+        for group, (_, size) in enumerate(_PORTS):
+            discrete_state.set_value(group, after.outputs[first : first + size])
+            first += size
+        groups = len(_PORTS)
+        head = np.concatenate(([float(after.asked)], after.before.ravel()))
+        discrete_state.set_value(groups, head)
+        pairs = (after.noise, memory.noise), (after.sound, memory.sound)
+        for group, (sums, old) in enumerate(pairs, start=groups + 1):
+            if sums is not old:
+                discrete_state.set_value(group, self._listener.pack(sums))
+
+    def _remembered(self, context: Any) -> _Memory:
+        groups, facts = len(_PORTS), self._listener.facts
+        head = context.get_discrete_state(groups).value()
+        noise, sound = (
+            self._listener.unpack(context.get_discrete_state(groups + k).CopyToVector())
+            for k in (1, 2)
+        )
+        outputs = np.concatenate(
+            [context.get_discrete_state(k).value() for k in range(groups)]
+        )
+        before = head[1:].reshape(facts.channels, facts.samples)
+        return _Memory(round(float(head[0])), before, noise, sound, outputs)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each frame of a compiled loop, ``Step``."""
+        if "audio" not in run.carried:
+            raise InputError(
+                "engine",
+                "frames of sound come to compiled loops from a MicArray alone; run "
+                "with engine drake",
+            )
+        audio, memory = run.carried["audio"], self._blank()
+
+        def listen(tick: int, inputs: Any, outputs: Any) -> None:
+            nonlocal memory
+            memory = self.hear(round(float(inputs[0])), lambda: audio(tick), memory)
+            outputs[:] = memory.outputs
+
+        period = round(self._microphones.frame_s / run.tick_s)
+        return host_step(listen, 1, _OUTPUTS, period)

@@ -1,0 +1,109 @@
+"""Bearing by steering the array at places around it, near ones included."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["NearGrid", "Steered", "near_grid", "steer"]
+
+#: Ranges of the grid, m, near and far: more of them find more echoes.
+_RANGES_M = (0.4, 3.0)
+#: Bearings of the grid are so far apart, deg; the peak is refined between them.
+_STEP_DEG = 2.0
+#: Another peak this far off is another direction, deg.
+_APART_DEG = 15.0
+
+
+class NearGrid(NamedTuple):
+    """Places around an array, and delays of sound from there."""
+
+    bearings: NDArray[np.float64]
+    """(b,) from the reference microphone, rad CCW from x."""
+    delays: NDArray[np.float64]
+    """(pairs, r, b) t_j - t_i, s."""
+
+
+class Steered(NamedTuple):
+    """Where the response is strongest."""
+
+    bearing: float
+    """rad."""
+    delays: NDArray[np.float64]
+    """(pairs,) of the strongest place, s."""
+    other: float
+    """Bearing of the strongest peak elsewhere, rad."""
+    other_share: float
+    """Its response over that of the strongest; 0: there is none."""
+    response: float
+    """Of the strongest place: the sum of the correlations there."""
+
+
+def near_grid(
+    p_RM: NDArray[np.float64], pairs: list[tuple[int, int]], c: float
+) -> NearGrid:
+    """The grid of an array.
+
+    Args:
+        p_RM: (n, 2) microphones from the reference one, m.
+        pairs: Of microphones.
+        c: Speed of sound, m/s.
+
+    Returns:
+        The grid.
+    """
+    bearings = np.radians(np.arange(-180.0, 180.0, _STEP_DEG))
+    unit = np.stack([np.cos(bearings), np.sin(bearings)])
+    places = np.multiply.outer(np.array(_RANGES_M), unit)  # (r, 2, b)
+    ways = np.linalg.norm(places[None] - p_RM[:, None, :, None], axis=2)
+    first, second = np.array(pairs).T
+    return NearGrid(bearings, (ways[second] - ways[first]) / c)
+
+
+def _wrapped(angle: Any) -> Any:
+    return np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
+
+
+def steer(
+    grid: NearGrid, correlations: NDArray[np.float64], fine_rate_hz: float
+) -> Steered:
+    """The strongest place of a grid.
+
+    Args:
+        grid: Places.
+        correlations: (pairs, n) over delays, 0 first, as ``cross_correlations`` gives.
+        fine_rate_hz: Points a second of them, Hz.
+
+    Returns:
+        The strongest bearing, between the grid's by a parabola, and the next one.
+    """
+    response = np.zeros(grid.delays.shape[1:])
+    length = correlations.shape[1]
+    for pair, delays in zip(correlations, grid.delays, strict=True):
+        at = delays * fine_rate_hz
+        low = np.floor(at).astype(int)
+        part = at - low
+        response += (1.0 - part) * pair[low % length] + part * pair[(low + 1) % length]
+    best = response.max(axis=0)
+    k = int(best.argmax())
+    row = int(response[:, k].argmax())
+    here, before, after = best[k], best[k - 1], best[(k + 1) % len(best)]
+    bend = before - 2.0 * here + after
+    shift = 0.5 * (before - after) / bend if bend < 0.0 else 0.0
+    bearing = grid.bearings[k] + shift * np.radians(_STEP_DEG)
+    off = np.abs(
+        np.remainder(grid.bearings - grid.bearings[k] + np.pi, 2 * np.pi) - np.pi
+    )
+    peak = (best >= np.roll(best, 1)) & (best >= np.roll(best, -1))
+    elsewhere = np.where(peak & (off > np.radians(_APART_DEG)), best, -np.inf)
+    other = int(elsewhere.argmax())
+    share = max(float(elsewhere[other]), 0.0) / here if here > 0.0 else 1.0
+    return Steered(
+        float(_wrapped(bearing)),
+        grid.delays[:, row, k],
+        float(grid.bearings[other]),
+        share,
+        float(here),
+    )

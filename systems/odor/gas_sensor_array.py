@@ -1,0 +1,274 @@
+"""Metal-oxide gas sensors on three arms."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydantic import Field, Strict, model_validator
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.finite import read_arrays
+from systems.framework.input_error import InputError
+from systems.framework.noise import (
+    BEFORE_THE_RUN,
+    TickNoise,
+    fill_with_tick_noise,
+    standard_normals,
+    tick_noise,
+)
+from systems.framework.parameters import (
+    Duration,
+    NonNegativeLength,
+    Parameters,
+    Point,
+    Positive,
+    Time,
+    with_preset,
+)
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.odor.odor_plume import PLUME_SIZE, concentration
+
+__all__ = [
+    "GasSensorArray",
+    "GasSensorFaultParameters",
+    "GasSensorParameters",
+    "gas_sensor_step",
+]
+
+_COUNT = 3
+_HOUR_S = 3_600.0
+_DEAD, _STUCK = 1, 2
+
+#: Time constants that differ from the paper's.
+_PRESETS = {
+    "song2011": {},
+    # GADEN's table of the TGS2620, ethanol.
+    "tgs2620": {"response_s": 2.96, "recovery_s": 15.71},
+}
+
+
+class GasSensorFaultParameters(Parameters):
+    """A gas sensor that fails in a run, and how."""
+
+    sensor: int = Field(default=1, ge=1, le=_COUNT)
+    """R1 right front, R2 rear, R3 left front."""
+    kind: Literal["dead", "stuck"] = "dead"
+    """``dead``: it reads 1, clean air, without noise; ``stuck``: what it read last."""
+    start_s: Time = 0.0
+    """When that begins, s."""
+
+
+class GasSensorParameters(Parameters):
+    """Three TGS2620 on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
+
+    preset: Literal["song2011", "tgs2620"] = "song2011"
+    """Time constants: the paper's, or those that GADEN has for the TGS2620."""
+    positions_m: Annotated[tuple[Point, Point, Point], Strict(False)] = (
+        (0.1, -0.1732),
+        (-0.2, 0.0),
+        (0.1, 0.1732),
+    )
+    """R1 right front, R2 rear, R3 left front, from the origin of B in its axes, m."""
+    height_m: NonNegativeLength = 0.0
+    """Above the floor, m."""
+    exponent: Positive = 0.7155
+    """Of Rs/R0 = (1 + C/C1)^-exponent: ethanol in GADEN's table."""
+    response_s: Duration = 2.5
+    """Time constant where the gas grows, s: 95 % in 7.5 s (2.3.3: 5 to 10)."""
+    recovery_s: Duration = 5.8
+    """Where it fades, s: 95 % in 17.4 s (2.3.3: 15 to 20)."""
+    noise: float = Field(default=0.003, ge=0.0, le=1.0)
+    """Standard deviation of a reading, as a share of it."""
+    mismatch: float = Field(default=0.01, ge=0.0, le=0.1)
+    """That of each sensor's R0, drawn once."""
+    slope_mismatch: float = Field(default=0.03, ge=0.0, le=0.15)
+    """That of each sensor's exponent, drawn once."""
+    drift_per_h: float = Field(default=0.0, ge=-0.03, le=0.03)
+    """Growth of all readings, as a share an hour."""
+    faults: Annotated[
+        tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
+    ] = ()
+    """Sensors that fail in a run."""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill(cls, data: Any) -> Any:
+        return with_preset(data, _PRESETS)
+
+    @model_validator(mode="after")
+    def _check(self) -> GasSensorParameters:
+        failing = [fault.sensor for fault in self.faults]
+        if len({*failing}) < len(failing):
+            raise InputError(
+                "faults", f"sensors {failing}: two faults of one; leave one of each"
+            )
+        return self
+
+
+class GasNumbers(NamedTuple):
+    """What the step of ``GasSensorArray`` depends on."""
+
+    positions: NDArray[np.float64]
+    """(3, 2) in B, m."""
+    height_m: float
+    scales: NDArray[np.float64]
+    """(3,) of R0."""
+    exponents: NDArray[np.float64]
+    """(3,)"""
+    response: float
+    """Share of the way that is gone in a tick where the gas grows."""
+    recovery: float
+    """And where it fades."""
+    noise_share: float
+    drift_per_s: float
+    faults: NDArray[np.float64]
+    """(3, 2) kind, 0 none, and since when, s, of each sensor."""
+    tick_s: float
+    noise: TickNoise
+
+
+@njit(cache=True)
+def _concentrations(
+    plume: Any, pose: Any, positions: Any, height: float, out: Any
+) -> None:  # pragma: no cover  (compiled)
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(len(positions)):
+        x, y = positions[k, 0], positions[k, 1]
+        place = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+        out[k] = concentration(plume, place[0], place[1], height)
+
+
+@register_jitable
+def gas_sensor_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: GasNumbers
+) -> None:
+    """Readings of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Ratio of each sensor without its noise, and its last reading.
+        inputs: As the input ports, as arrays.
+        outputs: As the output ports.
+        numbers: ``GasNumbers``.
+    """
+    ratios, truths = outputs
+    gas = np.empty(3)
+    _concentrations(inputs[0], inputs[1], numbers.positions, numbers.height_m, gas)
+    normals = np.empty((1, 4), dtype=np.float32)
+    fill_with_tick_noise(numbers.noise, tick, normals)
+    time = tick * numbers.tick_s
+    for k in range(3):
+        rest = (1.0 + gas[k]) ** -numbers.exponents[k]
+        share = numbers.response if rest < state[k] else numbers.recovery
+        state[k] += share * (rest - state[k])
+        value = state[k] * numbers.scales[k] * (1.0 + numbers.drift_per_s * time)
+        value *= 1.0 + numbers.noise_share * float(normals[0, k])
+        kind = numbers.faults[k, 0] if time >= numbers.faults[k, 1] else 0.0
+        if kind == _DEAD:
+            value = 1.0
+        elif kind == _STUCK:
+            value = state[3 + k]
+        state[3 + k] = value
+        ratios[k], truths[k] = value, gas[k]
+
+
+class GasSensorArray(LeafSystem, StepBlock):
+    """Smells at three places.
+
+    .. pydrake_system::
+
+        name: GasSensorArray
+        input_ports:
+        - plume [number, many, see systems.odor.odor_plume]
+        - pose_WB [m, m, rad]
+        output_ports:
+        - gas_ratio [1, right front, rear and left front]
+        - gas_concentration [1, shares of C1, in the same order]
+
+    A reading is Rs/R0: 1 in clean air, less in gas. It goes to
+    (1 + C/C1)^-exponent as a first order lag, faster where gas comes than where it
+    goes. ``gas_concentration`` is the truth behind it.
+
+    Discrete state, every tick: each sensor's ratio, and its last reading. Latency: none
+    but the lag.
+
+    Args:
+        parameters: ``GasSensorParameters``.
+        seed: Of noise and mismatch.
+        tick_s: Period of the robot, s.
+
+    Reference: Song 2011, 2.1, 2.3.3; power law and times of the TGS2620 from GADEN.
+    """
+
+    FACTS = BlockFacts(
+        "gas",
+        "obstacle sensing",
+        columns={
+            "gas_ratio": ("gas_right", "gas_rear", "gas_left"),
+            "gas_concentration": (
+                "concentration_right",
+                "concentration_rear",
+                "concentration_left",
+            ),
+        },
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: GasSensorParameters | None = None,
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self._own, self._period_s = parameters or GasSensorParameters(), tick_s
+        self.set_name("gas_sensor_array")
+        self.declare_step(
+            float,
+            self._step(seed),
+            (("plume", PLUME_SIZE), ("pose_WB", 3)),
+            (("gas_ratio", _COUNT), ("gas_concentration", _COUNT)),
+            tick_s,
+        )
+
+    def _step(self, seed: int) -> Step:
+        own, tick_s = self._own, self._period_s
+        drawn = standard_normals((2, _COUNT), seed, BEFORE_THE_RUN).astype(float)
+        faults = np.zeros((_COUNT, 2))
+        for fault in own.faults:
+            kind = _DEAD if fault.kind == "dead" else _STUCK
+            faults[fault.sensor - 1] = kind, fault.start_s
+        numbers = GasNumbers(
+            np.array(own.positions_m),
+            own.height_m,
+            1.0 + own.mismatch * drawn[0],
+            own.exponent * (1.0 + own.slope_mismatch * drawn[1]),
+            -math.expm1(-tick_s / own.response_s),
+            -math.expm1(-tick_s / own.recovery_s),
+            own.noise,
+            own.drift_per_h / _HOUR_S,
+            faults,
+            tick_s,
+            tick_noise(seed),
+        )
+        return Step(gas_sensor_step, numbers, [1.0] * (2 * _COUNT))
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        return self._step(run.seed_of(self.get_name()))
+
+    def _do_step(self, context: Any) -> tuple[Any, Any]:
+        # As arrays: lists of a plume's puffs would cost more than all the rest.
+        inputs = read_arrays(context, self._inputs)
+        state = context.get_discrete_state(0).value().tolist()
+        outputs = [[0.0] * size for size in self._sizes]
+        tick = round(context.get_time() / self._tick_s)
+        gas_sensor_step(tick, state, inputs, outputs, self.step.numbers)
+        return outputs, state

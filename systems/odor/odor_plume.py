@@ -1,0 +1,390 @@
+"""The plume of a source of odour: puffs that the wind carries, or their mean."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydantic import Field
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.finite import read_arrays
+from systems.framework.input_error import InputError
+from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.parameters import (
+    NonNegativeLength,
+    Parameters,
+    Time,
+)
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step
+from systems.odor.steady_plume import steady_concentration
+from systems.odor.wind import (
+    WIND_PERIOD_S,
+    WIND_SIZE,
+    WindParameters,
+    initial_wind,
+    wind_velocity,
+)
+
+__all__ = [
+    "MOST_PUFFS",
+    "PLUME_SIZE",
+    "PUFF",
+    "PUFFS_BEGIN",
+    "PUFF_SIZE",
+    "OdorParameters",
+    "OdorPlume",
+    "concentration",
+    "plume_step",
+    "release_rate",
+]
+
+#: Puffs that are kept, the youngest.
+MOST_PUFFS = 320
+#: Numbers of a puff: x, y in W, m; its own velocity, m/s; its spreads level and
+#: upright, m; what it holds.
+PUFF_SIZE = 7
+PUFF = ("x", "y", "vx", "vy", "level_spread", "upright_spread", "amount")
+_X, _Y, _VX, _VY, _LEVEL, _UPRIGHT, _AMOUNT = range(PUFF_SIZE)
+# The port ``plume``: background, kind, number of puffs, part of the next one, height of
+# the source, and how long it has been released, then the puffs.
+_BACKGROUND, _STEADY, _COUNT, _PART, _HEIGHT, _AGE = range(6)
+#: Where the puffs begin in the port; of a steady plume place of the source, direction
+#: of the wind, rate, speed and spreads stand there.
+PUFFS_BEGIN = 6
+#: Size of the port ``plume``.
+PLUME_SIZE = PUFFS_BEGIN + PUFF_SIZE * MOST_PUFFS
+#: A puff's spread is no less than this, m.
+_SMALLEST_M = 0.01
+#: Puffs spread as in a wind of this speed at least, m/s.
+_STILL_M_S = 0.05
+#: A slower wind than this makes no steady plume, m/s.
+_STEADY_M_S = 1e-3
+#: A puff's part farther off than so many spreads is nothing.
+_FAR = 6.0
+#: No more than this is gone through before a run, s.
+_LONGEST_SPIN_UP_S = 25.0
+#: Of the sensor by which the strength of the source is given: its power law, at a
+#: distance downwind, m, in a wind of so many m/s.
+_EXPONENT, _REFERENCE_M, _REFERENCE_M_S = 0.7155, 2.0, 1.0
+
+
+class OdorParameters(Parameters):
+    """A source of odour; the paper prints nothing of it but that it smells."""
+
+    kind: Literal["puffs", "steady"] = "puffs"
+    """``puffs``: as they come; ``steady``: their mean, Song 2011, eq. 6."""
+    ratio_at_2_m: float = Field(default=0.76, ge=1e-3, le=0.999)
+    """Strength: mean ratio Rs/R0 of a gas sensor 2 m downwind on the axis in a wind of
+    1 m/s; its power law makes a concentration of it."""
+    height_m: NonNegativeLength = 0.0
+    """H, above the floor, m."""
+    puffs_per_s: float = Field(default=16.0, ge=1.0, le=50.0)
+    """Puffs released a second; 320 are kept, which at 1 m/s reach 6 m."""
+    level_growth: float = Field(default=0.12, ge=1e-3, le=1.0)
+    """Growth of a puff's level spread with its way."""
+    upright_growth: float = Field(default=0.13, ge=1e-3, le=1.0)
+    """Growth of its upright spread."""
+    own_intensity: float = Field(default=0.1, ge=0.0, le=1.0)
+    """Standard deviation of each component of a puff's own velocity over the speed of
+    the wind."""
+    own_time_s: float = Field(default=2.0, ge=0.01, le=3_600.0)
+    """Time over which a puff's own velocity forgets, s."""
+    mean_intensity: float = Field(default=0.197, ge=1e-3, le=1.0)
+    """gamma_1 / u of the mean; that of the default puffs in the default wind."""
+    reach_m: float = Field(default=6.0, ge=0.5, le=1_000.0)
+    """Puffs farther from the source are left out, m."""
+    age_s: Time = 60.0
+    """How long it has been released when a run begins, s."""
+    room_volume_m3: float | None = Field(default=None, ge=1.0, le=1e6)
+    """Of a closed room, m^3, in which the odour gathers evenly; null: an open one."""
+
+
+def release_rate(own: OdorParameters) -> float:
+    """Rate of the source, by what a gas sensor reads 2 m downwind.
+
+    Args:
+        own: The source.
+
+    Returns:
+        Q in units of the sensor's concentration C1, m^3/s.
+    """
+    wanted = own.ratio_at_2_m ** (-1.0 / _EXPONENT) - 1.0
+    spreads = own.mean_intensity, own.mean_intensity, own.upright_growth
+    got = steady_concentration(
+        _REFERENCE_M, 0.0, 0.0, 0.0, 1.0, _REFERENCE_M_S, spreads
+    )
+    return wanted / float(got)
+
+
+@njit(cache=True)
+def concentration(
+    plume: Any, x: float, y: float, z: float
+) -> float:  # pragma: no cover  (compiled)
+    """Concentration at a point, in units of the gas sensors' C1.
+
+    Args:
+        plume: (PLUME_SIZE,) of the port ``plume``.
+        x: In W, m.
+        y: In W, m.
+        z: Above the floor, m.
+
+    Returns:
+        That of the plume and of the background.
+    """
+    total, height = plume[_BACKGROUND], plume[_HEIGHT]
+    if plume[_STEADY] > 0.5:
+        first = PUFFS_BEGIN
+        dx, dy = x - plume[first], y - plume[first + 1]
+        c, s = plume[first + 2], plume[first + 3]
+        spreads = plume[first + 6], plume[first + 6], plume[first + 7]
+        rate, speed = plume[first + 4], plume[first + 5]
+        u, v = c * dx + s * dy, c * dy - s * dx
+        return total + steady_concentration(u, v, z, height, rate, speed, spreads)
+    for puff in range(int(plume[_COUNT])):
+        first = PUFFS_BEGIN + PUFF_SIZE * puff
+        level = max(plume[first + _LEVEL], _SMALLEST_M)
+        upright = max(plume[first + _UPRIGHT], _SMALLEST_M)
+        dx, dy = x - plume[first + _X], y - plume[first + _Y]
+        off = (dx * dx + dy * dy) / (level * level)
+        if off > _FAR * _FAR:
+            continue
+        low, high = (z - height) / upright, (z + height) / upright
+        lift = math.exp(-0.5 * low * low) + math.exp(-0.5 * high * high)
+        dense = plume[first + _AMOUNT] / (level * level * upright)
+        total += dense * math.exp(-0.5 * off) * lift / (2.0 * math.pi) ** 1.5
+    return total
+
+
+class PlumeNumbers(NamedTuple):
+    """What the step of ``OdorPlume`` depends on."""
+
+    x: float
+    """Of the source in W, m."""
+    y: float
+    rate: float
+    puffs_per_s: float
+    level_growth: float
+    upright_growth: float
+    own_intensity: float
+    own_keep: float
+    """Share of a puff's own velocity that is left a period later."""
+    reach_m: float
+    volume: float
+    """m^3; 0: no background."""
+    period: int
+    """Ticks."""
+    period_s: float
+    steady: bool
+    noise: TickNoise
+
+
+@njit(cache=True)
+def _advance(
+    plume: Any, wind: Any, tick: int, numbers: PlumeNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """Carries all puffs on by a period, and releases new ones."""
+    dt = numbers.period_s
+    plume[_AGE] += dt
+    if numbers.volume > 0.0:
+        plume[_BACKGROUND] = numbers.rate * plume[_AGE] / numbers.volume
+    if numbers.steady:
+        return
+    normals = np.empty((2 * MOST_PUFFS, 2), dtype=np.float32)
+    fill_with_tick_noise(numbers.noise, tick, normals)
+    change = math.sqrt(1.0 - numbers.own_keep**2) * numbers.own_intensity
+    kept = 0
+    for puff in range(int(plume[_COUNT])):
+        old, new = PUFFS_BEGIN + PUFF_SIZE * puff, PUFFS_BEGIN + PUFF_SIZE * kept
+        x, y = plume[old + _X], plume[old + _Y]
+        ux, uy = wind_velocity(wind, x, y)
+        speed = math.hypot(ux, uy)
+        vx = numbers.own_keep * plume[old + _VX] + change * speed * normals[puff, 0]
+        vy = numbers.own_keep * plume[old + _VY] + change * speed * normals[puff, 1]
+        x, y = x + dt * (ux + vx), y + dt * (uy + vy)
+        if math.hypot(x - numbers.x, y - numbers.y) > numbers.reach_m:
+            continue
+        way = dt * max(speed, _STILL_M_S)
+        plume[new + _X], plume[new + _Y] = x, y
+        plume[new + _VX], plume[new + _VY] = vx, vy
+        plume[new + _LEVEL] = plume[old + _LEVEL] + numbers.level_growth * way
+        plume[new + _UPRIGHT] = plume[old + _UPRIGHT] + numbers.upright_growth * way
+        plume[new + _AMOUNT] = plume[old + _AMOUNT]
+        kept += 1
+    before = plume[_PART]
+    plume[_PART] += dt * numbers.puffs_per_s
+    fresh = int(plume[_PART])
+    plume[_PART] -= fresh
+    if kept + fresh > MOST_PUFFS:
+        drop = kept + fresh - MOST_PUFFS
+        for k in range(PUFF_SIZE * (kept - drop)):
+            plume[PUFFS_BEGIN + k] = plume[PUFFS_BEGIN + PUFF_SIZE * drop + k]
+        kept -= drop
+    ux, uy = wind_velocity(wind, numbers.x, numbers.y)
+    speed = math.hypot(ux, uy)
+    for k in range(fresh):
+        # Released within the period, the oldest first.
+        age = dt - (k + 1.0 - before) / numbers.puffs_per_s
+        first, row = PUFFS_BEGIN + PUFF_SIZE * kept, MOST_PUFFS + k
+        vx = numbers.own_intensity * speed * normals[row, 0]
+        vy = numbers.own_intensity * speed * normals[row, 1]
+        way = age * max(speed, _STILL_M_S)
+        plume[first + _X] = numbers.x + age * (ux + vx)
+        plume[first + _Y] = numbers.y + age * (uy + vy)
+        plume[first + _VX], plume[first + _VY] = vx, vy
+        plume[first + _LEVEL] = numbers.level_growth * way
+        plume[first + _UPRIGHT] = numbers.upright_growth * way
+        plume[first + _AMOUNT] = numbers.rate / numbers.puffs_per_s
+        kept += 1
+    plume[_COUNT] = kept
+
+
+@register_jitable
+def plume_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeNumbers
+) -> None:
+    """The plume after a tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: (PLUME_SIZE,) array of the port; changed.
+        inputs: As the input ports, as arrays.
+        outputs: Left as they are: they are state.
+        numbers: ``PlumeNumbers``.
+    """
+    if tick % numbers.period == 0:
+        _advance(state, inputs[0], tick, numbers)
+
+
+@register_jitable
+def _publish(state: Any, outputs: Any, numbers: PlumeNumbers) -> None:
+    """The output of ``plume_step``'s state."""
+    for k in range(len(state)):
+        outputs[0][k] = state[k]
+
+
+class OdorPlume(LeafSystem):
+    """The odour over the whole floor.
+
+    .. pydrake_system::
+
+        name: OdorPlume
+        input_ports:
+        - wind [number, nine of them, see systems.odor.wind]
+        output_ports:
+        - plume [number, many, see systems.odor.odor_plume]
+
+    ``concentration`` tells it at a point. A puff goes with the wind at its middle and a
+    velocity of its own, and grows with its way; the floor reflects it, walls do not,
+    and robots leave no wake. When a run begins the plume has been there for ``age_s``.
+
+    Discrete state, every 0.1 s: the output, which is what has come of the wind a period
+    ago.
+
+    Args:
+        parameters: ``OdorParameters``.
+        wind: For the plume at the begin of a run, and the mean.
+        p_WO: Place of the source in W, m.
+        seed: Of the puffs' own velocities.
+        tick_s: Period of the robots; 0.1 s is a multiple of it.
+
+    Raises:
+        InputError: A steady plume has no wind.
+
+    Reference: Song 2011, 2.2, eq. 1 to 6; puffs and all numbers are ours.
+    """
+
+    FACTS = BlockFacts("plume", "world")
+
+    def __init__(
+        self,
+        *,
+        parameters: OdorParameters | None = None,
+        wind: WindParameters | None = None,
+        p_WO: tuple[float, float] = (0.0, 0.0),
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self._own, self._wind = parameters or OdorParameters(), wind or WindParameters()
+        self._p_WO, self._tick_s = p_WO, tick_s
+        if self._own.kind == "steady" and self._wind.speed_m_s < _STEADY_M_S:
+            raise InputError(
+                "wind.speed_m_s",
+                f"is {self._wind.speed_m_s:g}, but a steady plume (odor.kind) has no "
+                "end without wind; set it to 0.5 or more, or odor.kind to puffs",
+            )
+        self.set_name("odor_plume")
+        self._port = self.DeclareVectorInputPort(name="wind", size=WIND_SIZE)
+        self.step = self._step(seed)
+        state: Any = np.array(self.step.state)
+        self.DeclareStateOutputPort("plume", self.DeclareDiscreteState(state))
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=self.step.numbers.period_s, offset_sec=0.0, update=self._update
+        )
+
+    def _step(self, seed: int) -> Step:
+        own, period = self._own, max(1, round(WIND_PERIOD_S / self._tick_s))
+        period_s = period * self._tick_s
+        numbers = PlumeNumbers(
+            *self._p_WO,
+            release_rate(own),
+            own.puffs_per_s,
+            own.level_growth,
+            own.upright_growth,
+            own.own_intensity,
+            math.exp(-period_s / own.own_time_s),
+            own.reach_m,
+            own.room_volume_m3 or 0.0,
+            period,
+            period_s,
+            own.kind == "steady",
+            tick_noise(seed),
+        )
+        state = np.zeros(PLUME_SIZE)
+        state[_HEIGHT], state[_AGE] = own.height_m, own.age_s
+        if numbers.steady:
+            direction, speed = (
+                math.radians(self._wind.direction_deg),
+                self._wind.speed_m_s,
+            )
+            state[_STEADY] = 1.0
+            steady = state[PUFFS_BEGIN:]
+            steady[:6] = (
+                *self._p_WO,
+                math.cos(direction),
+                math.sin(direction),
+                numbers.rate,
+                speed,
+            )
+            steady[6:8] = own.mean_intensity * speed, own.upright_growth * speed
+        else:
+            self._spin_up(state, numbers, seed)
+        return Step(plume_step, numbers, state.tolist(), _publish)
+
+    def _spin_up(
+        self, state: NDArray[np.float64], numbers: PlumeNumbers, seed: int
+    ) -> None:
+        """What has been released before the run, in a wind of its own."""
+        wind = initial_wind(self._wind, seed)
+        periods = round(min(self._own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)
+        for k in range(periods):
+            _advance(state, wind, -1 - k, numbers)
+        state[_AGE] = self._own.age_s
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        return self._step(run.seed_of(self.get_name()))
+
+    def _update(self, context: Any, discrete_state: Any) -> None:
+        state = context.get_discrete_state(0).CopyToVector()
+        tick = round(context.get_time() / self._tick_s)
+        inputs = read_arrays(context, [self._port])
+        plume_step(tick, state, inputs, (), self.step.numbers)
+        discrete_state.set_value(0, state)

@@ -1,0 +1,224 @@
+"""Wind over the floor: uniform, meandering, or a fan's jet."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from pydantic import Field
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.noise import (
+    BEFORE_THE_RUN,
+    TickNoise,
+    fill_with_tick_noise,
+    standard_normals,
+    tick_noise,
+)
+from systems.framework.parameters import Angle, Length, Parameters, Point
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step
+
+__all__ = [
+    "WIND_PERIOD_S",
+    "WIND_SIZE",
+    "WindField",
+    "WindParameters",
+    "wind_step",
+    "wind_velocity",
+]
+
+#: Size of the port ``wind``: whether it is a jet; mean and unsteady velocity, each x
+#: and y, m/s; a jet's origin, m, its diameter, m, and its growth.
+WIND_SIZE = 9
+_JET, _MEAN, _GUST, _ORIGIN, _DIAMETER, _GROWTH = 0, 1, 3, 5, 7, 8
+#: Wind and plume change so often, s.
+WIND_PERIOD_S = 0.1
+#: Diameters along which a round jet keeps its speed on the axis (Pope 2000, 5.1: the
+#: decay constant of 6 for a uniform outlet).
+_CORE = 6.0
+
+
+class WindParameters(Parameters):
+    """The wind; the paper prints its range of speeds alone (Song 2011, 4.1)."""
+
+    kind: Literal["uniform", "meandering", "jet"] = "meandering"
+    """``uniform``: always the mean; ``meandering``: its velocity changes slowly, all
+    over alike; ``jet``: a fan's, which meanders, too, widens and slows down."""
+    speed_m_s: float = Field(default=1.0, ge=0.0, le=20.0)
+    """Mean, of a jet at its outlet, m/s."""
+    direction_deg: Angle = 0.0
+    """Towards which it blows, deg CCW from the x axis of W."""
+    meander_intensity: float = Field(default=0.12, ge=0.0, le=1.0)
+    """Standard deviation of each component over the mean speed."""
+    meander_time_s: float = Field(default=8.0, ge=0.1, le=3_600.0)
+    """Time over which it forgets, s."""
+    jet_origin_m: Point = (-2.2, 0.0)
+    """Outlet of the jet in W, m."""
+    jet_diameter_m: Length = 0.3
+    """Of the outlet, m."""
+    jet_growth: float = Field(default=0.1, ge=0.0, le=1.0)
+    """Growth of the half width, at which the speed is exp(-1/2), a metre."""
+
+
+@njit(cache=True)
+def wind_velocity(
+    wind: Any, x: float, y: float
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Wind at a point.
+
+    Args:
+        wind: (WIND_SIZE,) of the port ``wind``.
+        x: In W, m.
+        y: In W, m.
+
+    Returns:
+        (ux, uy) in W, m/s.
+    """
+    share = 1.0
+    speed = math.hypot(wind[_MEAN], wind[_MEAN + 1])
+    if wind[_JET] > 0.5 and speed > 0.0:
+        dx, dy = x - wind[_ORIGIN], y - wind[_ORIGIN + 1]
+        along = (dx * wind[_MEAN] + dy * wind[_MEAN + 1]) / speed
+        across = (dy * wind[_MEAN] - dx * wind[_MEAN + 1]) / speed
+        if along <= 0.0:
+            return 0.0, 0.0
+        width = 0.5 * wind[_DIAMETER] + wind[_GROWTH] * along
+        share = min(1.0, _CORE * wind[_DIAMETER] / along)
+        share *= math.exp(-0.5 * (across / width) ** 2)
+    ux = share * (wind[_MEAN] + wind[_GUST])
+    return ux, share * (wind[_MEAN + 1] + wind[_GUST + 1])
+
+
+class WindNumbers(NamedTuple):
+    """What the step of ``WindField`` depends on."""
+
+    spread: float
+    """Standard deviation of a component, m/s."""
+    keep: float
+    """Share of it that is left a period later."""
+    period: int
+    """Ticks."""
+    noise: TickNoise
+
+
+def wind_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: WindNumbers
+) -> None:
+    """The wind after a tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: (WIND_SIZE,) of the port; changed.
+        inputs: None.
+        outputs: Left as they are: they are state.
+        numbers: ``WindNumbers``.
+    """
+    if tick % numbers.period != 0 or numbers.spread == 0.0:
+        return
+    normals = np.empty((1, 2), dtype=np.float32)
+    fill_with_tick_noise(numbers.noise, tick, normals)
+    change = numbers.spread * math.sqrt(1.0 - numbers.keep**2)
+    for k in range(2):
+        state[_GUST + k] = numbers.keep * state[_GUST + k] + change * float(
+            normals[0, k]
+        )
+
+
+def _publish(state: Any, outputs: Any, numbers: WindNumbers) -> None:
+    """The output of ``wind_step``'s state."""
+    for k in range(WIND_SIZE):
+        outputs[0][k] = state[k]
+
+
+def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
+    """The port ``wind`` at the first instant.
+
+    Args:
+        own: The wind.
+        seed: By which its unsteady part is drawn, as it is at any instant.
+
+    Returns:
+        (WIND_SIZE,) numbers.
+    """
+    wind = np.zeros(WIND_SIZE)
+    direction = math.radians(own.direction_deg)
+    wind[_JET] = own.kind == "jet"
+    wind[_MEAN : _MEAN + 2] = math.cos(direction), math.sin(direction)
+    wind[_MEAN : _MEAN + 2] *= own.speed_m_s
+    wind[_GUST : _GUST + 2] = (
+        _spread(own) * standard_normals((1, 2), seed, BEFORE_THE_RUN)[0]
+    )
+    wind[_ORIGIN : _ORIGIN + 2] = own.jet_origin_m
+    wind[_DIAMETER], wind[_GROWTH] = own.jet_diameter_m, own.jet_growth
+    return wind
+
+
+def _spread(own: WindParameters) -> float:
+    return 0.0 if own.kind == "uniform" else own.meander_intensity * own.speed_m_s
+
+
+class WindField(LeafSystem):
+    """The wind over the whole floor.
+
+    .. pydrake_system::
+
+        name: WindField
+        output_ports:
+        - wind [number, nine of them, see systems.odor.wind]
+
+    ``wind_velocity`` tells it at a point. The unsteady velocity is an
+    Ornstein-Uhlenbeck process in each component, advanced exactly.
+
+    Discrete state, every 0.1 s: the output. Nothing acts back on it.
+
+    Args:
+        parameters: ``WindParameters``.
+        seed: Of the unsteady part.
+        tick_s: Period of the robots; 0.1 s is a multiple of it.
+
+    Reference: Song 2011, 4.1, for the speeds; the rest is ours.
+    """
+
+    FACTS = BlockFacts("wind", "world")
+
+    def __init__(
+        self,
+        *,
+        parameters: WindParameters | None = None,
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self._own = parameters or WindParameters()
+        self._tick_s = tick_s
+        self.set_name("wind_field")
+        self.step = self._step(seed)
+        state: Any = np.array(self.step.state)
+        self.DeclareStateOutputPort("wind", self.DeclareDiscreteState(state))
+        self.DeclarePeriodicDiscreteUpdateEvent(
+            period_sec=max(1, round(WIND_PERIOD_S / tick_s)) * tick_s,
+            offset_sec=0.0,
+            update=self._update,
+        )
+
+    def _step(self, seed: int) -> Step:
+        period = max(1, round(WIND_PERIOD_S / self._tick_s))
+        keep = math.exp(-period * self._tick_s / self._own.meander_time_s)
+        numbers = WindNumbers(_spread(self._own), keep, period, tick_noise(seed))
+        state = initial_wind(self._own, seed).tolist()
+        return Step(wind_step, numbers, state, _publish)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        return self._step(run.seed_of(self.get_name()))
+
+    def _update(self, context: Any, discrete_state: Any) -> None:
+        state = context.get_discrete_state(0).CopyToVector()
+        tick = round(context.get_time() / self._tick_s)
+        wind_step(tick, state, (), (), self.step.numbers)
+        discrete_state.set_value(0, state)

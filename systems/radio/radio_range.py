@@ -1,0 +1,143 @@
+"""How strongly a robot's radio hears the one that it comes to."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.radio.radio_channel import RadioParameters
+
+__all__ = ["RadioRange", "radio_distance", "radio_level", "radio_range_step"]
+
+#: Levels are measured so often, s.
+_PERIOD_S = 0.1
+#: Antennas are no nearer to one another, m.
+_LEAST_M = 0.01
+
+
+@register_jitable
+def radio_level(distance: float, level_at_1_m_dbm: float, exponent: float) -> float:
+    """Level by the path loss of Song 2011, eq. 8.
+
+    Args:
+        distance: m.
+        level_at_1_m_dbm: -A, dBm.
+        exponent: n.
+
+    Returns:
+        R = -(10 n lg d + A), dBm.
+    """
+    return level_at_1_m_dbm - 10.0 * exponent * math.log10(max(distance, _LEAST_M))
+
+
+@register_jitable
+def radio_distance(level: float, level_at_1_m_dbm: float, exponent: float) -> float:
+    """Distance of a level: undoes ``radio_level``.
+
+    Args:
+        level: dBm.
+        level_at_1_m_dbm: -A, dBm.
+        exponent: n.
+
+    Returns:
+        m.
+    """
+    return 10.0 ** ((level_at_1_m_dbm - level) / (10.0 * exponent))
+
+
+class RangeNumbers(NamedTuple):
+    """What the step of ``RadioRange`` depends on."""
+
+    level_at_1_m_dbm: float
+    exponent: float
+    fading_db: float
+    period: int
+    """Ticks."""
+    noise: TickNoise
+
+
+@register_jitable
+def radio_range_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: RangeNumbers
+) -> None:
+    """Level of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: The last level, dBm.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``RangeNumbers``.
+    """
+    if tick % numbers.period == 0:
+        pose, other = inputs
+        distance = math.hypot(other[0] - pose[0], other[1] - pose[1])
+        normals = np.empty((1, 2), dtype=np.float32)
+        fill_with_tick_noise(numbers.noise, tick, normals)
+        level = radio_level(distance, numbers.level_at_1_m_dbm, numbers.exponent)
+        state[0] = level + numbers.fading_db * float(normals[0, 0])
+    outputs[0][0] = state[0]
+
+
+class RadioRange(LeafSystem, StepBlock):
+    """Measures the level of what the robot comes to.
+
+    .. pydrake_system::
+
+        name: RadioRange
+        input_ports:
+        - pose_WB [m, m, rad]
+        - pose_WS [m, m, rad]
+        output_ports:
+        - rssi_dbm [dBm]
+
+    A level is drawn every 0.1 s about that of the distance of the two bodies' middles,
+    with a normal error. Discrete state: the last one. Latency: none.
+
+    Args:
+        parameters: Levels and fading.
+        seed: Of the errors.
+        tick_s: Period of the update, s.
+
+    Reference: Song 2011, eq. 8.
+    """
+
+    FACTS = BlockFacts("radio_range", "hearing", columns={"rssi_dbm": ("rssi_dbm",)})
+
+    def __init__(
+        self,
+        *,
+        parameters: RadioParameters | None = None,
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own = parameters or RadioParameters()
+        numbers = RangeNumbers(
+            own.level_at_1_m_dbm,
+            own.path_loss_exponent,
+            own.fading_db,
+            max(1, round(_PERIOD_S / tick_s)),
+            tick_noise(seed),
+        )
+        self.set_name("radio_range")
+        self.declare_step(
+            float,
+            Step(radio_range_step, numbers, [0.0]),
+            (("pose_WB", 3), ("pose_WS", 3)),
+            (("rssi_dbm", 1),),
+            tick_s,
+        )
+
+    def step_for(self, run: RunFacts) -> Step:
+        """What the block does in each tick of a compiled loop."""
+        noise = tick_noise(run.seed_of(self.get_name()))
+        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))

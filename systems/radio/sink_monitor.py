@@ -1,0 +1,118 @@
+"""What the operator's computer knows of the robots, by radio alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.signals import TICK_S
+from systems.framework.state_block import StateOutputs
+from systems.framework.step_block import Step
+from systems.radio.radio_channel import AIR_SIZE
+from systems.radio.stream import PARSER_SIZE, parse_byte
+
+__all__ = ["SINK_FIELDS", "SinkMonitor", "sink_monitor_step"]
+
+#: What the sink knows of each robot: frames so far, the last one's function (-1: none
+#: yet) and value, time since then, s, and what it says of its search: -1 nothing, 0
+#: not found, 1 found.
+SINK_FIELDS = ("frames", "function", "value", "age_s", "result")
+_COUNT, _FUNCTION, _VALUE, _AGE, _RESULT = range(len(SINK_FIELDS))
+
+
+class SinkNumbers(NamedTuple):
+    """What the step of ``SinkMonitor`` depends on."""
+
+    addresses: NDArray[np.int64]
+    """Of the robots."""
+    tick_s: float
+
+
+@register_jitable
+def sink_monitor_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: SinkNumbers
+) -> None:
+    """What is known after a tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Not used.
+        state: What is known of each robot, then the parser's; changed.
+        inputs: As the input ports.
+        outputs: Left as they are: they are state.
+        numbers: ``SinkNumbers``.
+    """
+    air, fields, robots = inputs[0], 5, len(numbers.addresses)
+    for robot in range(robots):
+        state[robot * fields + _AGE] += numbers.tick_s
+    first = robots * fields
+    parser = state[first : first + PARSER_SIZE]
+    for k in range(int(air[0])):
+        good, address, function, value = parse_byte(parser, air[1 + k])
+        if not good:
+            continue
+        for robot in range(robots):
+            if numbers.addresses[robot] == address:
+                place = robot * fields
+                state[place + _COUNT] += 1.0
+                state[place + _FUNCTION] = float(function)
+                state[place + _VALUE] = value
+                state[place + _AGE] = 0.0
+                if function in (12, 16):
+                    state[place + _RESULT] = value
+    for k in range(PARSER_SIZE):  # of a list, the slice was a copy
+        state[first + k] = parser[k]
+
+
+@register_jitable
+def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
+    """The outputs of ``sink_monitor_step``'s state."""
+    status = outputs[0]
+    for k in range(len(status)):
+        status[k] = state[k]
+
+
+class SinkMonitor(LeafSystem, StateOutputs):
+    """Listens to all frames, and keeps the last of each robot.
+
+    .. pydrake_system::
+
+        name: SinkMonitor
+        input_ports:
+        - air [number of bytes, and bytes]
+        output_ports:
+        - sink_status [number, five for each robot, see SINK_FIELDS]
+
+    Discrete state, every tick: the output, and the parser's. Latency: a tick.
+
+    Args:
+        robots: Addresses of the robots, by name.
+        tick_s: Period of the update, s.
+
+    Reference: Song 2011, 3.3 and 4.1.
+    """
+
+    FACTS = BlockFacts("sink", "world")
+
+    def __init__(
+        self, *, robots: Mapping[str, int] | None = None, tick_s: float = TICK_S
+    ) -> None:
+        super().__init__()
+        robots = robots or {}
+        names = [f"{name}.{field}" for name in robots for field in SINK_FIELDS]
+        self.FACTS = replace(SinkMonitor.FACTS, columns={"sink_status": tuple(names)})
+        state = [0.0, -1.0, 0.0, 0.0, -1.0] * len(robots) + [0.0] * PARSER_SIZE
+        addresses = np.array([*robots.values()], dtype=np.int64)
+        self.set_name("sink_monitor")
+        self.declare_state_outputs(
+            Step(sink_monitor_step, SinkNumbers(addresses, tick_s), state, _publish),
+            (("air", AIR_SIZE),),
+            (("sink_status", len(names)),),
+            tick_s,
+        )

@@ -1,0 +1,219 @@
+"""Micro switches in the robot's front that feel what it touches."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from pydantic import Field, Strict
+from pydrake.systems.framework import LeafSystem
+
+from systems.base.robot import RobotParameters
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import Length, Parameters, Time
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import Step, StepBlock
+from systems.world.geometry import beyond_rectangle
+
+__all__ = [
+    "ContactFaultParameters",
+    "ContactParameters",
+    "ContactSwitches",
+    "contact_switches_step",
+]
+
+#: Points along half of the front edge at which it feels.
+_POINTS = 8
+#: A touch this near to the middle closes both switches, as a share of the width.
+_MIDDLE = 0.1
+
+
+class ContactFaultParameters(Parameters):
+    """A switch that fails in a run, and how."""
+
+    switch: int = Field(default=1, ge=1, le=2)
+    """1 left, 2 right."""
+    kind: Literal["stuck_open", "stuck_closed"] = "stuck_open"
+    """``stuck_open``: it never closes; ``stuck_closed``: it never opens."""
+    start_s: Time = 0.0
+    """When that begins, s."""
+
+
+class ContactParameters(Parameters):
+    """The two switches behind the front bumper (Song 2011, 2.1); sizes are ours."""
+
+    reach_m: Length = 0.01
+    """A switch closes where a body is this near to the front, m."""
+    faults: Annotated[
+        tuple[ContactFaultParameters, ...], Strict(False), Field(max_length=2)
+    ] = ()
+    """Switches that fail in a run."""
+
+
+class SwitchNumbers(NamedTuple):
+    """What the step of ``ContactSwitches`` depends on."""
+
+    points: NDArray[np.float64]
+    """(n, 2) points of the front edge in B, m, from left to right."""
+    middle_m: float
+    """A touch this near to the body's axis closes both switches."""
+    reach_m: float
+    length_m: float
+    """Of what is followed."""
+    width_m: float
+    open_from_s: tuple[float, float]
+    """Switches are stuck open from then on, s; infinite: never."""
+    closed_from_s: tuple[float, float]
+    """Or closed."""
+    tick_s: float
+
+
+@njit(cache=True)
+def _feel(
+    pose: Any, body: Any, points: Any, middle: float, reach: float
+) -> tuple[bool, bool]:  # pragma: no cover  (compiled)
+    """Whether a body closes the left and the right switch."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    far = 0.5 * math.hypot(body[3], body[4]) + 1.0
+    if math.hypot(body[0] - pose[0], body[1] - pose[1]) > far:
+        return False, False
+    left, right = False, False
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        place = pose[0] + c * x - s * y, pose[1] + s * x + c * y
+        box = body[0], body[1], body[2], body[3], body[4]
+        off = beyond_rectangle(place, box)
+        if math.hypot(off[0], off[1]) <= reach:
+            left = left or y >= -middle
+            right = right or y <= middle
+    return left, right
+
+
+def contact_switches_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: SwitchNumbers
+) -> None:
+    """Switches of one tick; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: None.
+        inputs: As the input ports.
+        outputs: As the output ports.
+        numbers: ``SwitchNumbers``.
+    """
+    pose, poses, sizes, followed = inputs
+    here = np.asarray(pose)
+    bodies = len(poses) // 3
+    touched, left, right = -1, False, False
+    body = np.empty(5)
+    for number in range(bodies + 1):
+        if number < bodies:
+            for k in range(3):
+                body[k] = poses[3 * number + k]
+            body[3], body[4] = sizes[2 * number], sizes[2 * number + 1]
+        else:
+            for k in range(3):
+                body[k] = followed[k]
+            body[3], body[4] = numbers.length_m, numbers.width_m
+        felt = _feel(here, body, numbers.points, numbers.middle_m, numbers.reach_m)
+        if felt[0] or felt[1]:
+            touched = number
+        left, right = left or felt[0], right or felt[1]
+    time, contact = tick * numbers.tick_s, outputs[0]
+    contact[0], contact[1] = 1.0 if left else 0.0, 1.0 if right else 0.0
+    for k in range(2):
+        if time >= numbers.open_from_s[k]:
+            contact[k] = 0.0
+        if time >= numbers.closed_from_s[k]:
+            contact[k] = 1.0
+    outputs[1][0] = float(touched)
+
+
+class ContactSwitches(LeafSystem, StepBlock):
+    """Feels what the front of the robot touches.
+
+    .. pydrake_system::
+
+        name: ContactSwitches
+        input_ports:
+        - pose_WB [m, m, rad]
+        - poses_WO [m, m, rad each]
+        - sizes [m, m each]
+        - pose_WS [m, m, rad]
+        output_ports:
+        - contact [0 or 1, left and right]
+        - touched [number of a body, -1 none]
+
+    A switch closes where a body is within its reach of its half of the front edge; in
+    the middle both do. Flanks and rear feel nothing. ``touched`` is the truth behind
+    them: the body's number, that of ``pose_WS`` being the last. The switches cannot
+    tell a source from a wall.
+
+    No state. Rate: every tick; latency: none.
+
+    Args:
+        parameters: ``ContactParameters``.
+        robot: Its size.
+        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        source_size: Length and width of what stands at ``pose_WS``, m.
+        tick_s: Period of the robot, s.
+
+    Reference: Song 2011, 2.1, 4.2.
+    """
+
+    FACTS = BlockFacts(
+        "contact",
+        "obstacle sensing",
+        columns={"contact": ("contact_left", "contact_right"), "touched": ("touched",)},
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: ContactParameters | None = None,
+        robot: RobotParameters | None = None,
+        bodies: int = 0,
+        source_size: tuple[float, float] = (0.08, 0.08),
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own, robot = parameters or ContactParameters(), robot or RobotParameters()
+        y = 0.5 * robot.width_m * np.arange(_POINTS, -_POINTS - 1, -1) / _POINTS
+        front = np.column_stack([np.full_like(y, 0.5 * robot.length_m), y])
+        numbers = SwitchNumbers(
+            front,
+            _MIDDLE * robot.width_m,
+            own.reach_m,
+            *source_size,
+            _since(own, "stuck_open"),
+            _since(own, "stuck_closed"),
+            tick_s,
+        )
+        self.set_name("contact_switches")
+        self.declare_step(
+            float,
+            Step(contact_switches_step, numbers),
+            (
+                ("pose_WB", 3),
+                ("poses_WO", 3 * bodies),
+                ("sizes", 2 * bodies),
+                ("pose_WS", 3),
+            ),
+            (("contact", 2), ("touched", 1)),
+            tick_s,
+        )
+
+
+def _since(own: ContactParameters, kind: str) -> tuple[float, float]:
+    """When each switch begins to fail so, s; infinite: never."""
+    left, right = (
+        min(
+            (f.start_s for f in own.faults if f.kind == kind and f.switch == switch),
+            default=math.inf,
+        )
+        for switch in (1, 2)
+    )
+    return left, right

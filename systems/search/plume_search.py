@@ -1,0 +1,374 @@
+"""The olfactory robot's search: wait, smell, decide, move, until it touches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Literal, NamedTuple
+
+from numba.extending import register_jitable
+from pydantic import Field
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import Duration, Fraction, Parameters, Time
+from systems.framework.signals import TICK_S
+from systems.framework.state_block import StateOutputs, ticks_of
+from systems.framework.step_block import Step
+from systems.radio.codec import FRAMES_SIZE
+from systems.search.report_frames import add_frame, clear_frames
+from systems.search.search_ending import (
+    FOUND,
+    NO_NOSE,
+    NO_TOUCH,
+    REFUSED,
+    REPORT_COLUMNS,
+    STEPS_GONE,
+    UNDECIDED,
+)
+from systems.search.song_rules import SongRuleParameters, song2011_turn
+from systems.search.upwind_gradient import (
+    RULE_MEMORY,
+    UpwindGradientParameters,
+    upwind_gradient_turn,
+)
+
+__all__ = ["PlumeSearch", "PlumeSearchParameters", "plume_search_step"]
+
+#: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
+_SENSED = 5
+_WAIT, _SENSE, _MOVE, _OVER = range(4)
+# Places in the state.
+_ACTIVITY, _LEFT, _STARTED = 0, 1, 2
+_EXPECTED, _MOVES, _CALLING = 3, 4, 5
+_REPORT = 6
+_ENDED, _PHASE, _STEPS, _FAULT = range(_REPORT, _REPORT + 4)
+_TOLD = 10
+_COUNT = 11
+_SMELT, _BEFORE = 12, 13
+_SUM = 14
+_LEAST = _SUM + _SENSED
+_MOST = _LEAST + _SENSED
+_MEAN = _MOST + _SENSED
+_MEMORY = _MEAN + _SENSED
+_FRAMES = _MEMORY + RULE_MEMORY
+_SIZE = _FRAMES + FRAMES_SIZE
+# Numbers of frames (Song 2011, table 5).
+_FN_SET, _FN_HEADING, _FN_GAS, _FN_AIRFLOW, _FN_RESULT = 2, 5, 6, 9, 12
+# Bits of the faults.
+_DEAD_GAS, _STUCK = 1, 8
+#: Readings nearer to one another than this in a whole stop come from no live sensor.
+_LIFELESS = 1e-9
+
+
+class PlumeSearchParameters(Parameters):
+    """Times of a step, and the rules by which it turns."""
+
+    rules: Literal["song2011", "upwind_gradient"] = "upwind_gradient"
+    """The paper's four phases, or ours."""
+    wait_s: Time = 15.0
+    """Rest before the sensors count, s (Song 2011, 4.2)."""
+    sense_s: Duration = 2.0
+    """Their mean over this time counts, without the largest and the least reading, s
+    (4.2)."""
+    move_s: Duration = 3.0
+    """Turning and driving, s (4.2)."""
+    most_steps: int = Field(default=40, ge=1, le=1_000)
+    """After so many steps the search is given up."""
+    gate: bool = True
+    """Whether what is touched has to smell to be the source; off: any touch ends the
+    search as a find, as printed."""
+    gate_share: Fraction = 0.95
+    """It smells where the least of the three ratios since the last stop but one, those
+    of the stops included, is below this share of that in clean air, 1."""
+    address: int = Field(default=1, ge=1, le=3)
+    """Of the robot in its radio frames (Song 2011, 3.3)."""
+    call_every_s: Duration = 1.0
+    """Once it has ended it reports so by radio every so often, s."""
+    song2011: SongRuleParameters = SongRuleParameters()
+    """Of the paper's rules."""
+    upwind_gradient: UpwindGradientParameters = UpwindGradientParameters()
+    """Of ours."""
+
+
+class PlumeSearchNumbers(NamedTuple):
+    """What the step of ``PlumeSearch`` depends on."""
+
+    turn: Callable[..., tuple[float, int, int]]
+    """``turn(gas, airflow, memory, rules)``, as ``song2011_turn``."""
+    rules: Any
+    wait: int
+    """Ticks, as those that follow."""
+    sense: int
+    move: int
+    repeat: int
+    most_steps: int
+    gate: bool
+    gate_share: float
+    address: int
+
+
+@register_jitable
+def _begin_stop(state: Any, numbers: PlumeSearchNumbers) -> None:
+    state[_ACTIVITY], state[_LEFT] = _WAIT, numbers.wait
+    state[_MOVES] = 0.0
+    state[_COUNT] = 0.0
+    for k in range(_SENSED):
+        state[_SUM + k] = 0.0
+
+
+@register_jitable
+def _sense(state: Any, gas: Any, airflow: Any) -> None:
+    """Adds a tick's readings."""
+    first = state[_COUNT] < 0.5
+    for k in range(_SENSED):
+        value = gas[k] if k < 3 else airflow[k - 3]
+        state[_SUM + k] += value
+        state[_LEAST + k] = value if first else min(state[_LEAST + k], value)
+        state[_MOST + k] = value if first else max(state[_MOST + k], value)
+    state[_COUNT] += 1.0
+
+
+@register_jitable
+def _average(state: Any) -> int:
+    """Means of a stop, without extremes; a dead gas sensor smells as the others do.
+
+    Returns:
+        How many gas sensors are alive.
+    """
+    count = state[_COUNT]
+    for k in range(_SENSED):
+        total = state[_SUM + k]
+        if count > 2.5:
+            total -= state[_LEAST + k] + state[_MOST + k]
+            state[_MEAN + k] = total / (count - 2.0)
+        else:
+            state[_MEAN + k] = total / count
+    alive, others, bits = 0, 0.0, 0.0
+    for k in range(3):
+        if state[_MOST + k] - state[_LEAST + k] >= _LIFELESS or count < 1.5:
+            alive += 1
+            others += state[_MEAN + k]
+        else:
+            bits += _DEAD_GAS << k
+    if 0 < alive < 3:
+        for k in range(3):
+            if (int(bits) >> k) & 1:
+                state[_MEAN + k] = others / alive
+    switches = int(state[_FAULT]) // _STUCK * _STUCK
+    state[_FAULT] = switches + bits
+    return alive
+
+
+@register_jitable
+def _end(state: Any, ended: int) -> None:
+    state[_ACTIVITY], state[_LEFT] = _OVER, 0.0
+    state[_MOVES] = 0.0
+    state[_ENDED] = ended
+    state[_CALLING] = 1.0 if ended == FOUND else 0.0
+
+
+@register_jitable
+def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
+    """Where to go after a stop."""
+    if _average(state) < 2:
+        _end(state, NO_NOSE)
+        return
+    if state[_STEPS] >= numbers.most_steps:
+        _end(state, STEPS_GONE)
+        return
+    mean = state[_MEAN], state[_MEAN + 1], state[_MEAN + 2]
+    blown = state[_MEAN + 3], state[_MEAN + 4]
+    memory = state[_MEMORY : _MEMORY + RULE_MEMORY]
+    turn, phase, ended = numbers.turn(mean, blown, memory, numbers.rules)
+    for k in range(RULE_MEMORY):  # of a list, the slice was a copy
+        state[_MEMORY + k] = memory[k]
+    state[_PHASE] = phase
+    if ended != UNDECIDED:
+        _end(state, ended)
+        return
+    state[_EXPECTED] = (heading + turn + 180.0) % 360.0 - 180.0
+    state[_STEPS] += 1.0
+    state[_ACTIVITY], state[_LEFT] = _MOVE, numbers.move
+    state[_MOVES] = 1.0
+    state[_TOLD] = 2.0
+    here = min(mean[0], mean[1], mean[2])
+    state[_SMELT], state[_BEFORE] = min(here, state[_BEFORE]), here
+
+
+@register_jitable
+def _check_switches(state: Any, contact: Any) -> bool:
+    """Whether something is touched; switches that are closed at the start are stuck."""
+    if state[_STARTED] < 0.5:
+        state[_STARTED] = 1.0
+        for k in range(2):
+            if contact[k] > 0.5:
+                state[_FAULT] += _STUCK << k
+        if contact[0] > 0.5 and contact[1] > 0.5:
+            _end(state, NO_TOUCH)
+            return False
+    touched = False
+    for k in range(2):
+        stuck = (int(state[_FAULT]) // (_STUCK << k)) % 2 == 1
+        touched = touched or (contact[k] > 0.5 and not stuck)
+    return touched
+
+
+@register_jitable
+def _judge_touch(state: Any, numbers: PlumeSearchNumbers) -> None:
+    """What is touched is the source, or smells of nothing."""
+    found = not numbers.gate or state[_SMELT] < numbers.gate_share
+    _end(state, FOUND if found else REFUSED)
+
+
+@register_jitable
+def _tell(state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers) -> None:
+    """Frames of this tick: what a step has measured, and in the end its result."""
+    address = numbers.address
+    clear_frames(state, _FRAMES)
+    if state[_ACTIVITY] == _OVER:
+        if tick % numbers.repeat == 0:
+            add_frame(state, _FRAMES, address, _FN_RESULT, state[_CALLING])
+        return
+    if state[_TOLD] == 2.0:
+        add_frame(state, _FRAMES, address, _FN_HEADING, heading)
+        add_frame(state, _FRAMES, address, _FN_SET, state[_EXPECTED])
+        add_frame(state, _FRAMES, address, _FN_GAS, state[_MEAN])
+        add_frame(state, _FRAMES, address, _FN_GAS + 1, state[_MEAN + 1])
+        state[_TOLD] = 1.0
+    elif state[_TOLD] == 1.0:
+        add_frame(state, _FRAMES, address, _FN_GAS + 2, state[_MEAN + 2])
+        add_frame(state, _FRAMES, address, _FN_AIRFLOW, state[_MEAN + 3])
+        add_frame(state, _FRAMES, address, _FN_AIRFLOW + 1, state[_MEAN + 4])
+        state[_TOLD] = 0.0
+
+
+@register_jitable
+def plume_search_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeSearchNumbers
+) -> None:
+    """One tick of the search; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Activity and what it holds, see the places above; changed.
+        inputs: As the input ports.
+        outputs: Left as they are: they are state.
+        numbers: ``PlumeSearchNumbers``.
+    """
+    gas, airflow, headings, contact = inputs
+    heading = headings[0]
+    if state[_STARTED] < 0.5:
+        state[_EXPECTED] = heading
+        state[_SMELT] = state[_BEFORE] = 1.0
+        _begin_stop(state, numbers)
+    touched = _check_switches(state, contact)
+    state[_SMELT] = min(state[_SMELT], gas[0], gas[1], gas[2])
+    if state[_ACTIVITY] != _OVER:
+        if touched:
+            _judge_touch(state, numbers)
+        elif state[_ACTIVITY] == _WAIT and state[_LEFT] <= 0.0:
+            state[_ACTIVITY], state[_LEFT] = _SENSE, numbers.sense
+    if state[_ACTIVITY] == _SENSE:
+        _sense(state, gas, airflow)
+    state[_LEFT] -= 1.0
+    if state[_LEFT] <= 0.0:
+        if state[_ACTIVITY] == _SENSE:
+            _decide(state, heading, numbers)
+        elif state[_ACTIVITY] == _MOVE:
+            _begin_stop(state, numbers)
+    _tell(state, tick, heading, numbers)
+
+
+@register_jitable
+def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
+    """The outputs of ``plume_search_step``'s state."""
+    expected, move, calling, report, frames = outputs
+    expected[0], move[0], calling[0] = state[_EXPECTED], state[_MOVES], state[_CALLING]
+    for k in range(len(report)):
+        report[k] = state[_REPORT + k]
+    for k in range(len(frames)):
+        frames[k] = state[_FRAMES + k]
+
+
+class PlumeSearch(LeafSystem, StateOutputs):
+    """Finds an odour source step by step: waits, smells, turns and moves.
+
+    .. pydrake_system::
+
+        name: PlumeSearch
+        input_ports:
+        - gas_ratio [1, right front, rear and left front]
+        - airflow [1, left and right]
+        - heading_deg [deg, clockwise from north]
+        - contact [0 or 1, left and right]
+        output_ports:
+        - expected_heading_deg [deg, clockwise from north]
+        - move [0 or 1]
+        - calling [0 or 1]
+        - search_report [number of the ending, phase, steps, sum of faults]
+        - frames [number, and nine bytes each, see systems.radio]
+
+    A step rests for ``wait_s`` until the gas sensors have settled, averages for
+    ``sense_s``, decides on a heading by its rules, and lets the robot turn and drive
+    for ``move_s``. A touch ends the search at once: as a find where it smells, and
+    then the robot calls; else as refused. Endings and faults are those of
+    ``systems.search.search_ending``: a gas sensor whose readings do not stir in a
+    whole stop is dead, and smells as the others do; a switch that is closed at the
+    start is stuck, and not heeded; one that is stuck open is not noticed. Phases of
+    ``song2011`` are the paper's; of ``upwind_gradient`` 1 is upwind, 2 across.
+
+    Discrete state, every tick: the outputs, what a stop has measured so far, and what
+    the rules remember. Latency: a tick.
+
+    Args:
+        parameters: ``PlumeSearchParameters``.
+        tick_s: Period of the update, s.
+
+    Reference: Song 2011, 2.3.3 and 4.2; the gate, and rules of our own.
+    """
+
+    FACTS = BlockFacts(
+        "controller",
+        "control",
+        columns={
+            "expected_heading_deg": ("expected_heading_deg",),
+            "move": ("move",),
+            "calling": ("calling",),
+            "search_report": REPORT_COLUMNS,
+        },
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: PlumeSearchParameters | None = None,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own = parameters or PlumeSearchParameters()
+        printed = own.rules == "song2011"
+        numbers = PlumeSearchNumbers(
+            song2011_turn if printed else upwind_gradient_turn,
+            own.song2011 if printed else own.upwind_gradient,
+            ticks_of(own.wait_s, tick_s, least=0),
+            ticks_of(own.sense_s, tick_s),
+            ticks_of(own.move_s, tick_s),
+            ticks_of(own.call_every_s, tick_s),
+            own.most_steps,
+            own.gate,
+            own.gate_share,
+            own.address,
+        )
+        self.set_name("plume_search")
+        self.declare_state_outputs(
+            Step(plume_search_step, numbers, [0.0] * _SIZE, _publish),
+            (("gas_ratio", 3), ("airflow", 2), ("heading_deg", 1), ("contact", 2)),
+            (
+                ("expected_heading_deg", 1),
+                ("move", 1),
+                ("calling", 1),
+                ("search_report", len(REPORT_COLUMNS)),
+                ("frames", FRAMES_SIZE),
+            ),
+            tick_s,
+        )

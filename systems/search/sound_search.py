@@ -1,0 +1,413 @@
+"""The hearing robots' search: wait for the call, listen, turn and move, arrive."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, Literal, NamedTuple
+
+from numba.extending import register_jitable
+from pydantic import Field
+from pydrake.systems.framework import LeafSystem
+
+from systems.framework.block_facts import BlockFacts
+from systems.framework.parameters import Duration, Length, Parameters, Time
+from systems.framework.signals import TICK_S
+from systems.framework.state_block import StateOutputs, ticks_of
+from systems.framework.step_block import Step
+from systems.radio.codec import FRAMES_SIZE
+from systems.radio.radio_channel import AIR_SIZE, RadioParameters
+from systems.radio.stream import PARSER_SIZE, parse_byte
+from systems.search.report_frames import add_frame, clear_frames
+from systems.search.search_ending import (
+    AMBIGUOUS,
+    CALLER_LOST,
+    DEAF,
+    FOUND,
+    NOT_CALLED,
+    NOT_HEARD,
+    REPORT_COLUMNS,
+    STEPS_GONE,
+)
+
+__all__ = ["SoundSearch", "SoundSearchParameters", "sound_search_step"]
+
+#: What the robot is at; ``search_phase`` in its report.
+_WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
+# Places in the state.
+_ACTIVITY, _LEFT, _STARTED = 0, 1, 2
+_EXPECTED, _MOVES, _LISTENING = 3, 4, 5
+_REPORT = 6
+_ENDED, _PHASE, _STEPS, _FAULT = range(_REPORT, _REPORT + 4)
+_TOLD, _LEVELS, _READINGS, _MISSES = 10, 11, 12, 13
+_NOISE_LEFT, _WAITED, _CALLED, _ARRIVED = 14, 15, 16, 17
+_BEARING, _RANGE, _AWAY = 18, 19, 20
+_PARSER = 21
+_FRAMES = _PARSER + PARSER_SIZE
+_SIZE = _FRAMES + FRAMES_SIZE
+# Numbers of frames (Song 2011, table 5).
+_FN_HEADING, _FN_FOUND_ODOR, _FN_DIRECTION = 5, 12, 13
+_FN_DISTANCE, _FN_RADIO_DISTANCE, _FN_RESULT = 14, 15, 16
+#: Bit of the faults.
+_LOST_MICROPHONE = 32
+#: What ``listening`` asks of the ears.
+_NOTHING, _NOISE, _SOUND = 0.0, 1.0, 2.0
+#: A turn takes about so long, s/deg, and the motors lag by so much, s.
+_TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
+#: A step is no shorter, s.
+_SHORTEST_S = 0.5
+
+
+class SoundSearchParameters(Parameters):
+    """Times of a step, who calls, who waits, and where the robot stops."""
+
+    await_call: bool = True
+    """Whether it starts when the caller reports its find by radio; off: at once."""
+    caller: int = Field(default=1, ge=1, le=3)
+    """Address of the robot that calls (Song 2011, 3.3)."""
+    address: int = Field(default=2, ge=1, le=3)
+    """Of this robot in its radio frames."""
+    waits_for: int = Field(default=0, ge=0, le=3)
+    """Address of a robot that goes first: this one holds within ``hold_within_m`` of
+    the caller until that one reports its result; 0: none."""
+    hold_within_m: Length = 1.2
+    """By radio, m."""
+    hold_s: Duration = 200.0
+    """It holds for so long at most, s."""
+    call_within_s: Duration = 1800.0
+    """Without a call for so long it gives up, s."""
+    noise_s: Time = 0.5
+    """At the start it listens to the noise alone, s; 0: it does not."""
+    listen_s: Duration = 2.0
+    """Of a step, s (Song 2011, 4.3)."""
+    compute_s: Duration = 5.0
+    """Of a step, s (4.3)."""
+    move_s: Duration = 3.0
+    """Of a step, turning and driving, s (4.3)."""
+    stop: Literal["range", "radio"] = "range"
+    """It has arrived by the range that it hears, or by radio; or by radio alone, as
+    printed."""
+    stop_range_m: Length = 0.52
+    """Nearer than this to what it hears it has arrived, m."""
+    radio_gate_m: Length = 1.2
+    """Only this near by radio does the range that it hears count, m."""
+    radio_stop_m: Length = 0.42
+    """Nearer than this by radio, meant over a step's listening, it has arrived, m;
+    printed: 0.2 (4.3), where the robots' arms have long touched."""
+    tries: int = Field(default=3, ge=1, le=100)
+    """So many times in a row it may hear nothing, or not whence, before it gives up."""
+    most_steps: int = Field(default=30, ge=1, le=1_000)
+    """After so many steps the search is given up."""
+    report_every_s: Duration = 1.0
+    """Once it has ended it reports so by radio every so often, s."""
+
+
+class SoundSearchNumbers(NamedTuple):
+    """What the step of ``SoundSearch`` depends on; times in ticks."""
+
+    own: SoundSearchParameters
+    noise: int
+    listen: int
+    compute: int
+    move: int
+    hold: int
+    call_within: int
+    repeat: int
+    speed_m_s: float
+    level_dbm: float
+    """Of the radio at 1 m, dBm."""
+    exponent: float
+    """Of its path loss."""
+    tick_s: float
+
+
+@register_jitable
+def _end(state: Any, ended: int) -> None:
+    state[_ACTIVITY], state[_LEFT] = _OVER, 0.0
+    state[_MOVES], state[_LISTENING] = 0.0, _NOTHING
+    state[_ENDED] = ended
+
+
+@register_jitable
+def _receive(state: Any, air: Any, own: Any) -> None:
+    """Calls and results out of what is on the air."""
+    parser = state[_PARSER : _PARSER + PARSER_SIZE]
+    for k in range(int(air[0])):
+        good, address, function, value = parse_byte(parser, air[1 + k])
+        if good and address == own.caller and function == _FN_FOUND_ODOR:
+            state[_CALLED] = 1.0 if value > 0.5 else -1.0
+        if good and address == own.waits_for and function == _FN_RESULT:
+            state[_ARRIVED] = 1.0
+    for k in range(PARSER_SIZE):  # of a list, the slice was a copy
+        state[_PARSER + k] = parser[k]
+
+
+@register_jitable
+def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
+    """Until it is called; first it hears the noise."""
+    if state[_NOISE_LEFT] > 0.0:
+        state[_LISTENING] = _NOISE
+        state[_NOISE_LEFT] -= 1.0
+        return
+    state[_LISTENING] = _NOTHING
+    state[_WAITED] += 1.0
+    if not numbers.own.await_call or state[_CALLED] > 0.5:
+        _begin_step(state, numbers)
+    elif state[_CALLED] < -0.5:
+        _end(state, CALLER_LOST)
+    elif state[_WAITED] > numbers.call_within:
+        _end(state, NOT_CALLED)
+
+
+@register_jitable
+def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
+    """Listens, or holds for the one that goes first."""
+    own = numbers.own
+    state[_MOVES] = 0.0
+    near = 0.0 < state[_AWAY] < own.hold_within_m
+    if own.waits_for > 0 and state[_ARRIVED] < 0.5 and near:
+        state[_ACTIVITY], state[_LEFT] = _HOLDS, numbers.hold
+        return
+    state[_ACTIVITY], state[_LEFT] = _LISTENS, numbers.listen
+    state[_LISTENING] = _SOUND
+    state[_LEVELS] = state[_READINGS] = 0.0
+
+
+@register_jitable
+def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
+    """Listens again, if it may."""
+    state[_MISSES] += 1.0
+    if state[_MISSES] >= numbers.own.tries:
+        _end(state, ended)
+    else:
+        _begin_step(state, numbers)
+
+
+@register_jitable
+def _decide(
+    state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
+) -> None:
+    """Where to go by what was heard, or that it has arrived."""
+    bearing, distance, detected, ranged, ambiguous, lost = heard
+    own = numbers.own
+    state[_FAULT] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
+    level = state[_LEVELS] / max(state[_READINGS], 1.0)
+    away = 10.0 ** ((numbers.level_dbm - level) / (10.0 * numbers.exponent))
+    state[_AWAY] = away
+    if away < own.radio_stop_m:
+        _end(state, FOUND)
+        return
+    if detected < 0.5:
+        _missed(state, DEAF if lost > 0.5 else NOT_HEARD, numbers)
+        return
+    if ambiguous > 0.5:
+        _missed(state, AMBIGUOUS, numbers)
+        return
+    state[_MISSES] = 0.0
+    state[_BEARING] = math.degrees(bearing)
+    state[_RANGE] = distance if ranged > 0.5 else 0.0
+    near = own.stop == "range" and ranged > 0.5 and away < own.radio_gate_m
+    if near and distance < own.stop_range_m:
+        _end(state, FOUND)
+        return
+    if state[_STEPS] >= own.most_steps:
+        _end(state, STEPS_GONE)
+        return
+    move = numbers.move
+    if own.stop == "range" and ranged < 0.5 and away < own.radio_gate_m:
+        move = max(1, move // 2)  # near, but not told how near
+    if near:
+        way = distance - 0.93 * own.stop_range_m
+        time = way / numbers.speed_m_s + _LAG_S + _TURN_S_DEG * abs(state[_BEARING])
+        move = min(move, int(max(time, _SHORTEST_S) / numbers.tick_s))
+    state[_EXPECTED] = (heading - state[_BEARING] + 180.0) % 360.0 - 180.0
+    state[_STEPS] += 1.0
+    state[_ACTIVITY], state[_LEFT] = _MOVING, move
+    state[_MOVES] = 1.0
+    state[_TOLD] = 1.0
+
+
+@register_jitable
+def _tell(state: Any, tick: int, heading: float, numbers: SoundSearchNumbers) -> None:
+    """Frames of this tick."""
+    address = numbers.own.address
+    clear_frames(state, _FRAMES)
+    if state[_ACTIVITY] == _OVER:
+        if tick % numbers.repeat == 0:
+            found = 1.0 if state[_ENDED] == FOUND else 0.0
+            add_frame(state, _FRAMES, address, _FN_RESULT, found)
+    elif state[_TOLD] > 0.5:
+        add_frame(state, _FRAMES, address, _FN_HEADING, heading)
+        add_frame(state, _FRAMES, address, _FN_DIRECTION, -state[_BEARING])
+        add_frame(state, _FRAMES, address, _FN_DISTANCE, min(state[_RANGE], 99.0))
+        away = min(state[_AWAY], 99.0)
+        add_frame(state, _FRAMES, address, _FN_RADIO_DISTANCE, away)
+        state[_TOLD] = 0.0
+
+
+@register_jitable
+def _end_activity(
+    state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
+) -> None:
+    """What comes after what it was at."""
+    activity = state[_ACTIVITY]
+    if activity == _LISTENS:
+        state[_ACTIVITY], state[_LEFT] = _COMPUTES, numbers.compute
+        state[_LISTENING] = _NOTHING
+    elif activity == _COMPUTES:
+        _decide(state, heard, heading, numbers)
+    elif activity == _MOVING:
+        _begin_step(state, numbers)
+    elif activity == _HOLDS:
+        state[_ARRIVED] = 1.0
+        _begin_step(state, numbers)
+
+
+@register_jitable
+def sound_search_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: SoundSearchNumbers
+) -> None:
+    """One tick of the search; see ``systems.framework.step_block.Step``.
+
+    Args:
+        tick: Number of the tick.
+        state: Activity and what it holds, see the places above; changed.
+        inputs: As the input ports.
+        outputs: Left as they are: they are state.
+        numbers: ``SoundSearchNumbers``.
+    """
+    bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
+    heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
+    heading = headings[0]
+    if state[_STARTED] < 0.5:
+        state[_STARTED], state[_EXPECTED] = 1.0, heading
+        state[_ACTIVITY], state[_NOISE_LEFT] = _WAITS, numbers.noise
+    _receive(state, air, numbers.own)
+    if state[_ACTIVITY] == _WAITS:
+        _wait(state, numbers)
+    elif state[_ACTIVITY] != _OVER:
+        if state[_ACTIVITY] == _LISTENS:
+            state[_LEVELS] += levels[0]
+            state[_READINGS] += 1.0
+        state[_LEFT] -= 1.0
+        held = state[_ACTIVITY] == _HOLDS and state[_ARRIVED] > 0.5
+        if held or state[_LEFT] <= 0.0:
+            _end_activity(state, heard, heading, numbers)
+    state[_PHASE] = state[_ACTIVITY]
+    _tell(state, tick, heading, numbers)
+
+
+@register_jitable
+def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
+    """The outputs of ``sound_search_step``'s state."""
+    expected, move, listening, report, frames = outputs
+    expected[0], move[0] = state[_EXPECTED], state[_MOVES]
+    listening[0] = state[_LISTENING]
+    for k in range(len(report)):
+        report[k] = state[_REPORT + k]
+    for k in range(len(frames)):
+        frames[k] = state[_FRAMES + k]
+
+
+class SoundSearch(LeafSystem, StateOutputs):
+    """Finds a calling robot step by step: listens, turns and moves.
+
+    .. pydrake_system::
+
+        name: SoundSearch
+        input_ports:
+        - source_bearing [rad]
+        - source_range [m]
+        - detected [0 or 1]
+        - range_valid [0 or 1]
+        - ambiguous [0 or 1]
+        - lost_microphone [number, 0 none]
+        - rssi_dbm [dBm]
+        - heading_deg [deg, clockwise from north]
+        - air [number of bytes, and bytes, see systems.radio]
+        output_ports:
+        - expected_heading_deg [deg, clockwise from north]
+        - move [0 or 1]
+        - listening [number, 0 nothing, 1 noise, 2 sound]
+        - search_report [number of the ending, activity, steps, sum of faults]
+        - frames [number, and nine bytes each, see systems.radio]
+
+    It hears the noise for ``noise_s``, then waits for the call of ``caller``: a frame
+    that says that the odour source is found. A step listens for ``listen_s``, computes
+    for ``compute_s`` and lets the robot turn and drive for ``move_s``, less where the
+    source is near. Two robots that come to one caller go one after the other: the
+    one that ``waits_for`` the other holds near the caller until that one has
+    reported its result, found or not, or ``hold_s`` are over. Sound that fits several
+    directions is not followed; it listens again, and gives up after ``tries``.
+    Endings and faults are those of ``systems.search.search_ending``. The activity is 1
+    waiting, 2 holding, 3 listening, 4 computing, 5 moving, 6 over.
+
+    Discrete state, every tick: the outputs, the radio's parser, and what the step
+    has measured so far. Latency: a tick.
+
+    Args:
+        parameters: ``SoundSearchParameters``.
+        radio: By which a level becomes a distance.
+        speed_m_s: Of the robot at full duty, m/s.
+        tick_s: Period of the update, s.
+
+    Reference: Song 2011, 3.2.3 and 4.3; the stop by range, and who waits, are ours.
+    """
+
+    FACTS = BlockFacts(
+        "controller",
+        "control",
+        columns={
+            "expected_heading_deg": ("expected_heading_deg",),
+            "move": ("move",),
+            "listening": ("listening",),
+            "search_report": REPORT_COLUMNS,
+        },
+    )
+
+    def __init__(
+        self,
+        *,
+        parameters: SoundSearchParameters | None = None,
+        radio: RadioParameters | None = None,
+        speed_m_s: float = 0.14,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        own, radio = parameters or SoundSearchParameters(), radio or RadioParameters()
+        numbers = SoundSearchNumbers(
+            own,
+            ticks_of(own.noise_s, tick_s, least=0),
+            ticks_of(own.listen_s, tick_s),
+            ticks_of(own.compute_s, tick_s),
+            ticks_of(own.move_s, tick_s),
+            ticks_of(own.hold_s, tick_s),
+            ticks_of(own.call_within_s, tick_s),
+            ticks_of(own.report_every_s, tick_s),
+            speed_m_s,
+            radio.level_at_1_m_dbm,
+            radio.path_loss_exponent,
+            tick_s,
+        )
+        self.set_name("sound_search")
+        single = (
+            "source_bearing",
+            "source_range",
+            "detected",
+            "range_valid",
+            "ambiguous",
+            "lost_microphone",
+            "rssi_dbm",
+            "heading_deg",
+        )
+        self.declare_state_outputs(
+            Step(sound_search_step, numbers, [0.0] * _SIZE, _publish),
+            (*((name, 1) for name in single), ("air", AIR_SIZE)),
+            (
+                ("expected_heading_deg", 1),
+                ("move", 1),
+                ("listening", 1),
+                ("search_report", len(REPORT_COLUMNS)),
+                ("frames", FRAMES_SIZE),
+            ),
+            tick_s,
+        )

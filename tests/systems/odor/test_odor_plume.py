@@ -1,0 +1,137 @@
+"""Puffs against their mean, wind, background and seeds."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from systems.framework.input_error import InputError
+from systems.odor.odor_plume import (
+    PUFFS_BEGIN,
+    OdorParameters,
+    OdorPlume,
+    concentration,
+    release_rate,
+)
+from systems.odor.steady_plume import steady_concentration
+from systems.odor.wind import WindField, WindParameters, wind_velocity
+
+WIND = WindParameters()
+INTENSITY = math.sqrt(0.12**2 + 0.12**2 + 0.1**2)
+
+
+def carried(seconds, *, seed=1, own=None, wind=WIND, every=1.0, parts=1):
+    """Ports ``plume`` of a run, a row every so often, s.
+
+    Wind and plume go on by 0.1 s, or by so many parts of it.
+    """
+    own, tick_s = own or OdorParameters(), 0.025
+    field = WindField(parameters=wind, seed=seed, tick_s=tick_s).step
+    puffs = OdorPlume(parameters=own, wind=wind, seed=seed + 1, tick_s=tick_s).step
+    period = field.numbers.period // parts
+    dt = period * tick_s
+    of_wind = field.numbers._replace(
+        period=period, keep=math.exp(-dt / wind.meander_time_s)
+    )
+    of_puffs = puffs.numbers._replace(
+        period=period, period_s=dt, own_keep=math.exp(-dt / own.own_time_s)
+    )
+    air, plume = np.array(field.state), np.array(puffs.state)
+    rows = []
+    for tick in range(0, round(seconds / tick_s), period):
+        before = air.copy()
+        field.step(tick, air, (), (), of_wind)
+        puffs.step(tick, plume, (before,), (), of_puffs)
+        if tick % round(every / tick_s) == 0:
+            rows.append(plume.copy())
+    return rows
+
+
+POINTS = [
+    (x, off * INTENSITY * x) for x in (0.5, 1.0, 1.5, 2.0) for off in (0, 0.5, -0.9)
+]
+
+
+def means(rows):
+    return np.array(
+        [np.mean([concentration(r, *p, 0.0) for r in rows]) for p in POINTS]
+    )
+
+
+def test_their_mean_over_fifty_minutes_is_equation_6():
+    own = OdorParameters()
+    got = means(carried(3000.0, every=0.5))
+    expected = [
+        steady_concentration(x, y, 0, 0, release_rate(own), 1.0, (0.197, 0.197, 0.13))
+        for x, y in POINTS
+    ]
+    np.testing.assert_allclose(got, expected, rtol=0.15)
+
+
+def test_half_the_period_changes_no_mean_by_a_twentieth():
+    """Every 0.1 s and every 0.05 s, with other random numbers, over four runs each."""
+    runs = [
+        [carried(3000.0, seed=s, every=0.5, parts=parts) for s in range(20, 60, 10)]
+        for parts in (1, 2)
+    ]
+    assert {len(rows) for part in runs for rows in part} == {6000}
+    whole, halved = (np.mean([means(rows) for rows in part], axis=0) for part in runs)
+    np.testing.assert_allclose(halved, whole, rtol=0.05)
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    first, again, other = (carried(20.0, seed=s)[-1] for s in (4, 4, 5))
+    assert first.tobytes() == again.tobytes()
+    assert first.tobytes() != other.tobytes()
+
+
+def test_the_strength_is_what_a_sensor_reads_two_metres_downwind():
+    own = OdorParameters(kind="steady", ratio_at_2_m=0.6)
+    plume = np.array(OdorPlume(parameters=own, wind=WIND).step.state)
+    assert (1.0 + concentration(plume, 2.0, 0.0, 0.0)) ** -0.7155 == pytest.approx(0.6)
+
+
+def test_a_closed_room_fills():
+    """Q t / V, whatever the wind does."""
+    own = OdorParameters(age_s=60.0, room_volume_m3=37.5)
+    plume = carried(30.0, own=own)[-1]
+    far = concentration(plume, -50.0, 0.0, 0.0)
+    assert far == pytest.approx(release_rate(own) * 89.1 / 37.5, rel=0.02)
+
+
+def test_without_wind_puffs_stay_and_spread():
+    own = OdorParameters(age_s=0.0)
+    calm = WindParameters(speed_m_s=0.0)
+    plume = carried(60.0, own=own, wind=calm)[-1]
+    assert np.isfinite(plume).all()
+    assert np.abs(plume[PUFFS_BEGIN::7][: int(plume[2])]).max() < 1e-9
+    with pytest.raises(InputError, match=r"wind\.speed_m_s"):
+        OdorPlume(parameters=OdorParameters(kind="steady"), wind=calm)
+
+
+def test_the_unsteady_wind_has_its_spread_and_its_memory():
+    """An Ornstein-Uhlenbeck process: sd 0.12, correlation exp(-1) after 8 s."""
+    step = WindField(parameters=WIND, seed=2).step
+    air, rows = np.array(step.state), []
+    for tick in range(0, 4 * 60_000, 4):
+        step.step(tick, air, (), (), step.numbers)
+        rows.append(air[3:5].copy())
+    gusts = np.array(rows)
+    np.testing.assert_allclose(gusts.std(axis=0), 0.12, rtol=0.08)
+    for gust in gusts.T:
+        later = np.corrcoef(gust[:-80], gust[80:])[0, 1]
+        assert later == pytest.approx(math.exp(-1.0), abs=0.1)
+
+
+def test_a_jet_widens_slows_and_blows_nothing_backwards():
+    wind = WindParameters(
+        kind="jet", meander_intensity=0.0, jet_origin_m=(0.0, 0.0), jet_diameter_m=0.3
+    )
+    air = np.array(WindField(parameters=wind).step.state)
+    assert wind_velocity(air, -0.1, 0.0) == (0.0, 0.0)
+    assert wind_velocity(air, 1.0, 0.0)[0] == pytest.approx(1.0)
+    assert wind_velocity(air, 3.6, 0.0)[0] == pytest.approx(0.5)
+    half_width = 0.15 + 0.1 * 3.6
+    assert wind_velocity(air, 3.6, half_width)[0] == pytest.approx(0.5 * math.exp(-0.5))
