@@ -19,8 +19,7 @@ from diagrams.robot import (
     multiplexed,
     parts_of,
 )
-from diagrams.scenario import ODOR, Scenario
-from diagrams.searching.world_blocks import WORLD
+from diagrams.scenario import ODOR, WORLD, Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
 

@@ -17,9 +17,9 @@ from diagrams.laws import commanded, make_command, make_controller
 from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.routed_robot import routed_blocks, trajectory_command
-from diagrams.scenario import ROBOT, SOURCE, Scenario
+from diagrams.scenario import ROBOT, SOURCE, WORLD, Scenario
 from diagrams.searching.searching_robot import search_command, searching_blocks
-from diagrams.searching.world_blocks import WORLD, world_blocks
+from diagrams.searching.world_blocks import world_blocks
 from systems import (
     CollisionVector,
     DiffDrivePlant,

@@ -39,12 +39,14 @@ from systems.sound.waveforms import SoundParameters
 from systems.world.geometry import rectangle_clearance
 from systems.world.paths import WaypointPath
 
-__all__ = ["GOAL", "ODOR", "ROBOT", "SOURCE", "Scenario"]
+__all__ = ["GOAL", "ODOR", "ROBOT", "SOURCE", "WORLD", "Scenario"]
 
 #: Names of the robot and of the source where there is one of each.
 ROBOT, SOURCE = "robot", "source"
 #: Name of what a robot with a route drives to.
 GOAL = "goal"
+#: Name of what all robots share in the diagram.
+WORLD = "world"
 #: Name of what smells.
 ODOR = "odor"
 
@@ -256,7 +258,13 @@ class Scenario(FollowerParameters, RunParameters):
 
     @model_validator(mode="after")
     def _check_names(self) -> Scenario:
-        taken = list(self.all_robots)
+        taken = [ODOR] if self.odor is not None else []
+        for name in self.all_robots:
+            if name in (WORLD, *taken):
+                raise InputError(
+                    "robots", f"the name {name!r} is taken; give the robot another one"
+                )
+        taken += self.all_robots
         for field, names in (
             ("sources", self.all_sources),
             ("obstacles", [obstacle.name for obstacle in self.obstacles]),

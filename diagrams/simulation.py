@@ -16,8 +16,7 @@ from diagrams.compiled.loop import CompiledLoop, compile_loop
 from diagrams.compiled.loop_blocks import shared_blocks, shared_world
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
-from diagrams.scenario import Scenario
-from diagrams.searching.world_blocks import WORLD
+from diagrams.scenario import WORLD, Scenario
 from diagrams.stop_rules import RunRules, StopRules
 from systems.framework.input_error import InputError
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -67,24 +68,32 @@ def _distance(axes: Axes, result: RunResult) -> None:
     axes.set_ylim(0.0, 1.1 * max(found, float(np.max(away))))
 
 
+def _curves(
+    axes: Axes, result: RunResult, curves: Sequence[tuple[str, str, str]], width: float
+) -> None:
+    """Columns, their labels and colours; angles are not joined where they wrap."""
+    for name, label, colour in curves:
+        values = result.columns[name].copy()
+        values[1:][np.abs(np.diff(values)) > 180.0] = np.nan
+        axes.plot(result.time, values, color=COLOURS[colour], lw=width, label=label)
+
+
 def _gas(axes: Axes, result: RunResult) -> None:
-    for name, label, colour in (
+    sides = (
         ("gas_left", "R3, left", "left"),
         ("gas_right", "R1, right", "right"),
         ("gas_rear", "R2, rear", "empty"),
-    ):
-        values = result.columns[name]
-        axes.plot(result.time, values, color=COLOURS[colour], lw=0.9, label=label)
+    )
+    _curves(axes, result, sides, 0.9)
     axes.set_ylabel("gas, Rs/R0")
 
 
 def _airflow(axes: Axes, result: RunResult) -> None:
-    for name, label, colour in (
+    sides = (
         ("airflow_left", "F1, left", "left"),
         ("airflow_right", "F2, right", "right"),
-    ):
-        values = result.columns[name]
-        axes.plot(result.time, values, color=COLOURS[colour], lw=0.7, label=label)
+    )
+    _curves(axes, result, sides, 0.7)
     if result.scenario.search.rules == "song2011":
         threshold = result.scenario.search.song2011.airflow_threshold
         axes.axhline(threshold, color="black", ls="--", lw=1.0, label="threshold")
@@ -109,13 +118,8 @@ def _level(axes: Axes, result: RunResult) -> None:
 
 
 def _heading(axes: Axes, result: RunResult) -> None:
-    for name, label, colour, width in (
-        ("expected_heading_deg", "expected", "source", 1.4),
-        ("heading_deg", "compass", "robot", 0.7),
-    ):
-        values = result.columns[name].copy()
-        values[1:][np.abs(np.diff(values)) > 180.0] = np.nan
-        axes.plot(result.time, values, color=COLOURS[colour], lw=width, label=label)
+    _curves(axes, result, (("expected_heading_deg", "expected", "source"),), 1.4)
+    _curves(axes, result, (("heading_deg", "compass", "robot"),), 0.7)
     axes.set_ylabel("heading\n(deg from north)")
 
 
@@ -124,28 +128,17 @@ def _phase(axes: Axes, result: RunResult) -> None:
     names = _PHASES[result.scenario.search.rules if smells else "sound"]
     phase = result.columns["search_phase"]
     axes.plot(result.time, phase, color=COLOURS["robot"], lw=1.2, label="phase")
-    moves = result.columns["move"] > 0.5
-    axes.fill_between(
-        result.time,
-        0.5,
-        len(names) - 0.5,
-        where=moves.tolist(),
-        color=COLOURS["seen"],
-        alpha=0.2,
-        lw=0.0,
-        label="moves",
-    )
+    shades = [("moves", result.columns["move"] > 0.5, "seen", 0.2)]
     if "listening" in result.columns:
-        listens = result.columns["listening"] > 1.5
-        axes.fill_between(
-            result.time,
-            0.5,
-            len(names) - 0.5,
-            where=listens.tolist(),
-            color=COLOURS["echo"],
-            alpha=0.3,
-            lw=0.0,
-            label="listens",
-        )
+        shades.append(("listens", result.columns["listening"] > 1.5, "echo", 0.3))
+    top = len(names) - 0.5
+    for label, where, colour, alpha in shades:
+        style: dict[str, Any] = {
+            "color": COLOURS[colour],
+            "alpha": alpha,
+            "label": label,
+            "lw": 0.0,
+        }
+        axes.fill_between(result.time, 0.5, top, where=where.tolist(), **style)
     axes.set_yticks(range(1, len(names)), names[1:])
     axes.set_ylim(0.5, len(names) - 0.5)

@@ -22,8 +22,7 @@ from diagrams.compiled.loop_blocks import LoopBlocks
 from diagrams.compiled.parts import run_parts
 from diagrams.compiled.plan import LoopPlan, LoopRobot, LoopWorld
 from diagrams.compiled.sounds import sounds_of_a_run
-from diagrams.scenario import Scenario
-from diagrams.searching.world_blocks import WORLD
+from diagrams.scenario import WORLD, Scenario
 from diagrams.stop_rules import JudgedTick, RunRules
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened

@@ -9,10 +9,7 @@ from diagrams.scenario import Scenario
 from diagrams.search_checks import address_of_robot
 from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
-__all__ = ["WORLD", "radio_nodes", "world_blocks"]
-
-#: Name of the diagram of these blocks.
-WORLD = "world"
+__all__ = ["radio_nodes", "world_blocks"]
 
 
 def radio_nodes(scenario: Scenario) -> dict[str, int]:

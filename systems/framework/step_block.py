@@ -10,9 +10,10 @@ from pydrake.common.value import Value
 
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
+from systems.framework.noise import tick_noise
 from systems.framework.scalar_math import float_of
 
-__all__ = ["RunFacts", "Step", "StepBlock"]
+__all__ = ["RunFacts", "Step", "StepBlock", "reseeded"]
 
 
 class Step(NamedTuple):
@@ -61,6 +62,21 @@ class RunFacts(NamedTuple):
     """(n, 5) x, y, theta, length, width of what the robot's map has, m and rad."""
     goal: tuple[float, float] | None = None
     """Where it drives to, m, if it has a goal."""
+
+
+def reseeded(block: Any, run: RunFacts) -> Step:
+    """The step of a block whose numbers have a ``noise``, with that of a run.
+
+    Args:
+        block: Has a step, and a name.
+        run: Knows the seed.
+
+    Returns:
+        What the block does in the run.
+    """
+    step: Step = block.step
+    noise = tick_noise(run.seed_of(block.get_name()))
+    return step._replace(numbers=step.numbers._replace(noise=noise))
 
 
 class StepBlock:

@@ -14,7 +14,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.parameters import Angle, Parameters
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 
 __all__ = [
     "CompassParameters",
@@ -22,6 +22,7 @@ __all__ = [
     "field_in_body",
     "heading_of_field",
     "magnetic_heading_step",
+    "wrapped_deg",
 ]
 
 _Part = Annotated[float, Field(ge=-0.9, le=0.9)]
@@ -40,6 +41,16 @@ class CompassParameters(Parameters):
     """By what the components along x and y of B are multiplied."""
     noise_deg: float = Field(default=0.5, ge=0.0, le=90.0)
     """Standard deviation of the heading, deg."""
+
+
+@register_jitable
+def wrapped_deg(angle: float) -> float:
+    """An angle in (-180, 180] deg.
+
+    Args:
+        angle: deg.
+    """
+    return 180.0 - (180.0 - angle) % 360.0
 
 
 @register_jitable
@@ -101,8 +112,7 @@ def magnetic_heading_step(
         normals = np.empty((1, 2), dtype=np.float32)
         fill_with_tick_noise(numbers.noise, tick, normals)
         heading += numbers.own.noise_deg * float(normals[0, 0])
-    heading = 180.0 - (180.0 - heading) % 360.0
-    outputs[0][0] = heading
+    outputs[0][0] = wrapped_deg(heading)
 
 
 class MagneticHeading(LeafSystem, StepBlock):
@@ -151,5 +161,4 @@ class MagneticHeading(LeafSystem, StepBlock):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
+        return reseeded(self, run)

@@ -11,6 +11,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.parameters import NonNegative, Parameters, Positive
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
+from systems.heading.compass import wrapped_deg
 
 __all__ = [
     "PULSE_WIDTHS",
@@ -19,7 +20,6 @@ __all__ = [
     "heading_controller_step",
     "heading_error",
     "motor_duties",
-    "wrapped_deg",
 ]
 
 #: How an error becomes duties: mended, as printed, and with the missing ``else`` alone.
@@ -50,16 +50,6 @@ class HeadingControlParameters(Parameters):
     """``mended``: duties go from full ahead to turning on the spot without a jump;
     ``printed``: table 2, which drives backwards; ``else_only``: with its missing
     ``else`` alone."""
-
-
-@register_jitable
-def wrapped_deg(angle: float) -> float:
-    """An angle in (-180, 180] deg.
-
-    Args:
-        angle: deg.
-    """
-    return 180.0 - (180.0 - angle) % 360.0
 
 
 @register_jitable

@@ -51,7 +51,7 @@ _DEAF = 1e-4
 #: Of what the occupied bins of all pairs would sum up to if they came from one place,
 #: sound reaches more than this,
 _COHERENT = 0.15
-#: and more than n bins of chance do: 4.6 over the root of 2 n, at most, in 30 silences.
+#: and more than n bins of chance do: 5.1 over the root of 2 n, at most, in 60 silences.
 _CHANCE = 5.5
 #: Fewer frames than this are no estimate.
 _LEAST_FRAMES = 4
@@ -460,8 +460,10 @@ class CrossPowerEstimator(LeafSystem):
         return outputs
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
-        memory = self._remembered(context)
         asked = round(float(read_arrays(context, [self._listening])[0][0]))
+        if asked == _NOTHING and not context.get_discrete_state(len(_PORTS)).value()[0]:
+            return  # without reading the sums, which are long
+        memory = self._remembered(context)
 
         def frame() -> AudioFrame:
             audio = self._audio.Eval(context)

@@ -18,8 +18,11 @@ __all__ = [
     "signal_powers",
 ]
 
-#: A bin is occupied where this share of the channels' power is the sound's.
+#: A bin is occupied where this share of the channels' power is the sound's,
 _LEAST_SHARE = 0.25
+#: and more than this share of the noise's: its cross power differs by about as much
+#: from one second to the next.
+_LEAST_OVER_NOISE = 0.3
 #: Or, relative to the strongest bin, this share of its power.
 _LEAST_POWER = 1e-4
 #: Points of a correlation between two samples.
@@ -117,18 +120,24 @@ def signal_powers(
 
     Returns:
         (pairs, bins) means, and (pairs, bins) whether a bin is occupied: by a good
-        share of both channels' power, and not far below the strongest.
+        share of both channels' power, not far below the strongest, and above what
+        noise leaves when it is subtracted.
     """
-    mean = sound.pairs / sound.frames
+    mean, own = sound.pairs / sound.frames, sound.own / sound.frames
+    steady = np.zeros_like(own)
     if noise is not None and noise.frames > 0.0:
         mean = mean - noise.pairs / noise.frames
-    own = sound.own / sound.frames
+        steady = noise.own / noise.frames
     first, second = np.array(facts.pairs).T
-    size, both = np.abs(mean), np.sqrt(own[first] * own[second])
+    own = np.maximum(own - steady, 0.0)
+    both = np.sqrt(own[first] * own[second])
+    left = _LEAST_OVER_NOISE * np.sqrt(steady[first] * steady[second])
+    size = np.abs(mean)
     f = facts.frequencies_hz
     inside = (f >= band_hz[0]) & (f <= band_hz[1])
     strongest = np.max(np.where(inside, size, 0.0), axis=1, keepdims=True)
-    occupied = inside & (size > _LEAST_SHARE * both) & (size > _LEAST_POWER * strongest)
+    least = np.maximum(_LEAST_SHARE * both, left)
+    occupied = inside & (size > least) & (size > _LEAST_POWER * strongest)
     return mean, occupied
 
 

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["interpolate_sphere", "near_or_far", "plane_wave_bearing", "y_array_source"]
+__all__ = ["interpolate_sphere", "near_or_far", "plane_wave_bearing"]
 
 #: Places farther than this are none: the plane wave's bearing is better, m.
 FARTHEST_M = 4.0
@@ -38,28 +38,6 @@ def interpolate_sphere(
         return np.full(S.shape[1], np.inf), math.inf
     distance = float(left @ delta / below)
     return 0.5 * inverse @ (delta - 2.0 * distance * d), distance
-
-
-def y_array_source(arm: float, d: ArrayLike) -> tuple[float, float, float]:
-    """The same in closed form for a Y of three equal arms, 120 deg apart.
-
-    Args:
-        arm: l, m; the first one points along x.
-        d: (3,) differences of range, m.
-
-    Returns:
-        (x, y) of the source from the middle, m, and its range, m; of a source above or
-        below the plane its place on it, and the slanted range.
-    """
-    d1, d2, d3 = np.asarray(d, dtype=float)
-    total = d1 + d2 + d3
-    if total == 0.0:
-        return math.inf, math.inf, math.inf
-    distance = (3.0 * arm**2 - (d1**2 + d2**2 + d3**2)) / (2.0 * total)
-    half = [0.5 * (arm**2 - each**2) - distance * each for each in (d1, d2, d3)]
-    x = 2.0 / (3.0 * arm) * (half[0] - 0.5 * (half[1] + half[2]))
-    y = 2.0 / (3.0 * arm) * math.sqrt(0.75) * (half[1] - half[2])
-    return float(x), float(y), float(distance)
 
 
 def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:

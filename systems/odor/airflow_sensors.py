@@ -15,7 +15,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.parameters import Parameters, Positive
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.odor.wind import WIND_SIZE, wind_velocity
 
 __all__ = ["AirflowParameters", "AirflowSensors", "airflow_reading", "airflow_step"]
@@ -147,5 +147,4 @@ class AirflowSensors(LeafSystem, StepBlock):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
+        return reseeded(self, run)

@@ -35,7 +35,6 @@ from systems.odor.wind import (
 __all__ = [
     "MOST_PUFFS",
     "PLUME_SIZE",
-    "PUFF",
     "PUFFS_BEGIN",
     "PUFF_SIZE",
     "OdorParameters",
@@ -50,7 +49,6 @@ MOST_PUFFS = 320
 #: Numbers of a puff: x, y in W, m; its own velocity, m/s; its spreads level and
 #: upright, m; what it holds.
 PUFF_SIZE = 7
-PUFF = ("x", "y", "vx", "vy", "level_spread", "upright_spread", "amount")
 _X, _Y, _VX, _VY, _LEVEL, _UPRIGHT, _AMOUNT = range(PUFF_SIZE)
 # The port ``plume``: background, kind, number of puffs, part of the next one, height of
 # the source, and how long it has been released, then the puffs.

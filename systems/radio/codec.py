@@ -12,11 +12,12 @@ from numba.extending import register_jitable
 from systems.framework.input_error import InputError
 
 __all__ = [
+    "FIRST_BYTE",
     "FRAMES_SIZE",
     "FRAME_BYTES",
     "FRAME_NAMES",
-    "HEAD",
     "MOST_FRAMES",
+    "SECOND_BYTE",
     "SINK",
     "Frame",
     "decode_frame",
@@ -32,7 +33,8 @@ FRAME_BYTES = 9
 MOST_FRAMES = 4
 #: Size of the port ``frames``: how many, then their bytes.
 FRAMES_SIZE = 1 + FRAME_BYTES * MOST_FRAMES
-HEAD = (0xFA, 0xFB)
+#: By which a frame begins.
+FIRST_BYTE, SECOND_BYTE = 0xFA, 0xFB
 #: Address of the sink, beside those of the robots, 1 to 3.
 SINK = 4
 _FILL = 0xFF
@@ -89,15 +91,15 @@ def write_frame(
         value: Angles in deg, sent as 0 to 359.9 to a tenth; flags 0 or 1; commands
             have none; all else 0 to 99.99 to a hundredth, limited to that.
     """
-    out[first], out[first + 1] = 250.0, 251.0
+    out[first], out[first + 1] = float(FIRST_BYTE), float(SECOND_BYTE)
     out[first + 2], out[first + 3] = float(address), float(function)
     if _is_command(function):
         for k in range(4, 8):
-            out[first + k] = 255.0
+            out[first + k] = float(_FILL)
     elif _is_flag(function):
         out[first + 4] = 1.0 if value > 0.5 else 0.0
         for k in range(5, 8):
-            out[first + k] = 255.0
+            out[first + k] = float(_FILL)
     else:
         if _is_angle(function):
             digits = math.floor(10.0 * value + 0.5) % 3600
@@ -126,7 +128,7 @@ def frame_is_sound(data: Any, first: int) -> bool:
     total = 0
     for k in range(8):
         total += int(data[first + k])
-    sound = int(data[first]) == 250 and int(data[first + 1]) == 251
+    sound = int(data[first]) == FIRST_BYTE and int(data[first + 1]) == SECOND_BYTE
     sound = sound and total % 256 == int(data[first + 8])
     function = int(data[first + 3])
     sound = sound and 1 <= int(data[first + 2]) <= 4 and function <= 16

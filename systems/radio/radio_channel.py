@@ -16,7 +16,7 @@ from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.parameters import Fraction, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs
-from systems.framework.step_block import RunFacts, Step
+from systems.framework.step_block import RunFacts, Step, reseeded
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 
 __all__ = ["AIR_SIZE", "RadioChannel", "RadioParameters", "radio_channel_step"]
@@ -163,5 +163,4 @@ class RadioChannel(LeafSystem, StateOutputs):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
+        return reseeded(self, run)

@@ -12,7 +12,7 @@ from pydrake.systems.framework import LeafSystem
 from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.radio.radio_channel import RadioParameters
 
 __all__ = ["RadioRange", "radio_distance", "radio_level", "radio_range_step"]
@@ -139,5 +139,4 @@ class RadioRange(LeafSystem, StepBlock):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
+        return reseeded(self, run)

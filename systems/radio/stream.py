@@ -7,7 +7,14 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from systems.radio.codec import FRAME_BYTES, Frame, frame_is_sound, frame_value
+from systems.radio.codec import (
+    FIRST_BYTE,
+    FRAME_BYTES,
+    SECOND_BYTE,
+    Frame,
+    frame_is_sound,
+    frame_value,
+)
 
 __all__ = ["PARSER_SIZE", "StreamParser", "parse_byte"]
 
@@ -18,9 +25,9 @@ PARSER_SIZE = 1 + FRAME_BYTES
 @register_jitable
 def _is_begin(state: Any, count: int) -> bool:
     """Whether the bytes held can still become a frame."""
-    if count >= 1 and state[1] != 250.0:
+    if count >= 1 and state[1] != FIRST_BYTE:
         return False
-    return not (count >= 2 and state[2] != 251.0)
+    return not (count >= 2 and state[2] != SECOND_BYTE)
 
 
 @register_jitable

@@ -23,7 +23,7 @@ from systems.framework.parameters import (
     Time,
 )
 from systems.framework.signals import TICK_S, whole
-from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.ranging.objects import (
     KNOWN,
     OBJECT_SIZE,
@@ -294,6 +294,4 @@ class IdealObjectSensor(LeafSystem, StepBlock):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        step = self.step
-        return step._replace(numbers=step.numbers._replace(noise=noise))
+        return reseeded(self, run)

@@ -14,8 +14,8 @@ from systems.framework.parameters import Duration, Fraction, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs, ticks_of
 from systems.framework.step_block import Step
+from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
-from systems.search.report_frames import add_frame, clear_frames
 from systems.search.search_ending import (
     FOUND,
     NO_NOSE,
@@ -24,6 +24,22 @@ from systems.search.search_ending import (
     REPORT_COLUMNS,
     STEPS_GONE,
     UNDECIDED,
+)
+from systems.search.search_state import (
+    ACTIVITY,
+    ENDED,
+    EXPECTED,
+    FAULT,
+    FLAG,
+    LEFT,
+    MOVES,
+    OWN,
+    PHASE,
+    STARTED,
+    STEPS,
+    add_frame,
+    clear_frames,
+    publish_search,
 )
 from systems.search.song_rules import SongRuleParameters, song2011_turn
 from systems.search.upwind_gradient import (
@@ -37,15 +53,8 @@ __all__ = ["PlumeSearch", "PlumeSearchParameters", "plume_search_step"]
 #: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
 _WAIT, _SENSE, _MOVE, _OVER = range(4)
-# Places in the state.
-_ACTIVITY, _LEFT, _STARTED = 0, 1, 2
-_EXPECTED, _MOVES, _CALLING = 3, 4, 5
-_REPORT = 6
-_ENDED, _PHASE, _STEPS, _FAULT = range(_REPORT, _REPORT + 4)
-_TOLD = 10
-_COUNT = 11
-_SMELT, _BEFORE = 12, 13
-_SUM = 14
+# Places in the state, after those of both searches.
+_TOLD, _COUNT, _SMELT, _BEFORE, _SUM = range(OWN, OWN + 5)
 _LEAST = _SUM + _SENSED
 _MOST = _LEAST + _SENSED
 _MEAN = _MOST + _SENSED
@@ -109,8 +118,8 @@ class PlumeSearchNumbers(NamedTuple):
 
 @register_jitable
 def _begin_stop(state: Any, numbers: PlumeSearchNumbers) -> None:
-    state[_ACTIVITY], state[_LEFT] = _WAIT, numbers.wait
-    state[_MOVES] = 0.0
+    state[ACTIVITY], state[LEFT] = _WAIT, numbers.wait
+    state[MOVES] = 0.0
     state[_COUNT] = 0.0
     for k in range(_SENSED):
         state[_SUM + k] = 0.0
@@ -154,17 +163,17 @@ def _average(state: Any) -> int:
         for k in range(3):
             if (int(bits) >> k) & 1:
                 state[_MEAN + k] = others / alive
-    switches = int(state[_FAULT]) // _STUCK * _STUCK
-    state[_FAULT] = switches + bits
+    switches = int(state[FAULT]) // _STUCK * _STUCK
+    state[FAULT] = switches + bits
     return alive
 
 
 @register_jitable
 def _end(state: Any, ended: int) -> None:
-    state[_ACTIVITY], state[_LEFT] = _OVER, 0.0
-    state[_MOVES] = 0.0
-    state[_ENDED] = ended
-    state[_CALLING] = 1.0 if ended == FOUND else 0.0
+    state[ACTIVITY], state[LEFT] = _OVER, 0.0
+    state[MOVES] = 0.0
+    state[ENDED] = ended
+    state[FLAG] = 1.0 if ended == FOUND else 0.0
 
 
 @register_jitable
@@ -173,7 +182,7 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     if _average(state) < 2:
         _end(state, NO_NOSE)
         return
-    if state[_STEPS] >= numbers.most_steps:
+    if state[STEPS] >= numbers.most_steps:
         _end(state, STEPS_GONE)
         return
     mean = state[_MEAN], state[_MEAN + 1], state[_MEAN + 2]
@@ -182,14 +191,14 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     turn, phase, ended = numbers.turn(mean, blown, memory, numbers.rules)
     for k in range(RULE_MEMORY):  # of a list, the slice was a copy
         state[_MEMORY + k] = memory[k]
-    state[_PHASE] = phase
+    state[PHASE] = phase
     if ended != UNDECIDED:
         _end(state, ended)
         return
-    state[_EXPECTED] = (heading + turn + 180.0) % 360.0 - 180.0
-    state[_STEPS] += 1.0
-    state[_ACTIVITY], state[_LEFT] = _MOVE, numbers.move
-    state[_MOVES] = 1.0
+    state[EXPECTED] = wrapped_deg(heading + turn)
+    state[STEPS] += 1.0
+    state[ACTIVITY], state[LEFT] = _MOVE, numbers.move
+    state[MOVES] = 1.0
     state[_TOLD] = 2.0
     here = min(mean[0], mean[1], mean[2])
     state[_SMELT], state[_BEFORE] = min(here, state[_BEFORE]), here
@@ -198,17 +207,17 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
 @register_jitable
 def _check_switches(state: Any, contact: Any) -> bool:
     """Whether something is touched; switches that are closed at the start are stuck."""
-    if state[_STARTED] < 0.5:
-        state[_STARTED] = 1.0
+    if state[STARTED] < 0.5:
+        state[STARTED] = 1.0
         for k in range(2):
             if contact[k] > 0.5:
-                state[_FAULT] += _STUCK << k
+                state[FAULT] += _STUCK << k
         if contact[0] > 0.5 and contact[1] > 0.5:
             _end(state, NO_TOUCH)
             return False
     touched = False
     for k in range(2):
-        stuck = (int(state[_FAULT]) // (_STUCK << k)) % 2 == 1
+        stuck = (int(state[FAULT]) // (_STUCK << k)) % 2 == 1
         touched = touched or (contact[k] > 0.5 and not stuck)
     return touched
 
@@ -225,13 +234,13 @@ def _tell(state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers) ->
     """Frames of this tick: what a step has measured, and in the end its result."""
     address = numbers.address
     clear_frames(state, _FRAMES)
-    if state[_ACTIVITY] == _OVER:
+    if state[ACTIVITY] == _OVER:
         if tick % numbers.repeat == 0:
-            add_frame(state, _FRAMES, address, _FN_RESULT, state[_CALLING])
+            add_frame(state, _FRAMES, address, _FN_RESULT, state[FLAG])
         return
     if state[_TOLD] == 2.0:
         add_frame(state, _FRAMES, address, _FN_HEADING, heading)
-        add_frame(state, _FRAMES, address, _FN_SET, state[_EXPECTED])
+        add_frame(state, _FRAMES, address, _FN_SET, state[EXPECTED])
         add_frame(state, _FRAMES, address, _FN_GAS, state[_MEAN])
         add_frame(state, _FRAMES, address, _FN_GAS + 1, state[_MEAN + 1])
         state[_TOLD] = 1.0
@@ -257,24 +266,24 @@ def plume_search_step(
     """
     gas, airflow, headings, contact = inputs
     heading = headings[0]
-    if state[_STARTED] < 0.5:
-        state[_EXPECTED] = heading
+    if state[STARTED] < 0.5:
+        state[EXPECTED] = heading
         state[_SMELT] = state[_BEFORE] = 1.0
         _begin_stop(state, numbers)
     touched = _check_switches(state, contact)
     state[_SMELT] = min(state[_SMELT], gas[0], gas[1], gas[2])
-    if state[_ACTIVITY] != _OVER:
+    if state[ACTIVITY] != _OVER:
         if touched:
             _judge_touch(state, numbers)
-        elif state[_ACTIVITY] == _WAIT and state[_LEFT] <= 0.0:
-            state[_ACTIVITY], state[_LEFT] = _SENSE, numbers.sense
-    if state[_ACTIVITY] == _SENSE:
+        elif state[ACTIVITY] == _WAIT and state[LEFT] <= 0.0:
+            state[ACTIVITY], state[LEFT] = _SENSE, numbers.sense
+    if state[ACTIVITY] == _SENSE:
         _sense(state, gas, airflow)
-    state[_LEFT] -= 1.0
-    if state[_LEFT] <= 0.0:
-        if state[_ACTIVITY] == _SENSE:
+    state[LEFT] -= 1.0
+    if state[LEFT] <= 0.0:
+        if state[ACTIVITY] == _SENSE:
             _decide(state, heading, numbers)
-        elif state[_ACTIVITY] == _MOVE:
+        elif state[ACTIVITY] == _MOVE:
             _begin_stop(state, numbers)
     _tell(state, tick, heading, numbers)
 
@@ -282,12 +291,7 @@ def plume_search_step(
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
     """The outputs of ``plume_search_step``'s state."""
-    expected, move, calling, report, frames = outputs
-    expected[0], move[0], calling[0] = state[_EXPECTED], state[_MOVES], state[_CALLING]
-    for k in range(len(report)):
-        report[k] = state[_REPORT + k]
-    for k in range(len(frames)):
-        frames[k] = state[_FRAMES + k]
+    publish_search(state, outputs, _FRAMES)
 
 
 class PlumeSearch(LeafSystem, StateOutputs):

@@ -14,10 +14,11 @@ from systems.framework.parameters import Duration, Length, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs, ticks_of
 from systems.framework.step_block import Step
+from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
 from systems.radio.radio_channel import AIR_SIZE, RadioParameters
+from systems.radio.radio_range import radio_distance
 from systems.radio.stream import PARSER_SIZE, parse_byte
-from systems.search.report_frames import add_frame, clear_frames
 from systems.search.search_ending import (
     AMBIGUOUS,
     CALLER_LOST,
@@ -28,20 +29,42 @@ from systems.search.search_ending import (
     REPORT_COLUMNS,
     STEPS_GONE,
 )
+from systems.search.search_state import (
+    ACTIVITY,
+    ENDED,
+    EXPECTED,
+    FAULT,
+    FLAG,
+    LEFT,
+    MOVES,
+    OWN,
+    PHASE,
+    STARTED,
+    STEPS,
+    add_frame,
+    clear_frames,
+    publish_search,
+)
 
 __all__ = ["SoundSearch", "SoundSearchParameters", "sound_search_step"]
 
 #: What the robot is at; ``search_phase`` in its report.
 _WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
-# Places in the state.
-_ACTIVITY, _LEFT, _STARTED = 0, 1, 2
-_EXPECTED, _MOVES, _LISTENING = 3, 4, 5
-_REPORT = 6
-_ENDED, _PHASE, _STEPS, _FAULT = range(_REPORT, _REPORT + 4)
-_TOLD, _LEVELS, _READINGS, _MISSES = 10, 11, 12, 13
-_NOISE_LEFT, _WAITED, _CALLED, _ARRIVED = 14, 15, 16, 17
-_BEARING, _RANGE, _AWAY = 18, 19, 20
-_PARSER = 21
+# Places in the state, after those of both searches.
+(
+    _TOLD,
+    _LEVELS,
+    _READINGS,
+    _MISSES,
+    _NOISE_LEFT,
+    _WAITED,
+    _CALLED,
+    _ARRIVED,
+    _BEARING,
+    _RANGE,
+    _AWAY,
+    _PARSER,
+) = range(OWN, OWN + 12)
 _FRAMES = _PARSER + PARSER_SIZE
 _SIZE = _FRAMES + FRAMES_SIZE
 # Numbers of frames (Song 2011, table 5).
@@ -53,6 +76,8 @@ _LOST_MICROPHONE = 32
 _NOTHING, _NOISE, _SOUND = 0.0, 1.0, 2.0
 #: A turn takes about so long, s/deg, and the motors lag by so much, s.
 _TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
+#: The last step ends at this share of the range at which it has arrived.
+_SHORT_OF = 0.93
 #: A step is no shorter, s.
 _SHORTEST_S = 0.5
 
@@ -122,9 +147,9 @@ class SoundSearchNumbers(NamedTuple):
 
 @register_jitable
 def _end(state: Any, ended: int) -> None:
-    state[_ACTIVITY], state[_LEFT] = _OVER, 0.0
-    state[_MOVES], state[_LISTENING] = 0.0, _NOTHING
-    state[_ENDED] = ended
+    state[ACTIVITY], state[LEFT] = _OVER, 0.0
+    state[MOVES], state[FLAG] = 0.0, _NOTHING
+    state[ENDED] = ended
 
 
 @register_jitable
@@ -145,10 +170,10 @@ def _receive(state: Any, air: Any, own: Any) -> None:
 def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
     """Until it is called; first it hears the noise."""
     if state[_NOISE_LEFT] > 0.0:
-        state[_LISTENING] = _NOISE
+        state[FLAG] = _NOISE
         state[_NOISE_LEFT] -= 1.0
         return
-    state[_LISTENING] = _NOTHING
+    state[FLAG] = _NOTHING
     state[_WAITED] += 1.0
     if not numbers.own.await_call or state[_CALLED] > 0.5:
         _begin_step(state, numbers)
@@ -162,13 +187,13 @@ def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
 def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
     """Listens, or holds for the one that goes first."""
     own = numbers.own
-    state[_MOVES] = 0.0
+    state[MOVES] = 0.0
     near = 0.0 < state[_AWAY] < own.hold_within_m
     if own.waits_for > 0 and state[_ARRIVED] < 0.5 and near:
-        state[_ACTIVITY], state[_LEFT] = _HOLDS, numbers.hold
+        state[ACTIVITY], state[LEFT] = _HOLDS, numbers.hold
         return
-    state[_ACTIVITY], state[_LEFT] = _LISTENS, numbers.listen
-    state[_LISTENING] = _SOUND
+    state[ACTIVITY], state[LEFT] = _LISTENS, numbers.listen
+    state[FLAG] = _SOUND
     state[_LEVELS] = state[_READINGS] = 0.0
 
 
@@ -189,9 +214,9 @@ def _decide(
     """Where to go by what was heard, or that it has arrived."""
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
-    state[_FAULT] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
+    state[FAULT] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
     level = state[_LEVELS] / max(state[_READINGS], 1.0)
-    away = 10.0 ** ((numbers.level_dbm - level) / (10.0 * numbers.exponent))
+    away = radio_distance(level, numbers.level_dbm, numbers.exponent)
     state[_AWAY] = away
     if away < own.radio_stop_m:
         _end(state, FOUND)
@@ -209,20 +234,20 @@ def _decide(
     if near and distance < own.stop_range_m:
         _end(state, FOUND)
         return
-    if state[_STEPS] >= own.most_steps:
+    if state[STEPS] >= own.most_steps:
         _end(state, STEPS_GONE)
         return
     move = numbers.move
     if own.stop == "range" and ranged < 0.5 and away < own.radio_gate_m:
         move = max(1, move // 2)  # near, but not told how near
     if near:
-        way = distance - 0.93 * own.stop_range_m
+        way = distance - _SHORT_OF * own.stop_range_m
         time = way / numbers.speed_m_s + _LAG_S + _TURN_S_DEG * abs(state[_BEARING])
         move = min(move, int(max(time, _SHORTEST_S) / numbers.tick_s))
-    state[_EXPECTED] = (heading - state[_BEARING] + 180.0) % 360.0 - 180.0
-    state[_STEPS] += 1.0
-    state[_ACTIVITY], state[_LEFT] = _MOVING, move
-    state[_MOVES] = 1.0
+    state[EXPECTED] = wrapped_deg(heading - state[_BEARING])
+    state[STEPS] += 1.0
+    state[ACTIVITY], state[LEFT] = _MOVING, move
+    state[MOVES] = 1.0
     state[_TOLD] = 1.0
 
 
@@ -231,9 +256,9 @@ def _tell(state: Any, tick: int, heading: float, numbers: SoundSearchNumbers) ->
     """Frames of this tick."""
     address = numbers.own.address
     clear_frames(state, _FRAMES)
-    if state[_ACTIVITY] == _OVER:
+    if state[ACTIVITY] == _OVER:
         if tick % numbers.repeat == 0:
-            found = 1.0 if state[_ENDED] == FOUND else 0.0
+            found = 1.0 if state[ENDED] == FOUND else 0.0
             add_frame(state, _FRAMES, address, _FN_RESULT, found)
     elif state[_TOLD] > 0.5:
         add_frame(state, _FRAMES, address, _FN_HEADING, heading)
@@ -249,10 +274,10 @@ def _end_activity(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
     """What comes after what it was at."""
-    activity = state[_ACTIVITY]
+    activity = state[ACTIVITY]
     if activity == _LISTENS:
-        state[_ACTIVITY], state[_LEFT] = _COMPUTES, numbers.compute
-        state[_LISTENING] = _NOTHING
+        state[ACTIVITY], state[LEFT] = _COMPUTES, numbers.compute
+        state[FLAG] = _NOTHING
     elif activity == _COMPUTES:
         _decide(state, heard, heading, numbers)
     elif activity == _MOVING:
@@ -278,34 +303,28 @@ def sound_search_step(
     bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
     heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
     heading = headings[0]
-    if state[_STARTED] < 0.5:
-        state[_STARTED], state[_EXPECTED] = 1.0, heading
-        state[_ACTIVITY], state[_NOISE_LEFT] = _WAITS, numbers.noise
+    if state[STARTED] < 0.5:
+        state[STARTED], state[EXPECTED] = 1.0, heading
+        state[ACTIVITY], state[_NOISE_LEFT] = _WAITS, numbers.noise
     _receive(state, air, numbers.own)
-    if state[_ACTIVITY] == _WAITS:
+    if state[ACTIVITY] == _WAITS:
         _wait(state, numbers)
-    elif state[_ACTIVITY] != _OVER:
-        if state[_ACTIVITY] == _LISTENS:
+    elif state[ACTIVITY] != _OVER:
+        if state[ACTIVITY] == _LISTENS:
             state[_LEVELS] += levels[0]
             state[_READINGS] += 1.0
-        state[_LEFT] -= 1.0
-        held = state[_ACTIVITY] == _HOLDS and state[_ARRIVED] > 0.5
-        if held or state[_LEFT] <= 0.0:
+        state[LEFT] -= 1.0
+        held = state[ACTIVITY] == _HOLDS and state[_ARRIVED] > 0.5
+        if held or state[LEFT] <= 0.0:
             _end_activity(state, heard, heading, numbers)
-    state[_PHASE] = state[_ACTIVITY]
+    state[PHASE] = state[ACTIVITY]
     _tell(state, tick, heading, numbers)
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
     """The outputs of ``sound_search_step``'s state."""
-    expected, move, listening, report, frames = outputs
-    expected[0], move[0] = state[_EXPECTED], state[_MOVES]
-    listening[0] = state[_LISTENING]
-    for k in range(len(report)):
-        report[k] = state[_REPORT + k]
-    for k in range(len(frames)):
-        frames[k] = state[_FRAMES + k]
+    publish_search(state, outputs, _FRAMES)
 
 
 class SoundSearch(LeafSystem, StateOutputs):

@@ -13,7 +13,6 @@ from systems.hearing.spherical_interpolation import (
     interpolate_sphere,
     near_or_far,
     plane_wave_bearing,
-    y_array_source,
 )
 
 ARM = 0.15
@@ -24,6 +23,15 @@ SAMPLE_M = 340.0 / 32_000.0
 def differences(x, y, z=0.0):
     ways = np.sqrt(((np.array([x, y]) - Y) ** 2).sum(axis=1) + z * z)
     return ways - math.sqrt(x * x + y * y + z * z)
+
+
+def y_array_source(arm, d):
+    """Closed form of eq. 17 for a Y, by hand: (x, y) and range."""
+    total = sum(d)
+    distance = (3.0 * arm**2 - sum(each**2 for each in d)) / (2.0 * total)
+    half = [0.5 * (arm**2 - each**2) - distance * each for each in d]
+    x = 2.0 / (3.0 * arm) * (half[0] - 0.5 * (half[1] + half[2]))
+    return x, 2.0 / (3.0 * arm) * math.sqrt(0.75) * (half[1] - half[2]), distance
 
 
 @given(st.floats(0.3, 3.0), st.floats(-math.pi, math.pi))

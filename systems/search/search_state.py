@@ -1,0 +1,91 @@
+"""What the states of both searches have in common, and how it is put out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from numba.extending import register_jitable
+
+from systems.radio.codec import FRAME_BYTES, MOST_FRAMES, write_frame
+
+__all__ = [
+    "ACTIVITY",
+    "ENDED",
+    "EXPECTED",
+    "FAULT",
+    "FLAG",
+    "LEFT",
+    "MOVES",
+    "OWN",
+    "PHASE",
+    "STARTED",
+    "STEPS",
+    "add_frame",
+    "clear_frames",
+    "publish_search",
+]
+
+#: Places in the state: what the robot is at, for how many ticks, whether it has begun;
+#: its outputs: heading, whether it moves, whether it calls or what it listens to, and
+#: its report; then what each search has of its own.
+(
+    ACTIVITY,
+    LEFT,
+    STARTED,
+    EXPECTED,
+    MOVES,
+    FLAG,
+    ENDED,
+    PHASE,
+    STEPS,
+    FAULT,
+    OWN,
+) = range(11)
+
+
+@register_jitable
+def publish_search(state: Any, outputs: Any, first: int) -> None:
+    """Puts out what the state of a search says.
+
+    Args:
+        state: Of the search.
+        outputs: Heading, move, flag, report and frames; filled.
+        first: Place of the frames in the state.
+    """
+    expected, move, flag, report, frames = outputs
+    expected[0], move[0], flag[0] = state[EXPECTED], state[MOVES], state[FLAG]
+    for k in range(len(report)):
+        report[k] = state[ENDED + k]
+    for k in range(len(frames)):
+        frames[k] = state[first + k]
+
+
+@register_jitable
+def clear_frames(state: Any, first: int) -> None:
+    """Takes the frames of the last tick away.
+
+    Args:
+        state: Holds the number of frames at ``first``, and their bytes after it.
+        first: Place of that number.
+    """
+    state[first] = 0.0
+
+
+@register_jitable
+def add_frame(
+    state: Any, first: int, address: int, function: int, value: float
+) -> None:
+    """Adds a frame, if there is room.
+
+    Args:
+        state: As of ``clear_frames``.
+        first: The same.
+        address: Of the sender.
+        function: Fn of the frame (Song 2011, table 5).
+        value: What it carries, in its unit.
+    """
+    count = int(state[first])
+    if count >= MOST_FRAMES:
+        return
+    write_frame(state, first + 1 + FRAME_BYTES * count, address, function, value)
+    state[first] = count + 1.0
