@@ -104,7 +104,7 @@ def heading_loop_margins(
     # Of the frequency response: polynomials of so short a tick are ill-conditioned.
     gain, phase, crossover = _margins(heading_loop(*parts, tick_s), math.pi / tick_s)
     _, free, _ = _margins(heading_loop(*parts, None), math.pi / tick_s)
-    delay = math.radians(phase) / crossover
+    delay = float(math.radians(phase) / crossover)
     return HeadingLoopMargins(
         tick_s,
         float(crossover),
