@@ -10,9 +10,9 @@ from pydrake.systems.framework import LeafSystem
 
 from diagrams.own_code import asked_for, import_own, made
 from diagrams.own_laws import checked_law, try_law
-from diagrams.routed_robot import make_trajectory_controller
+from diagrams.robots.routed_robot import make_trajectory_controller
+from diagrams.robots.searching_robot import search_controller
 from diagrams.scenario import Scenario
-from diagrams.searching.searching_robot import search_controller
 from systems import (
     RadialLawController,
     TwistWheelCommand,

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 from zlib import crc32
 
@@ -16,24 +17,16 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSi
 from diagrams.laws import commanded, make_command, make_controller
 from diagrams.own_code import with_own_blocks
 from diagrams.participants import SourceParameters
-from diagrams.routed_robot import routed_blocks, trajectory_command
+from diagrams.robots.following_robot import following_blocks
+from diagrams.robots.routed_robot import routed_blocks, trajectory_command
+from diagrams.robots.searching_robot import search_command, searching_blocks
 from diagrams.scenario import ROBOT, SOURCE, WORLD, Scenario
-from diagrams.searching.searching_robot import search_command, searching_blocks
-from diagrams.searching.world_blocks import world_blocks
+from diagrams.world_blocks import world_blocks
 from systems import (
-    CollisionVector,
     DiffDrivePlant,
-    FreeSpaceMap,
-    IdealObstacleSensor,
-    IdealSourceSensor,
-    MicArray,
     MotionGuard,
-    SensingMonitor,
     SoundEmitter,
     SourceRobot,
-    SourceTracker,
-    TDOAEstimator,
-    UltrasonicArray,
     WheelOdometry,
 )
 from systems.framework.block_facts import block_facts
@@ -181,24 +174,27 @@ def robot_blocks(
     Raises:
         InputError: As ``make_robot``.
     """
-    seed = seed_of(scenario, "controller", name)
+    own_seed = partial(seed_of, scenario, owner=name)
+    seed = own_seed("controller")
     controller = make_controller(scenario, bodies=bodies, seed=seed)
     if scenario.searches is not None:
         sensing = searching_blocks(
             scenario,
             bodies=bodies,
             others=others,
-            seed_of=lambda block: seed_of(scenario, block, name),
+            seed_of=own_seed,
         )
     elif scenario.route is None:
-        sensing = _sound_and_ranges(scenario, name, controller, bodies, others)
+        sensing = following_blocks(
+            scenario, controller, bodies=bodies, others=others, seed_of=own_seed
+        )
     else:
         with _fields_of_robot(name):
             sensing = routed_blocks(
                 scenario,
                 bodies=bodies,
                 robots=robots,
-                seed_of=lambda block: seed_of(scenario, block, name),
+                seed_of=own_seed,
             )
     ours = [
         DiffDrivePlant(
@@ -428,141 +424,6 @@ def _carry_loudspeaker(builder: DiagramBuilder, emitter: Any, plant: Any) -> Non
     for output, entry in (("pose_WB", "pose_WS"), ("velocity_WB", "v_WS")):
         builder.Connect(plant.GetOutputPort(output), emitter.GetInputPort(entry))
     builder.ExportOutput(emitter.GetOutputPort("emission"), "own_emission")
-
-
-def _sound_and_ranges(
-    scenario: Scenario,
-    name: str,
-    controller: Any,
-    bodies: int,
-    others: Sequence[str],
-) -> list[Any]:
-    """What a robot that follows a sound senses by."""
-    _check_sensing(scenario, controller)
-    mapped = scenario.own_guard is not None or "free_space" in _inputs(controller)
-    return [
-        *_hearing(scenario, name, others),
-        _tracker(scenario),
-        *_obstacle_sensing(scenario, name, bodies, mapped=mapped),
-    ]
-
-
-def _hearing(scenario: Scenario, name: str, others: Sequence[str]) -> list[Any]:
-    if scenario.hearing == "ideal":
-        return [
-            IdealSourceSensor(
-                robot=scenario.robot,
-                hearing=scenario.ideal_hearing,
-                sound=scenario.sound,
-                frame_s=scenario.microphones.frame_s,
-                seed=seed_of(scenario, "ideal_source_sensor", name),
-            )
-        ]
-    return [
-        MicArray(
-            parameters=scenario.microphones,
-            robot=scenario.robot,
-            acoustics=scenario.acoustics,
-            room=scenario.room,
-            others=others,
-            seed=seed_of(scenario, "mic_array", name),
-        ),
-        TDOAEstimator(
-            parameters=scenario.tdoa,
-            robot=scenario.robot,
-            acoustics=scenario.acoustics,
-            sound=scenario.sound,
-            microphones=scenario.microphones,
-        ),
-    ]
-
-
-def _tracker(scenario: Scenario) -> Any:
-    """An ideal estimate is a tick old, one from audio half a frame more.
-
-    It also is what its covariance says, and tells front from back.
-    """
-    tick, frame = scenario.tick_s, scenario.microphones.frame_s
-    tracker, age = scenario.tracker, tick + 0.5 * frame
-    if scenario.hearing == "ideal":
-        exact = {"resolve_front_back": False, "measurement_floor_m": 0.0}
-        tracker = tracker.model_copy(update=exact)
-        age = tick
-    return SourceTracker(
-        robot=scenario.robot,
-        tracker=tracker,
-        measurement_age_s=age,
-        frame_s=frame,
-        tick_s=tick,
-    )
-
-
-#: What only range sensors give.
-_OF_RANGES = {"ranges", "echo", "range_ages", "free_space"}
-
-
-def _check_sensing(scenario: Scenario, controller: Any) -> None:
-    """Refuses a law that reads ranges where there are none."""
-    wanted = _OF_RANGES.intersection(_inputs(controller))
-    if wanted and scenario.obstacle_sensing != "ultrasonic" and not scenario.blocks:
-        raise InputError(
-            "obstacle_sensing",
-            f"is {scenario.obstacle_sensing}, but law {scenario.law!r} reads "
-            f"{', '.join(sorted(wanted))}; set it to ultrasonic",
-        )
-
-
-def _inputs(block: Any) -> list[str]:
-    ports = map(block.get_input_port, range(block.num_input_ports()))
-    return [port.get_name() for port in ports]
-
-
-def _obstacle_sensing(
-    scenario: Scenario, name: str, bodies: int, *, mapped: bool
-) -> list[Any]:
-    seen: dict[str, Any] = {
-        "robot": scenario.robot,
-        "source_size": scenario.source_size,
-        "obstacle_count": bodies,
-    }
-    if scenario.obstacle_sensing == "ideal":
-        return [
-            IdealObstacleSensor(
-                maximum_range_m=scenario.ultrasonic.maximum_range_m,
-                all_bodies=scenario.collision_vector.aggregation == "sum",
-                **seen,
-            )
-        ]
-    sensing = [
-        UltrasonicArray(
-            parameters=scenario.ultrasonic,
-            acoustics=scenario.acoustics,
-            seed=seed_of(scenario, "ultrasonic_array", name),
-            tick_s=scenario.tick_s,
-            **seen,
-        ),
-        CollisionVector(
-            parameters=scenario.collision_vector,
-            sensors=scenario.ultrasonic,
-            robot=scenario.robot,
-            initial_pose=scenario.start.pose,
-            tick_s=scenario.tick_s,
-        ),
-    ]
-    if mapped:
-        known = FreeSpaceMap(
-            parameters=scenario.free_space,
-            sensors=scenario.ultrasonic,
-            robot=scenario.robot,
-            tick_s=scenario.tick_s,
-        )
-        sensing.append(known)
-    if scenario.own_guard is not None:
-        monitor = SensingMonitor(
-            sensors=scenario.ultrasonic, robot=scenario.robot, tick_s=scenario.tick_s
-        )
-        sensing.append(monitor)
-    return sensing
 
 
 def _driving(scenario: Scenario, controller: Any) -> Any:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from diagrams.robot import world_seeds
 from diagrams.scenario import Scenario
-from diagrams.searching.world_blocks import world_blocks
+from diagrams.world_blocks import world_blocks
 from systems.odor.odor_plume import concentration
 
 __all__ = ["PlumeInstant", "concentration_map", "plume_history"]

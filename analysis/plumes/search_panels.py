@@ -132,12 +132,15 @@ def _phase(axes: Axes, result: RunResult) -> None:
         shades.append(("listens", result.columns["listening"] > 1.5, "echo", 0.3))
     top = len(names) - 0.5
     for label, where, colour, alpha in shades:
-        style: dict[str, Any] = {
-            "color": COLOURS[colour],
-            "alpha": alpha,
-            "label": label,
-            "lw": 0.0,
-        }
-        axes.fill_between(result.time, 0.5, top, where=where.tolist(), **style)
+        axes.fill_between(
+            result.time,
+            0.5,
+            top,
+            where=where.tolist(),
+            color=COLOURS[colour],
+            alpha=alpha,
+            label=label,
+            lw=0.0,
+        )
     axes.set_yticks(range(1, len(names)), names[1:])
     axes.set_ylim(0.5, len(names) - 0.5)

@@ -14,7 +14,7 @@ from diagrams.robot import (
     world_seeds,
 )
 from diagrams.scenario import Scenario
-from diagrams.searching.world_blocks import radio_nodes, world_blocks
+from diagrams.world_blocks import radio_nodes, world_blocks
 from systems.framework.input_error import InputError
 from systems.framework.step_block import RunFacts, Step
 

@@ -13,12 +13,13 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import check_record, read_arrays
+from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Fraction, Frequency, Parameters
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts, Step
+from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
 from systems.hearing.cross_powers import (
     FINE,
     CrossPowers,
@@ -435,13 +436,7 @@ class CrossPowerEstimator(LeafSystem):
         return _Memory(asked, frame, noise, sound, outputs)
 
     def _counts(self, audio: AudioFrame) -> NDArray[np.float64]:
-        rate = self._microphones.sample_rate_hz
-        if audio.sample_rate_hz != rate:
-            raise InputError(
-                "CrossPowerEstimator",
-                f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate:g} "
-                "Hz",
-            )
+        check_rate(audio, self._microphones.sample_rate_hz, "CrossPowerEstimator")
         return audio.counts.astype(np.float64)
 
     def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
@@ -466,14 +461,7 @@ class CrossPowerEstimator(LeafSystem):
         memory = self._remembered(context)
 
         def frame() -> AudioFrame:
-            audio = self._audio.Eval(context)
-            if not isinstance(audio, AudioFrame):
-                raise TypeError(
-                    f"CrossPowerEstimator: port audio carries a {type(audio).__name__};"
-                    " connect the audio of a MicArray"
-                )
-            check_record(context, self._audio, audio)
-            return audio
+            return read_audio(context, self._audio, "CrossPowerEstimator")
 
         after = self.hear(asked, frame, memory)
         if after is memory:
@@ -505,13 +493,7 @@ class CrossPowerEstimator(LeafSystem):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each frame of a compiled loop, ``Step``."""
-        if "audio" not in run.carried:
-            raise InputError(
-                "engine",
-                "frames of sound come to compiled loops from a MicArray alone; run "
-                "with engine drake",
-            )
-        audio, memory = run.carried["audio"], self._blank()
+        audio, memory = audio_of_run(run), self._blank()
 
         def listen(tick: int, inputs: Any, outputs: Any) -> None:
             nonlocal memory

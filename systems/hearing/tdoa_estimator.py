@@ -12,11 +12,10 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import check_record
 from systems.framework.host_step import host_step
-from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts, Step
+from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
 from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
@@ -173,13 +172,7 @@ class TDOAEstimator(LeafSystem):
         )
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
-        audio = self._audio.Eval(context)
-        if not isinstance(audio, AudioFrame):
-            raise TypeError(
-                f"TDOAEstimator: port audio carries a {type(audio).__name__}; connect "
-                "the audio of a MicArray"
-            )
-        check_record(context, self._audio, audio)
+        audio = read_audio(context, self._audio, "TDOAEstimator")
         before, located = self._remembered(context)
         fix, after = self.hear(audio, before)
         flags = after.echoes is not None, after.heard, fix is not None
@@ -206,12 +199,7 @@ class TDOAEstimator(LeafSystem):
         Raises:
             InputError: The frame has another rate, or is none of this array.
         """
-        if audio.sample_rate_hz != self._microphones.sample_rate_hz:
-            raise InputError(
-                "TDOAEstimator",
-                f"audio has a rate of {audio.sample_rate_hz:g} Hz; "
-                f"record at {self._microphones.sample_rate_hz:g} Hz",
-            )
+        check_rate(audio, self._microphones.sample_rate_hz, "TDOAEstimator")
         fix, after = self._localiser.localise(audio.counts, memory)
         if self._schedule and not may_sound(
             self._schedule,
@@ -224,13 +212,7 @@ class TDOAEstimator(LeafSystem):
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each frame of a compiled loop, ``Step``."""
-        if "audio" not in run.carried:
-            raise InputError(
-                "engine",
-                "frames of sound come to compiled loops from a MicArray alone; run "
-                "with engine drake",
-            )
-        audio = run.carried["audio"]
+        audio = audio_of_run(run)
         memory, located = self._localiser.blank(), False
 
         def listen(tick: int, _: Any, outputs: Any) -> None:

@@ -1,0 +1,3 @@
+"""Blocks of each kind of robot: that follows a sound, drives on a route, searches."""
+
+__all__: list[str] = []

@@ -1,0 +1,78 @@
+"""How estimators get the frames of the microphones, in Drake and in compiled loops."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from systems.framework.finite import check_record
+from systems.framework.input_error import InputError
+from systems.framework.signals import AudioFrame
+from systems.framework.step_block import RunFacts
+
+__all__ = ["audio_of_run", "check_rate", "read_audio"]
+
+
+def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
+    """The frame on a port.
+
+    Args:
+        context: Of the block.
+        port: Its input port ``audio``.
+        block: Its name, for messages.
+
+    Returns:
+        The frame.
+
+    Raises:
+        TypeError: The port carries something else.
+        InputError: A value of the frame is not finite.
+    """
+    audio = port.Eval(context)
+    if not isinstance(audio, AudioFrame):
+        raise TypeError(
+            f"{block}: port audio carries a {type(audio).__name__}; connect the audio "
+            "of a MicArray"
+        )
+    check_record(context, port, audio)
+    return audio
+
+
+def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
+    """Frames of a compiled loop, by the tick at which they end.
+
+    Args:
+        run: What the loop runs.
+
+    Returns:
+        A function of the present tick; the frame is made when it is called.
+
+    Raises:
+        InputError: No MicArray of ours gives any.
+    """
+    if "audio" not in run.carried:
+        raise InputError(
+            "engine",
+            "frames of sound come to compiled loops from a MicArray alone; run "
+            "with engine drake",
+        )
+    return run.carried["audio"]
+
+
+def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
+    """Refuses a frame of another rate.
+
+    Args:
+        audio: The frame.
+        rate_hz: That the block is for, Hz.
+        block: Its name, for messages.
+
+    Raises:
+        InputError: The rates differ.
+    """
+    if audio.sample_rate_hz != rate_hz:
+        raise InputError(
+            block,
+            f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate_hz:g} "
+            "Hz",
+        )
