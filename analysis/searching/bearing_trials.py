@@ -25,8 +25,10 @@ from systems.sound.room import RoomParameters
 from systems.sound.sound_emitter import emissions_along, history_ticks
 from systems.sound.waveforms import SoundParameters, make_waveform
 
-__all__ = ["BearingTrial", "hear_once"]
+__all__ = ["FAN_M", "BearingTrial", "hear_once"]
 
+#: Distance of the fan, m.
+FAN_M = 2.0
 _FRAME_S = 0.025
 #: The fan's noise lasts from before the run to its end.
 _ALWAYS_S = 60.0
@@ -109,7 +111,7 @@ def _frames(
         )
     ]
     if trial.fan_bearing is not None:
-        level = trial.sound.level_pa / trial.distance * 2.0
+        level = trial.sound.level_pa / trial.distance * FAN_M
         level *= 10.0 ** (-trial.fan_snr_db / 20.0)
         fan = SoundParameters(
             kind="band_noise",
@@ -119,7 +121,7 @@ def _frames(
             on_s=_ALWAYS_S,
             period_s=_ALWAYS_S,
         )
-        sounds.append((fan, _place(middle, trial.fan_bearing, 2.0)))
+        sounds.append((fan, _place(middle, trial.fan_bearing, FAN_M)))
     recorder = Recorder(
         microphones,
         robot,

@@ -23,7 +23,7 @@ from analysis.reporting.intervals import wilson_interval
 from analysis.reporting.markdown import markdown_table
 from analysis.runs.search_metrics import ARMS_M
 from analysis.searching import SearchOutcomes, search_outcomes, search_runs
-from analysis.searching.bearing_trials import BearingTrial, hear_once
+from analysis.searching.bearing_trials import FAN_M, BearingTrial, hear_once
 from systems.hearing.cross_power_estimator import CrossPowerParameters
 from systems.sound.room import RoomParameters
 from systems.sound.waveforms import SoundParameters
@@ -215,6 +215,10 @@ def _trials(count: int, seed: int, **changes: Any) -> list[BearingTrial]:
         fan = {}
         if "fan_snr_db" in changes:
             fan["fan_bearing"] = float(generator.uniform(-math.pi, math.pi))
+            angle = fan["fan_bearing"]
+            a, b = x + FAN_M * math.cos(angle), y + FAN_M * math.sin(angle)
+            if changes.get("room") and (abs(a) > 2.5 or abs(b) > 1.5):
+                continue
         if abs(u) < 2.4 and abs(v) < 1.4:
             own = {**changes, **fan}
             place = float(x), float(y)
@@ -253,6 +257,13 @@ def bearings_table(count: int = 100) -> str:
     rows += [
         (f"siren, fan at {snr:g} dB", {"sound": siren, "fan_snr_db": snr})
         for snr in (0.0, -5.0, -10.0)
+    ]
+    rows += [
+        (
+            f"{name}, fan at -5 dB, T60 0.25 s",
+            {"sound": sound, "fan_snr_db": -5.0, "room": _room(0.25)},
+        )
+        for name, sound in (("siren", siren), ("noise", noise))
     ]
     rows.append(("steady tone of 2.7 kHz", {"sound": tone}))
     methods = [

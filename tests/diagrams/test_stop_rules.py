@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 import weakref
 from typing import Any
 
@@ -10,10 +11,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from diagrams import RunResult, build_sound_follower, make_simulator, simulate
+from diagrams import (
+    RunResult,
+    build_sound_follower,
+    load_scenario,
+    make_simulator,
+    simulate,
+)
 from diagrams.bodies import robot_rectangle
 from diagrams.scenario import Scenario
-from diagrams.stop_rules import StopRules
+from diagrams.stop_rules import FOUND, RobotRules, StopRules, judge_search
 from systems.world.geometry import rectangle_clearance
 
 BASE: dict[str, Any] = {
@@ -347,3 +354,28 @@ def test_a_near_miss_is_no_collision():
         **WAITING, start={"heading_deg": 45.0}, obstacles=[speck], duration_s=1.5
     )
     assert result.cause == "timeout"
+
+
+@pytest.mark.parametrize(
+    ("searches", "ended", "place", "cause"),
+    [
+        ("odor_search", 0, (0.1, 0.0), ""),
+        ("odor_search", 1, (0.21, 0.0), "found"),
+        ("odor_search", 1, (0.23, 0.0), "false find"),
+        ("odor_search", 1, (0.05, 0.15), "found"),  # 71.6 deg off
+        ("odor_search", 1, (0.03, 0.15), "false find"),  # 78.7 deg
+        ("odor_search", 2, (0.1, 0.0), "lost"),
+        ("sound_search", 1, (-0.4, 0.4), "found"),  # 0.57 m, behind
+        ("sound_search", 1, (-0.5, 0.4), "false find"),
+        ("sound_search", 1, (21.0, 0.0), "diverged"),
+    ],
+)
+def test_a_find_is_judged_by_where_the_source_is(searches, ended, place, cause):
+    """The robot is at (2, 1), turned by 30 deg; places are ahead and left of it."""
+    scenario = load_scenario(searches)
+    numbers = RobotRules(scenario, scenario.surroundings()).numbers
+    c, s = math.cos(math.pi / 6), math.sin(math.pi / 6)
+    ahead, left = place
+    source = 2.0 + c * ahead - s * left, 1.0 + s * ahead + c * left
+    found = judge_search(float(ended), (2.0, 1.0, math.pi / 6), source, numbers)
+    assert FOUND[found] == cause

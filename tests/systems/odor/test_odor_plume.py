@@ -135,3 +135,15 @@ def test_a_jet_widens_slows_and_blows_nothing_backwards():
     assert wind_velocity(air, 3.6, 0.0)[0] == pytest.approx(0.5)
     half_width = 0.15 + 0.1 * 3.6
     assert wind_velocity(air, 3.6, half_width)[0] == pytest.approx(0.5 * math.exp(-0.5))
+
+
+def test_a_puff_spreads_by_the_way_that_it_has_gone():
+    """In a wind without gusts, and without velocities of their own: exactly."""
+    own = OdorParameters(own_intensity=0.0, level_growth=0.2, upright_growth=0.1)
+    plume = carried(1.0, own=own, wind=WindParameters(kind="uniform"))[-1]
+    puffs = plume[PUFFS_BEGIN:].reshape(-1, 7)[: int(plume[2])]
+    np.testing.assert_allclose(puffs[:, 1], 0.0, atol=1e-12)
+    np.testing.assert_allclose(puffs[:, 4], 0.2 * puffs[:, 0], rtol=1e-9)
+    np.testing.assert_allclose(puffs[:, 5], 0.1 * puffs[:, 0], rtol=1e-9)
+    # 16 a second at 1 m/s: one every 62.5 mm.
+    np.testing.assert_allclose(np.diff(puffs[:, 0]), -0.0625, rtol=1e-9)

@@ -16,13 +16,20 @@ from systems.ranging.contact_switches import (
 BODY = RobotParameters(length_m=0.2, width_m=0.3)
 
 
-def felt(pose, followed=(9.0, 9.0, 0.0), box=(5.0, 5.0, 0.0), compiled=False, **own):
-    """Left, right and touched, of a box of 0.2 m and what is followed, of 0.1 m."""
+def felt(
+    pose,
+    followed=(9.0, 9.0, 0.0),
+    box=(5.0, 5.0, 0.0),
+    compiled=False,
+    width=0.1,
+    **own,
+):
+    """Left, right and touched, of a box of 0.2 m and what is followed, 0.1 m long."""
     block = ContactSwitches(
         parameters=ContactParameters(**own),
         robot=BODY,
         bodies=1,
-        source_size=(0.1, 0.1),
+        source_size=(0.1, width),
     )
     work = njit(block.step.step) if compiled else block.step.step
     inputs = tuple(map(np.array, (pose, box, (0.2, 0.2), followed)))
@@ -62,3 +69,12 @@ def test_switches_that_are_stuck_say_so_always():
     assert felt((0, 0, 0), (0.155, 0.0, 0.0), faults=stuck)[:2] == [0, 1]
     late = (ContactFaultParameters(switch=2, kind="stuck_closed", start_s=0.2),)
     assert felt((0, 0, 0), faults=late)[:2] == [0, 0]
+
+
+@pytest.mark.parametrize(
+    ("y", "switches"),
+    [(0.02, [1, 1]), (-0.02, [1, 1]), (0.06, [1, 0]), (-0.06, [0, 1])],
+)
+def test_a_post_near_the_middle_closes_both(y, switches):
+    """The middle is a tenth of the width to either side: 3 cm."""
+    assert felt((0, 0, 0), (0.155, y, 0.0), width=0.01)[:2] == switches
