@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
 from diagrams.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters, Point, Positive
-from systems.sound.acoustics import AcousticParameters
+from systems.sound.acoustics import AcousticParameters, sound_speed
+from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["ArrayGeometry", "load_geometry"]
+__all__ = ["ROBOT_ARRAY", "ArrayGeometry", "KnownArray", "load_geometry"]
 
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
@@ -23,15 +27,45 @@ _MOST_MICROPHONES = 64
 
 _LEAST_BAND_HZ = 500.0
 
+# Where a geometry does not say how well it is known: places to this share of the
+# aperture, as by a tape for a large array and as on a board for a small one, but to
+# this at best; the air to these, with and without a word on it.
+_PLACES_SHARE, _PLACES_M = 0.01, 0.0005
+_TEMPERATURE_C, _SPEED_SHARE = 2.0, 0.01
+
+# Covariances are symmetric and positive to this part of their largest variance.
+_ROUNDING = 1e-6
+
 _Point3 = Annotated[tuple[float, float, float], Strict(False)]
 _Points = Annotated[tuple[Point, ...], Strict(False)]
 _Points3 = Annotated[tuple[_Point3, ...], Strict(False)]
 _Channels = Annotated[tuple[Annotated[int, Field(ge=0)], ...], Strict(False)]
 _Band = Annotated[tuple[Positive, Positive], Strict(False)]
+_PlaceStd = Annotated[float, Field(ge=0.0, le=1.0)]
+_PlaceStds = Annotated[tuple[_PlaceStd, ...], Strict(False)]
+_Row = Annotated[tuple[float, ...], Strict(False)]
+_Matrix = Annotated[tuple[_Row, ...], Strict(False)]
+_Side = Literal["ahead", "behind", "above", "below"]
+
+
+@dataclass(frozen=True)
+class KnownArray:
+    """An array, and how well it is known."""
+
+    shape: ArrayShape
+    """The microphones, looking to the side that is stated."""
+    c: float
+    """Speed of sound, m/s."""
+    budget: ArrayBudget
+    """What is not known of the places, of the air and of the channels."""
+    gain_std_db: float = 2.0
+    """Standard deviation of a channel's gain, dB."""
+    largest_range_error: float = 0.2
+    """Ranges are given up to this standard deviation over range."""
 
 
 class ArrayGeometry(Parameters):
-    """A geometry file. The default is the robot's own array."""
+    """A geometry file. The default places are those of the robot's own array."""
 
     microphones: _Points | _Points3 = ((0.0, 0.4), (0.0, 0.0), (0.0, -0.4))
     """Places (x, y) or (x, y, z) in the order of the channels, m."""
@@ -43,6 +77,27 @@ class ArrayGeometry(Parameters):
     """Temperature, deg C."""
     band: _Band | None = None
     """Band of the sound, Hz; none: 300 to 15000 or 0.45 of the sample rate."""
+    position_std_m: _PlaceStd | _PlaceStds | None = None
+    """Standard deviation of each coordinate of the microphones' places, one for all or
+    one each, m; none: 1 % of the aperture, 0.5 mm at least."""
+    position_covariance_m2: _Matrix | None = None
+    """Covariance of a microphone's coordinates, alike for all, or of all coordinates
+    of all microphones in their order, m^2; instead of ``position_std_m``."""
+    sound_speed_std: float | None = Field(default=None, ge=0.0, le=400.0)
+    """Standard deviation of the speed of sound, m/s; none: from that of the
+    temperature, or 1 % where nothing is said of the air."""
+    temperature_std_c: float | None = Field(default=None, ge=0.0, le=50.0)
+    """Standard deviation of the temperature, deg C; none: 2."""
+    delay_std_s: float = Field(default=1e-6, ge=0.0, le=0.01)
+    """Standard deviation of each channel's instants of sampling, s."""
+    gain_std_db: float = Field(default=2.0, ge=0.0, le=40.0)
+    """Standard deviation of each channel's gain, dB. Delays do not depend on it; a
+    channel is named as far louder or fainter than the others beyond it."""
+    largest_range_error: float = Field(default=0.2, gt=0.0, le=1.0)
+    """Ranges are given where their standard deviation is at most this share of them."""
+    side: _Side | None = None
+    """On which side of a row (ahead, behind) or of a plane (above, below) all sources
+    are; none: either, and the other one is named as an alternative."""
 
     @model_validator(mode="after")
     def _check(self) -> ArrayGeometry:
@@ -66,6 +121,20 @@ class ArrayGeometry(Parameters):
             raise InputError(
                 "sound_speed", "given together with temperature_c; keep one of them"
             )
+        self._check_band()
+        shape = ArrayShape.of(self.microphones)
+        if shape.aperture_m > _LARGEST_M:
+            raise InputError(
+                "microphones",
+                f"{shape.aperture_m:g} m apart; give positions in m, at most "
+                f"{_LARGEST_M:g} m apart",
+            )
+        self._check_budget(shape)
+        if self.side is not None:
+            shape.facing(self.side)
+        return self
+
+    def _check_band(self) -> None:
         if self.band is not None and self.band[0] >= self.band[1]:
             raise InputError("band", "must rise, as [300, 8000]")
         if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
@@ -74,14 +143,27 @@ class ArrayGeometry(Parameters):
                 f"{list(self.band)} is too narrow to tell delays; give at least "
                 f"{_LEAST_BAND_HZ:g} Hz",
             )
-        aperture = ArrayShape.of(self.microphones).aperture_m
-        if aperture > _LARGEST_M:
+
+    def _check_budget(self, shape: ArrayShape) -> None:
+        std, covariance = self.position_std_m, self.position_covariance_m2
+        if std is not None and covariance is not None:
             raise InputError(
-                "microphones",
-                f"{aperture:g} m apart; give positions in m, at most "
-                f"{_LARGEST_M:g} m apart",
+                "position_std_m",
+                "given together with position_covariance_m2; keep one of them",
             )
-        return self
+        if isinstance(std, tuple) and len(std) != shape.count:
+            raise InputError(
+                "position_std_m",
+                f"{len(std)} given for {shape.count} microphones; give one for all, "
+                "or one for each",
+            )
+        if covariance is not None:
+            _check_covariance(covariance, shape)
+        if self.sound_speed_std is not None and self.temperature_std_c is not None:
+            raise InputError(
+                "sound_speed_std",
+                "given together with temperature_std_c; keep one of them",
+            )
 
     @property
     def columns(self) -> tuple[int, ...]:
@@ -95,13 +177,73 @@ class ArrayGeometry(Parameters):
             return self.sound_speed
         return AcousticParameters(temperature_c=self.temperature_c).c
 
+    @property
+    def known(self) -> KnownArray:
+        """The array with its budget, as estimators take it."""
+        shape = ArrayShape.of(self.microphones)
+        of_places = self._of_places(shape)
+        return KnownArray(
+            shape=shape if self.side is None else shape.facing(self.side),
+            c=self.c,
+            budget=ArrayBudget(of_places, self._speed_std(), self.delay_std_s),
+            gain_std_db=self.gain_std_db,
+            largest_range_error=self.largest_range_error,
+        )
+
+    def _of_places(self, shape: ArrayShape) -> NDArray[np.float64]:
+        if self.position_covariance_m2 is not None:
+            given = np.array(self.position_covariance_m2)
+            alike = len(given) == shape.dimension
+            return np.kron(np.eye(shape.count), given) if alike else given
+        std = self.position_std_m
+        if std is None:
+            std = max(_PLACES_SHARE * shape.aperture_m, _PLACES_M)
+        each = np.broadcast_to(np.array(std), shape.count)
+        return np.diag(np.repeat(each**2, shape.dimension))
+
+    def _speed_std(self) -> float:
+        if self.sound_speed_std is not None:
+            return self.sound_speed_std
+        unsaid = self.sound_speed is None and self.temperature_c is None
+        if unsaid and self.temperature_std_c is None:
+            return _SPEED_SHARE * self.c
+        std = self.temperature_std_c
+        warmer = sound_speed(_TEMPERATURE_C if std is None else std)
+        return warmer - sound_speed(0.0)
+
+
+#: The robot's own array, built to a millimetre.
+ROBOT_ARRAY = ArrayGeometry(position_std_m=0.001)
+
+
+def _check_covariance(given: tuple[tuple[float, ...], ...], shape: ArrayShape) -> None:
+    sizes = (shape.dimension, shape.p_AM.size)
+    if len(given) not in sizes or any(len(row) != len(given) for row in given):
+        raise InputError(
+            "position_covariance_m2",
+            f"has {len(given)} rows of {sorted({len(row) for row in given})}; give "
+            f"{sizes[0]} x {sizes[0]} for a microphone, or {sizes[1]} x {sizes[1]} for "
+            "all coordinates of all",
+        )
+    matrix = np.array(given)
+    scale = max(float(np.abs(np.diag(matrix)).max()), 1e-30)
+    if np.abs(matrix - matrix.T).max() > _ROUNDING * scale:
+        raise InputError(
+            "position_covariance_m2", "is not symmetric; give a covariance, m^2"
+        )
+    if np.linalg.eigvalsh(matrix)[0] < -_ROUNDING * scale:
+        raise InputError(
+            "position_covariance_m2",
+            "has a negative variance in some direction; give a covariance, m^2",
+        )
+
 
 def load_geometry(path: str | Path) -> ArrayGeometry:
     """Reads a geometry file.
 
     Args:
-        path: YAML with ``microphones`` and optionally ``channels``,
-            ``sound_speed`` or ``temperature_c``, and ``band``.
+        path: YAML with ``microphones`` and optionally the other fields of
+            ``ArrayGeometry``.
 
     Raises:
         InputError: The file is missing, not YAML or makes no sense; the

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_order import FrameDelays, exchanged_channels, misfit
 from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
 from systems.delays.copied_channels import copied_pairs
@@ -27,6 +28,7 @@ __all__ = ["ChannelFault", "find_channel_faults"]
 # this, the source is at it.
 _DEAD_DB = 30.0
 _NEAR_DB = 15.0
+_GAIN_DEVIATIONS = 5.0
 
 # Least number and share of a channel's samples at an extreme, and how much more
 # often it occurs than the next values do: with a sine 2.4 times.
@@ -67,8 +69,7 @@ class ChannelFault:
 
 def find_channel_faults(
     samples: NDArray[np.float64],
-    shape: ArrayShape,
-    c: float,
+    array: KnownArray,
     *,
     sample_rate_hz: float,
     band_hz: tuple[float, float] | None = None,
@@ -77,8 +78,7 @@ def find_channel_faults(
 
     Args:
         samples: (n, samples) one row a microphone.
-        shape: The n microphones.
-        c: Speed of sound, m/s.
+        array: The n microphones and their budget.
         sample_rate_hz: Rate of the samples, Hz.
         band_hz: Lowest and highest frequency of the sound, Hz; None: from 300
             to 8000 or 0.45 of the rate.
@@ -87,6 +87,7 @@ def find_channel_faults(
         The faults; empty where none is seen, which is no proof that all is
         well: a silent recording shows little.
     """
+    shape, c = array.shape, array.c
     faults = [_unreadable(k, channel) for k, channel in enumerate(samples)]
     found = [fault for fault in faults if fault is not None]
     use = np.array([k for k, fault in enumerate(faults) if fault is None], dtype=int)
@@ -99,7 +100,7 @@ def find_channel_faults(
     measured = correlate_pairs(readable, shape.max_delay(c), sample_rate_hz, band_hz)
     if measured is None:
         return found
-    beside = _levels(measured, use) + _strangers(measured, use)
+    beside = _levels(measured, use, array.gain_std_db) + _strangers(measured, use)
     dead = {k for fault in beside if fault.kind == "dead" for k in fault.channels}
     found += beside
     inverted = _inverted(measured, use, dead)
@@ -111,7 +112,12 @@ def find_channel_faults(
 
     def delays(measured: PairCorrelations) -> FrameDelays:
         return FrameDelays(
-            _lags(measured, signs), measured.levels, shape, c / sample_rate_hz
+            _lags(measured, signs),
+            measured.levels,
+            shape,
+            c / sample_rate_hz,
+            position_std_m=array.budget.position_std,
+            gain_std_db=array.gain_std_db,
         )
 
     as_given = delays(measured)
@@ -178,8 +184,11 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     )
 
 
-def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelFault]:
+def _levels(
+    measured: PairCorrelations, use: NDArray[np.int64], gain_std_db: float
+) -> list[ChannelFault]:
     """Channels far below or above the others."""
+    near_db = max(_NEAR_DB, _GAIN_DEVIATIONS * gain_std_db)
     level = 20.0 * np.log10(np.maximum(measured.level, 1e-300))
     faults = []
     for k, channel in enumerate(use.tolist()):
@@ -189,7 +198,7 @@ def _levels(measured: PairCorrelations, use: NDArray[np.int64]) -> list[ChannelF
         if level[k] - others[max(-2, -others.size)] < -_DEAD_DB:
             faults.append(_dead(channel, f"{-over:.0f} dB below the others"))
         # It is near alone, among others with levels like each other's.
-        if over > _NEAR_DB and np.ptp(others) < _NEAR_DB:
+        if over > near_db and np.ptp(others) < near_db:
             faults.append(
                 ChannelFault(
                     "near",

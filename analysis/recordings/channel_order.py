@@ -28,10 +28,11 @@ __all__ = [
     "misfit",
 ]
 
-# Delays fit where they are right to this part of a sample, or to this share of
-# what sound needs across the array.
+# Delays fit where they are right to this part of a sample, to this share of what
+# sound needs across the array, or to so many deviations of the microphones' places.
 _FIT_SAMPLES = 0.25
 _FIT_SHARE = 0.05
+_FIT_DEVIATIONS = 5.0
 
 # Fewer frames whose pairs agree prove nothing.
 _LEAST_FRAMES = 5
@@ -43,8 +44,9 @@ _MOST_TRIALS = 20_000
 # least; shares nearer to each other than this are alike; and one that is hopeless.
 _WRONG, _RIGHT, _ALIKE, _HOPELESS = 0.35, 0.6, 0.1, 0.1
 
-# Spread of 1/R below which levels say nothing of a range, dB.
-_LEAST_SPREAD_DB = 3.0
+# Spread of 1/R below which levels say nothing of a range, dB, and in deviations of
+# the channels' gains.
+_LEAST_SPREAD_DB, _LEAST_SPREAD = 3.0, 1.5
 
 
 @dataclass(frozen=True)
@@ -59,12 +61,21 @@ class FrameDelays:
     """The n microphones."""
     metres_per_sample: float
     """Speed of sound over the sample rate."""
+    position_std_m: float = 0.0
+    """Of the microphones' places, root mean square."""
+    gain_std_db: float = 0.0
+    """Of the channels, dB."""
 
     @property
     def tolerance_m(self) -> float:
         """By how much delays may be off that fit a place, m."""
         across = _FIT_SHARE * self.shape.aperture_m
-        return max(_FIT_SAMPLES * self.metres_per_sample, across)
+        return max(_FIT_SAMPLES * self.metres_per_sample, across, self.misplaced_m)
+
+    @property
+    def misplaced_m(self) -> float:
+        """By how much the microphones' places alone may put delays off, m."""
+        return _FIT_DEVIATIONS * self.position_std_m
 
     def agreeing(
         self, tolerance_m: float = np.inf
@@ -97,24 +108,22 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
         no exchange helps.
     """
     (d, levels), shape = delays.agreeing(), delays.shape
-    tolerance = delays.tolerance_m
-    if len(d) < _LEAST_FRAMES or _fitting(d, levels, shape, tolerance)[0] > _WRONG:
+    if len(d) < _LEAST_FRAMES or _fitting(d, levels, delays)[0] > _WRONG:
         return []
     exchanges = list(combinations(range(shape.count), 2))
     trials = len(d) * len(exchanges)
     every = max(1, min(trials // _MOST_TRIALS, len(d) // _LEAST_FRAMES))
     d, levels = d[::every], levels[::every]
-    found = [
-        _fitting(
-            d, levels, replace(shape, p_AM=exchanged(shape.p_AM, *pair)), tolerance
-        )
+    turned = (
+        replace(delays, shape=replace(shape, p_AM=exchanged(shape.p_AM, *pair)))
         for pair in exchanges
-    ]
+    )
+    found = [_fitting(d, levels, other) for other in turned]
     best = max(share for share, _ in found)
     if best < _RIGHT:
         return []
     least = min(error for share, error in found if share > best - _ALIKE)
-    limit = 1.5 * least + 0.05 * tolerance
+    limit = 1.5 * least + 0.05 * delays.tolerance_m
     return [
         pair
         for pair, (share, error) in zip(exchanges, found, strict=True)
@@ -131,7 +140,7 @@ def misfit(delays: FrameDelays) -> float | None:
     d, levels = delays.agreeing()
     if len(d) < 2 * _LEAST_FRAMES:
         return None
-    share, _ = _fitting(d, levels, delays.shape, delays.tolerance_m)
+    share, _ = _fitting(d, levels, delays)
     return 1.0 - share if share < _HOPELESS else None
 
 
@@ -154,13 +163,14 @@ def exchanged(rows: NDArray[np.float64], i: int, j: int) -> NDArray[np.float64]:
 def _fitting(
     differences: NDArray[np.float64],
     levels: NDArray[np.float64],
-    shape: ArrayShape,
-    tolerance: float,
+    delays: FrameDelays,
 ) -> tuple[float, float]:
     """Share of the frames that a place outside the array explains, and RMS error.
 
     The error in m is that of the frames that it explains.
     """
+    shape, tolerance = delays.shape, delays.tolerance_m
+    gain_std_db = delays.gain_std_db
     if shape.kind == "plane" and shape.dimension == 2:
         # The source need not lie in the plane.
         shape = ArrayShape.of(np.column_stack((shape.p_AM, np.zeros(shape.count))))
@@ -169,7 +179,8 @@ def _fitting(
     for d, level in zip(differences, levels, strict=True):
         fix = locate_source(d, covariance, shape, 1.0)
         off = arrival_delays(fix, shape, 1.0) - d
-        if np.abs(off).max() < tolerance and not levels_contradict(level, fix, shape):
+        fits = np.abs(off).max() < tolerance
+        if fits and not levels_contradict(level, fix, shape, gain_std_db):
             errors.append(off)
     if not errors:
         return 0.0, np.inf
@@ -177,7 +188,10 @@ def _fitting(
 
 
 def levels_contradict(
-    levels: NDArray[np.float64], fix: SourceFix, shape: ArrayShape
+    levels: NDArray[np.float64],
+    fix: SourceFix,
+    shape: ArrayShape,
+    gain_std_db: float = 0.0,
 ) -> bool:
     """Whether a near source would be heard at other levels than these.
 
@@ -188,6 +202,7 @@ def levels_contradict(
         levels: (n,) RMS of the channels' sound, any unit.
         fix: A fix, with a range or without.
         shape: The n microphones.
+        gain_std_db: Standard deviation of the channels' gains, dB.
 
     Returns:
         True where the levels follow less than half of what 1/R asks for.
@@ -196,7 +211,7 @@ def levels_contradict(
         return False
     ranges = np.linalg.norm(shape.p_AM - fix.p_AS, axis=1)
     expected = -20.0 * np.log10(np.maximum(ranges, 1e-3))
-    if np.ptp(expected) < _LEAST_SPREAD_DB:
+    if np.ptp(expected) < max(_LEAST_SPREAD_DB, _LEAST_SPREAD * gain_std_db):
         return False
     expected -= expected.mean()
     measured = 20.0 * np.log10(np.maximum(levels, 1e-300))

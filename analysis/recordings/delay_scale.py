@@ -58,7 +58,8 @@ def delay_scale(delays: FrameDelays) -> DelayScale | None:
     later = np.hstack((np.zeros((len(d), 1)), d))
     i, j = shape.pairs.T
     paths = np.abs(later[:, j] - later[:, i])
-    over = float(np.median(((paths - error) / shape.distances_m).max(axis=1)))
+    certain = paths - error - delays.misplaced_m
+    over = float(np.median((certain / shape.distances_m).max(axis=1)))
     if over > _IMPOSSIBLE:
         return DelayScale("beyond", over, 0.0)
     long = shape.distances_m > _LONG * shape.aperture_m

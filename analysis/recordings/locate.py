@@ -7,7 +7,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+from analysis.recordings.array_geometry import (
+    ROBOT_ARRAY,
+    ArrayGeometry,
+    KnownArray,
+    load_geometry,
+)
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
 from analysis.recordings.recording_faults import channels_without_faults
@@ -16,7 +21,6 @@ from analysis.recordings.recording_spectra import RecordingSpectra
 from analysis.recordings.source_placement import place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
-from systems.sound.array_shape import ArrayShape
 from systems.sound.sound_file import read_sound
 
 __all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
@@ -47,32 +51,32 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         geometry: The microphones; the robot's own array by default.
 
     Returns:
-        ``LocateResult``. A range is reported where its standard deviation is
-        smaller than itself, and the wave fronts' curvature is more than small
-        errors of the geometry, of the speed of sound or reflections could
-        make. These are not in the standard deviations.
+        ``LocateResult``. Standard deviations count what the geometry says of its
+        own errors; a range is reported where its standard deviation is at most
+        ``largest_range_error`` of it.
 
     Raises:
         InputError: The recording cannot be used; says why, and the remedy.
     """
-    geometry = geometry or ArrayGeometry()
+    geometry = geometry or ROBOT_ARRAY
     samples, rate = read_sound(path, "recording")
     where = repr(str(path))
     complaint = _complaint(samples, rate, geometry)
     if complaint:
         raise InputError("recording", f"{where} {complaint}")
-    shape = ArrayShape.of(geometry.microphones)
+    known = geometry.known
+    shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
-    recording, faults = _recording(channels, rate, shape, geometry, where)
+    recording, faults = _recording(channels, rate, known, geometry.band, where)
     if not recording.starts.size:
         raise InputError(
             "recording",
             f"{where} has {samples.shape[1]} samples, less than one frame of "
             f"{recording.window.size}; record longer",
         )
-    search, sightings, estimates = _estimates(recording, shape, geometry.c)
-    late = late_channel(sightings, shape, geometry.c)
+    search, sightings, estimates = _estimates(recording, known)
+    late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     array = {
@@ -80,7 +84,12 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "channels": list(geometry.columns),
         "kind": shape.kind,
         "aperture_m": shape.aperture_m,
-        "sound_speed_m_s": geometry.c,
+        "side": shape.side,
+        "sound_speed_m_s": known.c,
+        "sound_speed_std_m_s": known.budget.speed_std,
+        "position_std_m": known.budget.position_std,
+        "delay_std_s": known.budget.delay_std,
+        "largest_range_error": known.largest_range_error,
         "band_hz": [recording.low_hz, recording.high_hz],
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
@@ -91,42 +100,41 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
 def _recording(
     channels: NDArray[np.float64],
     rate: int,
-    shape: ArrayShape,
-    geometry: ArrayGeometry,
+    array: KnownArray,
+    band: tuple[float, float] | None,
     where: str,
 ) -> tuple[RecordingSpectra, list[ChannelFault]]:
     """The channels that were chosen, mended where they can be; and their faults."""
-    low, high = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
+    low, high = band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
+    shape = array.shape
 
     def spectra(channels: NDArray[np.float64]) -> RecordingSpectra:
         equal = np.empty(channels.shape, dtype=np.float32)
         for row, channel in zip(equal, channels, strict=True):
             row[:] = (channel - channel.mean()) / channel.std()
-        return RecordingSpectra(
-            equal, float(rate), low, high, shape.max_delay(geometry.c)
-        )
+        return RecordingSpectra(equal, float(rate), low, high, shape.max_delay(array.c))
 
     def agreement(channels: NDArray[np.float64]) -> float:
-        search = RecordingSearch(spectra(channels), shape, geometry.c, _SNAPSHOTS[0])
+        search = RecordingSearch(spectra(channels), shape, array.c, _SNAPSHOTS[0])
         return search.mean_response()
 
     faults = find_channel_faults(
-        channels, shape, geometry.c, sample_rate_hz=float(rate), band_hz=geometry.band
+        channels, array, sample_rate_hz=float(rate), band_hz=band
     )
     channels, faults = channels_without_faults(channels, faults, agreement, where)
     return spectra(channels), faults
 
 
 def _estimates(
-    recording: RecordingSpectra, shape: ArrayShape, c: float
+    recording: RecordingSpectra, array: KnownArray
 ) -> tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]:
     """By the shortest stretches in which something is heard often enough."""
     best: tuple[RecordingSearch, list[Sighting], list[SourceEstimate]] | None = None
     for snapshots in _SNAPSHOTS:
-        search = RecordingSearch(recording, shape, c, snapshots)
+        search = RecordingSearch(recording, array.shape, array.c, snapshots)
         sightings = list(search.sightings())
-        placed = ((s.t_s, place_source(s, shape, c)) for s in sightings)
-        found = [SourceEstimate.of(t_s, fix) for t_s, fix in placed if fix is not None]
+        placed = ((s.t_s, place_source(s, array)) for s in sightings)
+        found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
         if best is None or len(found) > len(best[2]):
             best = search, sightings, found
         if len(found) >= min(_LEAST_ESTIMATES, len(search.stretches)):
@@ -150,7 +158,7 @@ def _complaint(samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry)
             "record every microphone on a channel of its own"
         )
     if geometry.channels is None and count > needed:
-        default = geometry.microphones == ArrayGeometry().microphones
+        default = geometry.microphones == ROBOT_ARRAY.microphones
         remedy = (
             "give the places of its microphones by --geometry FILE"
             if default

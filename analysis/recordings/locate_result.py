@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.channel_faults import ChannelFault
-from systems.hearing.source_fix import SourceFix
+from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
 __all__ = ["LocateResult", "SourceEstimate"]
@@ -37,39 +37,53 @@ class SourceEstimate:
     """Azimuth from the microphones' centroid, CCW from +x, in (-180, 180].
     None: an upright row of microphones cannot tell."""
     bearing_std_deg: float | None
-    """Its standard deviation from noise and scattered reflections."""
+    """Its standard deviation: noise, scattered reflections, errors of the array."""
+    bearing_systematic_deg: float | None
+    """The part of that by errors of the array, alike in all estimates."""
     elevation_deg: float | None
     """From the x-y plane. None: positions in the plane or a row cannot tell."""
     elevation_std_deg: float | None
     """Its standard deviation."""
+    elevation_systematic_deg: float | None
+    """The part of that by errors of the array."""
     range_m: float | None
     """Distance from the centroid; None where it cannot be told."""
     range_std_m: float | None
     """Its standard deviation."""
+    range_systematic_m: float | None
+    """The part of that by errors of the array."""
 
     @classmethod
-    def of(cls, t_s: float, fix: SourceFix) -> SourceEstimate:
-        """From a fix; what the array cannot tell becomes None.
+    def of(cls, t_s: float, placed: PlacedSource) -> SourceEstimate:
+        """From a place; what the array cannot tell becomes None.
 
         Args:
             t_s: Middle of the stretch, s from the start of the recording.
-            fix: Place in the array's frame, m, with its errors.
+            placed: Place in the array's frame, m, with its errors.
 
         Returns:
             Angles in deg, range in m.
         """
+        fix, systematic = placed.fix, placed.systematic
         bearing = math.isfinite(fix.bearing_std)
         elevation = fix.elevation_std is not None and math.isfinite(fix.elevation_std)
         return cls(
             t_s=t_s,
             bearing_deg=_wrapped_deg(math.degrees(fix.bearing)) if bearing else None,
             bearing_std_deg=math.degrees(fix.bearing_std) if bearing else None,
+            bearing_systematic_deg=(
+                math.degrees(systematic.bearing_std) if bearing else None
+            ),
             elevation_deg=math.degrees(fix.elevation or 0.0) if elevation else None,
             elevation_std_deg=(
                 math.degrees(fix.elevation_std or 0.0) if elevation else None
             ),
+            elevation_systematic_deg=(
+                math.degrees(systematic.elevation_std or 0.0) if elevation else None
+            ),
             range_m=fix.range if fix.range_valid else None,
             range_std_m=fix.range_std if fix.range_valid else None,
+            range_systematic_m=systematic.range_std if fix.range_valid else None,
         )
 
 
@@ -109,10 +123,17 @@ class LocateResult:
         return {
             "bearing_deg": bearing,
             "bearing_std_deg": bearing_std,
+            "bearing_systematic_deg": _usual([e.bearing_systematic_deg for e in main]),
             "elevation_deg": elevation,
             "elevation_std_deg": elevation_std,
+            "elevation_systematic_deg": _usual(
+                [e.elevation_systematic_deg for e in main]
+            ),
             "range_m": range_m,
             "range_std_m": range_std,
+            "range_systematic_m": _usual(
+                [e.range_systematic_m for e in main] if enough else []
+            ),
             "observable": [name for name, value in told.items() if value is not None],
             "ambiguity": self.shape.ambiguity,
             "alternatives": self._alternatives(bearing, elevation),
@@ -127,7 +148,7 @@ class LocateResult:
     ) -> list[dict[str, float | None]]:
         """The other side of a row or plane."""
         ahead = self.shape.ahead
-        if ahead is None or bearing is None:
+        if ahead is None or bearing is None or self.shape.ambiguity == "none":
             return []
         azimuth, height = math.radians(bearing), math.radians(elevation or 0.0)
         level = math.cos(height)
@@ -190,6 +211,12 @@ def _median(
     centre = _weighted_median(values, weights)
     scatter = _TO_STANDARD * float(np.median(np.abs(values - centre)))
     return centre, max(scatter, float(np.median(errors)))
+
+
+def _usual(values: Sequence[float | None]) -> float | None:
+    """The median of what is known; None where nothing is."""
+    known = [value for value in values if value is not None]
+    return float(np.median(known)) if known else None
 
 
 def _weighted_median(

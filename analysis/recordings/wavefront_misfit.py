@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.recording_search import Sighting
 from analysis.recordings.source_placement import inverse_range_std, tolerance
@@ -41,10 +42,6 @@ _STEPS = 6
 # allow: those are alike in all of them, and do not average out.
 _DEVIATIONS = 2.7
 
-# Reflections off the microphones' surroundings move each channel by its own, by this
-# share of what sound takes along the array, for each part that is not coherent.
-_SCATTER_SHARE = 0.015
-
 # Channels that explain nearly as much are no less to be blamed.
 _ALIKE = 0.8
 
@@ -62,14 +59,13 @@ class Lateness:
 
 
 def channel_lateness(
-    sightings: Sequence[Sighting], shape: ArrayShape, c: float
+    sightings: Sequence[Sighting], array: KnownArray
 ) -> Lateness | None:
     """How late each channel seems.
 
     Args:
         sightings: Delays and their errors.
-        shape: The microphones.
-        c: Speed of sound, m/s.
+        array: The microphones and their budget.
 
     Returns:
         The latenesses; None where there are too few stretches.
@@ -78,9 +74,10 @@ def channel_lateness(
     chosen = sightings[::every]
     if len(chosen) < _LEAST_STRETCHES:
         return None
+    shape = array.shape
     if shape.dimension == 2:
         shape = ArrayShape.of(np.pad(shape.p_AM, ((0, 0), (0, 1))))
-    found = [_of_stretch(sighting, shape, c) for sighting in chosen]
+    found = [_of_stretch(sighting, shape, array) for sighting in chosen]
     late, info, alike, misfit = (np.array(part) for part in zip(*found, strict=True))
     middle = np.median(late, axis=0)
     # Noise averages out over the stretches, of which one in two is independent.
@@ -95,19 +92,18 @@ def channel_lateness(
 
 
 def late_channel(
-    sightings: Sequence[Sighting], shape: ArrayShape, c: float
+    sightings: Sequence[Sighting], array: KnownArray
 ) -> ChannelFault | None:
     """The channel that is late, if one is beyond doubt.
 
     Args:
         sightings: Delays and their errors.
-        shape: The microphones.
-        c: Speed of sound, m/s.
+        array: The microphones and their budget.
 
     Returns:
         Which one, and by how much; None: none is beyond doubt.
     """
-    found = channel_lateness(sightings, shape, c)
+    found = channel_lateness(sightings, array)
     if found is None:
         return None
     worst = int(np.argmax(found.explained))
@@ -120,14 +116,14 @@ def late_channel(
     return ChannelFault(
         "late",
         tuple(int(k) for k in blamed),
-        f"channel {names}: off by {late_us:.0f} us at all times, or its microphone by "
-        f"{1e-3 * late_us * c:.0f} mm; sample all channels at once, and check their "
-        "order and the positions (in m)",
+        f"channel {names}: off by {late_us:.0f} us at all times, or its microphone "
+        f"by {1e-3 * late_us * array.c:.0f} mm; sample all channels at once, and check "
+        "their order and the positions (in m)",
     )
 
 
 def _of_stretch(
-    sighting: Sighting, shape: ArrayShape, c: float
+    sighting: Sighting, shape: ArrayShape, array: KnownArray
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], float]:
     """Lateness of each channel alone, and what is known of it.
 
@@ -136,10 +132,8 @@ def _of_stretch(
         variances that is alike in all stretches, s^2; and the whole misfit.
     """
     bent = inverse_range_std(shape)
-    scatter = _SCATTER_SHARE * (1.0 - min(sighting.coherence, 1.0))
-    scatter *= shape.max_delay(c)
-    allowed = tolerance(sighting, c)
-    allowed += scatter**2 * (np.eye(shape.count - 1) + 1.0)
+    c = array.c
+    allowed = tolerance(sighting, array)
     far = locate_far_source(
         sighting.tau, sighting.covariance, shape, c, allowed, inverse_range_std=bent
     )

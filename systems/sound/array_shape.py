@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, NamedTuple
 
@@ -18,6 +18,8 @@ _LEAST_DISTANCE_M = 1e-3
 
 # Off a line or a plane by less than this share of the aperture is on it.
 _FLATNESS = 0.01
+
+_UPRIGHT = ("above", "below")
 
 
 class EqualRow(NamedTuple):
@@ -52,6 +54,8 @@ class ArrayShape:
     a row's where that plane is upright. None where nothing is ambiguous."""
     aperture_m: float
     """Largest distance between two microphones, m."""
+    side: Literal["ahead", "behind", "above", "below"] | None = None
+    """Where all sources are known to be; None: on either side."""
 
     @classmethod
     def of(cls, positions: ArrayLike, flat_m: float | None = None) -> ArrayShape:
@@ -106,7 +110,7 @@ class ArrayShape:
         A row in space cannot even tell front from above: every place on a
         circle about it fits.
         """
-        if self.ahead is None:
+        if self.ahead is None or self.side is not None:
             return "none"
         return "front_back" if self.kind == "row" else "mirror"
 
@@ -145,6 +149,38 @@ class ArrayShape:
     def distances_m(self) -> NDArray[np.float64]:
         """Distance of each of ``pairs``, m."""
         return _distances(self.p_AM)[tuple(self.pairs.T)]
+
+    def facing(self, side: Literal["ahead", "behind", "above", "below"]) -> ArrayShape:
+        """The same microphones where all sources are known to be on one side.
+
+        Args:
+            side: Ahead is towards +x, or +y for a row along x; above towards +z.
+
+        Returns:
+            The shape that looks there; ``ambiguity`` is then none.
+
+        Raises:
+            InputError: The array cannot tell these sides, or tells all places.
+        """
+        level = self.ahead is None or abs(self.ahead[-1]) <= _FLATNESS
+        names = ("ahead", "behind") if self.dimension == 2 or level else _UPRIGHT
+        if self.ahead is None:
+            raise InputError(
+                "side", f"is {side}, but this array tells all sides; remove it"
+            )
+        if side not in names:
+            raise InputError(
+                "side",
+                f"is {side}, but this array tells {names[0]} from {names[1]} alone; "
+                "give one of them",
+            )
+        turned = side == names[1]
+        return replace(
+            self,
+            ahead=-self.ahead if turned else self.ahead,
+            span=-self.span if turned and self.kind == "row" else self.span,
+            side=side,
+        )
 
     def max_delay(self, c: float) -> float:
         """Longest time that sound takes from microphone to microphone, s."""

@@ -8,7 +8,9 @@ import warnings
 import numpy as np
 import pytest
 
+from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import find_channel_faults
+from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 FS, C, SECONDS = 16_000, 340.0, 3.0
@@ -43,8 +45,14 @@ def recording(shape, p_AS, *, snr_db=20.0, seed=0):
     return np.rint(rows * (0.3 * 2**15 / np.abs(rows).max())) / 2**15
 
 
+def found_faults(samples, shape, position_std=0.0005, gain_std_db=0.0):
+    budget = ArrayBudget.of(shape, position_std)
+    array = KnownArray(shape, C, budget, gain_std_db=gain_std_db)
+    return find_channel_faults(samples, array, sample_rate_hz=FS)
+
+
 def faults(samples, shape=FIVE):
-    found = find_channel_faults(samples, shape, C, sample_rate_hz=FS)
+    found = found_faults(samples, shape)
     return [(fault.kind, fault.channels) for fault in found]
 
 
@@ -142,7 +150,7 @@ def test_exchanged_neighbours_of_a_row():
 
 def test_a_square_names_both_sides():
     samples = recording(SQUARE, place(SQUARE, 35.0, 2.0))
-    found = find_channel_faults(samples[[1, 0, 2, 3]], SQUARE, C, sample_rate_hz=FS)
+    found = found_faults(samples[[1, 0, 2, 3]], SQUARE)
     assert [(f.kind, f.channels) for f in found] == [("swapped", (0, 1, 2, 3))]
     assert "channels 1 and 2 or 3 and 4" in found[0].message
     assert faults(samples[[2, 1, 0, 3]], SQUARE) == []
@@ -170,9 +178,7 @@ def test_a_source_at_a_microphone(order):
 )
 def test_a_source_straight_ahead_or_above_says_little_of_the_size(places, p_AS, where):
     shape = ArrayShape.of(places)
-    (fault,) = find_channel_faults(
-        recording(shape, np.array(p_AS)), shape, C, sample_rate_hz=FS
-    )
+    (fault,) = found_faults(recording(shape, np.array(p_AS)), shape)
     assert fault.kind == "size"
     assert where in fault.message
 
@@ -250,3 +256,17 @@ def test_rooms_are_no_fault():
         assert faults(samples) == []
         samples[3] *= -1.0
         assert faults(samples) == [("inverted", (3,))]
+
+
+def test_unequal_gains_that_were_stated_are_no_fault():
+    samples = recording(FIVE, place(FIVE, 50.0, 1.5))
+    samples *= np.array([[1.0], [1.0], [12.0], [1.0], [1.0]])
+    assert [f.kind for f in found_faults(samples, FIVE)] == ["near"]
+    assert found_faults(samples, FIVE, gain_std_db=8.0) == []
+
+
+def test_misplaced_microphones_that_were_stated_are_no_fault():
+    """As far off as an exchange of neighbours would put them."""
+    samples = recording(SQUARE, place(SQUARE, 35.0, 2.0))[[1, 0, 2, 3]]
+    assert [f.kind for f in found_faults(samples, SQUARE)] == ["swapped"]
+    assert found_faults(samples, SQUARE, position_std=0.15) == []

@@ -85,6 +85,37 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         (GOOD + "band: 300\n", "band: is 300; give a list"),
         (GOOD + "band: [8000, 300]\n", "band"),
         (GOOD + "bandwidth: 3\n", "bandwidth: unknown key"),
+        (GOOD + "position_std_m: -0.01\n", "position_std_m"),
+        (GOOD + "position_std_m: 5\n", "position_std_m.*1"),
+        (GOOD + "position_std_m: [0.01, 0.01]\n", "2 given for 3 microphones"),
+        (
+            GOOD + "position_std_m: 0.01\n"
+            "position_covariance_m2: [[1.0e-4, 0], [0, 1.0e-4]]\n",
+            "position_std_m.*keep one",
+        ),
+        (
+            GOOD + "position_covariance_m2: [[1.0e-4]]\n",
+            r"has 1 rows of \[1\]; give 2 x 2 .* 6 x 6",
+        ),
+        (
+            GOOD + "position_covariance_m2: [[1.0e-4, 1.0e-4], [0, 1.0e-4]]\n",
+            "not symmetric",
+        ),
+        (
+            GOOD + "position_covariance_m2: [[1.0e-4, 2.0e-4], [2.0e-4, 1.0e-4]]\n",
+            "negative variance",
+        ),
+        (
+            GOOD + "sound_speed_std: 1\ntemperature_std_c: 1\n",
+            "sound_speed_std.*keep one",
+        ),
+        (GOOD + "largest_range_error: 0\n", "largest_range_error"),
+        (GOOD + "side: above\n", "side.*ahead from behind alone"),
+        (GOOD + "side: left\n", "side"),
+        (
+            "microphones: [[0, 0], [0, 1], [1, 0]]\nside: ahead\n",
+            "side.*tells all sides; remove",
+        ),
     ],
 )
 def test_geometry_that_makes_no_sense(tmp_path, text, says):

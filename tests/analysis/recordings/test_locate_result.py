@@ -23,10 +23,13 @@ def estimate(t, bearing, elevation=None, range_m=None, std=1.0):
         t_s=t,
         bearing_deg=bearing,
         bearing_std_deg=std,
+        bearing_systematic_deg=0.5 * std,
         elevation_deg=elevation,
         elevation_std_deg=None if elevation is None else std,
+        elevation_systematic_deg=None if elevation is None else 0.5 * std,
         range_m=range_m,
         range_std_m=None if range_m is None else 0.1,
+        range_systematic_m=None if range_m is None else 0.05,
     )
 
 

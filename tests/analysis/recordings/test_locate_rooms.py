@@ -66,7 +66,9 @@ def record(path, places, bearing, elevation, distance, t60, snr_db=20.0):
     level = heard.std() * 10 ** (-snr_db / 20)
     heard = heard + level * rng.standard_normal(heard.shape)
     soundfile.write(path, 0.5 * heard.T / np.abs(heard).max(), RATE, subtype="PCM_24")
-    return locate(path, ArrayGeometry(microphones=tuple(map(tuple, places.tolist()))))
+    microphones = tuple(map(tuple, places.tolist()))
+    exact = ArrayGeometry(microphones=microphones, position_std_m=0.0005)
+    return locate(path, exact)
 
 
 @pytest.mark.parametrize(

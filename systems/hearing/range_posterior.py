@@ -1,0 +1,242 @@
+"""How far a source is, from delays with errors in common: compiled kernels.
+
+Where the array is not known well, the least squares' range is a poor answer: delays
+whose errors happen to bend the waves look certain just because they are near, and an
+array in space may have a second place amid its microphones. Hence the likelihood of
+the delays is taken at many ranges, each with the best direction there and with what
+the array's errors make of delays from there, and is integrated over ranges that are
+all alike likely.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from systems.sound.array_budget import ArrayBudget
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["RangePosterior", "range_posterior"]
+
+# Ranges beyond the farthest are told by no array, m; so many of them, evenly by their
+# logarithm, and about the likeliest place, by deviations of the inverse range.
+_FARTHEST_M = 30.0
+_RANGES = 48
+_ABOUT = np.linspace(-5.0, 5.0, 31)
+
+_STEPS = 4
+_LEAST_OFF = 0.2
+
+
+class RangePosterior(NamedTuple):
+    """The range of a source, and the direction at that range."""
+
+    range: float
+    """Mean, m."""
+    range_std: float
+    """Standard deviation, m."""
+    u: NDArray[np.float64]
+    """(d,) unit vector to the source from the microphones' centroid."""
+    covariance: NDArray[np.float64]
+    """(d, d) of the place u times range, m^2."""
+
+
+class _Kernel(NamedTuple):
+    """Delays, the array and its budget, for compiled code."""
+
+    tau: NDArray[np.float64]
+    own: NDArray[np.float64]
+    p: NDArray[np.float64]
+    frame: NDArray[np.float64]
+    """(d, q) axes within which directions are sought."""
+    ahead: NDArray[np.float64]
+    """(q,) unit vector off a row or plane; zeros: there is none."""
+    of_places: NDArray[np.float64]
+    speed_share: float
+    delay_std: float
+    c: float
+
+
+def range_posterior(
+    tau: NDArray[np.float64],
+    covariance: NDArray[np.float64],
+    shape: ArrayShape,
+    budget: ArrayBudget,
+    c: float,
+    *,
+    start: tuple[NDArray[np.float64], float, float],
+    nearest_m: float,
+) -> RangePosterior:
+    """The range with all that is not known of the array marginalised.
+
+    Args:
+        tau: (n - 1,) delays t_k - t_0 of microphones 1 ... n - 1, s.
+        covariance: (n - 1, n - 1) of the delays by noise and reflections, s^2.
+        shape: The n microphones.
+        budget: What is not known of them and of the air.
+        c: Speed of sound, m/s.
+        start: A direction (d,), an inverse range, 1/m, and its standard deviation,
+            about which the likelihood is looked at more closely.
+        nearest_m: Least range, m.
+
+    Returns:
+        Mean and standard deviation over ranges up to 30 m, and the direction.
+    """
+    u, w, w_std = start
+    frame = (
+        np.stack((shape.span[0], shape.ahead), axis=1)
+        if shape.kind == "row" and shape.ahead is not None
+        else np.eye(shape.dimension)
+    )
+    kernel = _Kernel(
+        np.ascontiguousarray(tau),
+        np.ascontiguousarray(covariance),
+        shape.p_AM,
+        np.ascontiguousarray(frame),
+        np.zeros(frame.shape[1]) if shape.ahead is None else frame.T @ shape.ahead,
+        np.ascontiguousarray(budget.of_places),
+        budget.speed_std / c,
+        budget.delay_std,
+        c,
+    )
+    ranges = np.geomspace(_FARTHEST_M, nearest_m, _RANGES)
+    close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / _FARTHEST_M, 1.0 / nearest_m)
+    ranges = np.unique(np.concatenate((ranges, close)))[::-1].copy()
+    likelihood = _log_likelihood(kernel, frame.T @ u, ranges)
+    density = np.exp(likelihood - likelihood.max())
+    mean, std = _moments(ranges[::-1], density[::-1])
+    a, of_p = _place(kernel, frame.T @ u, mean)
+    direction = frame @ a
+    along = float(direction @ of_p @ direction)
+    stretch = np.eye(len(direction)) + (std / np.sqrt(along) - 1.0) * np.outer(
+        direction, direction
+    )
+    return RangePosterior(mean, std, direction, stretch @ of_p @ stretch)
+
+
+def _moments(
+    ranges: NDArray[np.float64], density: NDArray[np.float64]
+) -> tuple[float, float]:
+    whole = np.trapezoid(density, ranges)
+    mean = float(np.trapezoid(density * ranges, ranges) / whole)
+    variance = np.trapezoid(density * (ranges - mean) ** 2, ranges) / whole
+    return mean, float(np.sqrt(variance))
+
+
+@njit(cache=True)
+def _delays(
+    kernel: _Kernel, u: NDArray[np.float64], r: float
+) -> tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]:  # pragma: no cover  (compiled)
+    """Delays (n - 1,) from u r, slopes (n - 1, d) along it, and covariance."""
+    n, d = kernel.p.shape
+    rays = np.empty((n, d))
+    later = np.empty(n)
+    for m in range(n):
+        square = 0.0
+        for i in range(d):
+            rays[m, i] = u[i] * r - kernel.p[m, i]
+            square += rays[m, i] ** 2
+        later[m] = np.sqrt(square)
+        for i in range(d):
+            rays[m, i] /= max(later[m], 1e-9)
+    tau = (later[1:] - later[0]) / kernel.c
+    slopes = np.empty((n - 1, d))
+    moved = np.zeros((n - 1, n * d))
+    for k in range(n - 1):
+        for i in range(d):
+            slopes[k, i] = (rays[k + 1, i] - rays[0, i]) / kernel.c
+            moved[k, (k + 1) * d + i] = -rays[k + 1, i] / kernel.c
+            moved[k, i] = rays[0, i] / kernel.c
+    whole = kernel.own + moved @ kernel.of_places @ moved.T
+    for k in range(n - 1):
+        for j in range(n - 1):
+            whole[k, j] += kernel.speed_share**2 * tau[k] * tau[j]
+            whole[k, j] += kernel.delay_std**2 * (2.0 if j == k else 1.0)
+    return tau, slopes, whole
+
+
+@njit(cache=True)
+def _across(a: NDArray[np.float64]) -> NDArray[np.float64]:  # pragma: no cover
+    """(q, q - 1) orthonormal directions across a unit vector."""
+    if a.size == 2:
+        return np.array([[-a[1]], [a[0]]])
+    least = 0
+    for i in range(1, 3):
+        if abs(a[i]) < abs(a[least]):
+            least = i
+    size = np.sqrt(1.0 - a[least] ** 2)
+    out = np.empty((3, 2))
+    for i in range(3):
+        out[i, 0] = ((1.0 if i == least else 0.0) - a[least] * a[i]) / size
+    for i in range(3):
+        j, m = (i + 1) % 3, (i + 2) % 3
+        out[i, 1] = a[j] * out[m, 0] - a[m] * out[j, 0]
+    return out
+
+
+@njit(cache=True)
+def _turned(
+    kernel: _Kernel, a: NDArray[np.float64], r: float
+) -> tuple[NDArray[np.float64], float]:  # pragma: no cover  (compiled)
+    """The best direction at a range, and the logarithm of its likelihood.
+
+    Directions about the best one are integrated over, too (Laplace).
+    """
+    # In the plane itself nothing points off it.
+    off = np.sum(kernel.ahead**2) * _LEAST_OFF - np.sum(kernel.ahead * a)
+    if off > 0.0:
+        a = a + off * kernel.ahead
+        a = a / np.sqrt(np.sum(a**2))
+    value = 0.0
+    for step in range(_STEPS + 1):
+        tau, slopes, whole = _delays(kernel, kernel.frame @ a, r)
+        root = np.linalg.inv(np.linalg.cholesky(whole))
+        residual: NDArray[np.float64] = root @ (kernel.tau - tau)
+        sides: NDArray[np.float64] = root @ slopes @ (kernel.frame @ _across(a)) * r
+        normal = sides.T @ sides
+        for i in range(len(normal)):
+            normal[i, i] += 1e-12
+        if step == _STEPS:
+            value = -0.5 * np.sum(residual**2)
+            value += np.sum(np.log(np.diag(root)))
+            known = np.linalg.eigvalsh(normal)
+            # Near a plane the angle off it is the root of a small difference.
+            least = max(1.0, 0.5 * np.sqrt(known[-1]))
+            value -= 0.5 * np.sum(np.log(np.maximum(known, least)))
+            break
+        move = np.linalg.solve(normal, sides.T @ residual)
+        length = np.sqrt(np.sum(move**2))
+        if length > 0.3:
+            move *= 0.3 / length
+        a = a + _across(a) @ move
+        a = a / np.sqrt(np.sum(a**2))
+    return a, value
+
+
+@njit(cache=True)
+def _log_likelihood(
+    kernel: _Kernel, a: NDArray[np.float64], ranges: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """(k,) at falling ranges."""
+    out = np.empty(ranges.size)
+    for k in range(ranges.size):
+        a, out[k] = _turned(kernel, a, ranges[k])
+    return out
+
+
+@njit(cache=True)
+def _place(
+    kernel: _Kernel, a: NDArray[np.float64], r: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:  # pragma: no cover  (compiled)
+    """The best direction at a range, and the covariance (d, d) of the place there."""
+    a, _ = _turned(kernel, a, r)
+    _, slopes, whole = _delays(kernel, kernel.frame @ a, r)
+    root = np.linalg.inv(np.linalg.cholesky(whole))
+    sides = root @ slopes @ kernel.frame
+    of_a = np.linalg.pinv(sides.T @ sides)
+    return a, kernel.frame @ of_a @ kernel.frame.T
