@@ -9,7 +9,7 @@ that noise makes, and reflections, as far as they move bands apart.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -43,7 +43,10 @@ class AlignedDelays:
     covariance: NDArray[np.float64]
     """(n - 1, n - 1), s^2."""
     coherence: float
-    """Mean over pairs and frequencies of the part in phase, at most 1."""
+    """Mean over pairs and frequencies of the part in phase, at most 1; frequencies
+    count as far as they are coherent."""
+    agreement: float = field(default=0.0, kw_only=True)
+    """The same with all frequencies alike: how well these delays explain all."""
 
 
 def fit_aligned_delays(
@@ -96,8 +99,13 @@ def fit_aligned_delays(
     scale = float(np.trace(inverse @ scatter)) / tau.size
     coherence = float(aligned / (len(first) * (gain * total).sum()))
     echo = 1.0 + _ECHO_ERROR * (1.0 - min(coherence, 1.0))
+    whole = np.array([0, angular_frequency.size])
+    in_phase = _sums(cross, even, angular_frequency, tau, whole)[2]
     return AlignedDelays(
-        tau=tau, covariance=echo**2 * scale * inverse, coherence=coherence
+        tau=tau,
+        covariance=echo**2 * scale * inverse,
+        coherence=coherence,
+        agreement=float(in_phase / (len(first) * total.sum())),
     )
 
 

@@ -15,6 +15,7 @@ from analysis.recordings.array_geometry import (
 )
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
+from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
 from analysis.recordings.recording_faults import channels_without_faults
 from analysis.recordings.recording_search import RecordingSearch, Sighting
 from analysis.recordings.recording_spectra import RecordingSpectra
@@ -125,22 +126,56 @@ def _recording(
     return spectra(channels), faults
 
 
-def _estimates(
-    recording: RecordingSpectra, array: KnownArray
-) -> tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]:
-    """By the shortest stretches in which something is heard often enough."""
-    best: tuple[RecordingSearch, list[Sighting], list[SourceEstimate]] | None = None
+_Heard = tuple[RecordingSearch, list[Sighting], list[SourceEstimate]]
+
+
+def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
+    """By each sound, if they are short, or by stretches of time.
+
+    The stretches are the shortest ones in which something is heard often enough.
+    """
+    sounds = [
+        OnsetSpectra(
+            recording.channels,
+            recording.sample_rate_hz,
+            recording.low_hz,
+            recording.high_hz,
+            recording.travel_s,
+            after_s=after_s,
+        )
+        for after_s in AFTER_S
+    ]
+    if sounds[0].are_most:
+        return min((_heard(s, array, snapshots=1) for s in sounds), key=_uncertainty)
+    best = None
     for snapshots in _SNAPSHOTS:
-        search = RecordingSearch(recording, array.shape, array.c, snapshots)
-        sightings = list(search.sightings())
-        placed = ((s.t_s, place_source(s, array)) for s in sightings)
-        found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
-        if best is None or len(found) > len(best[2]):
-            best = search, sightings, found
-        if len(found) >= min(_LEAST_ESTIMATES, len(search.stretches)):
+        heard = _heard(recording, array, snapshots)
+        if best is None or len(heard[2]) > len(best[2]):
+            best = heard
+        if len(heard[2]) >= min(_LEAST_ESTIMATES, len(heard[0].stretches)):
             break
     assert best is not None
     return best
+
+
+def _uncertainty(heard: _Heard) -> tuple[int, float]:
+    """What is worse the less is heard, and then the less well its delays are known."""
+    variances = [np.trace(sighting.covariance) for sighting in heard[1]]
+    return -len(variances), float(np.median(variances)) if variances else np.inf
+
+
+def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _Heard:
+    search = RecordingSearch(
+        recording,
+        array.shape,
+        array.c,
+        snapshots,
+        has_place=lambda delays: place_source(delays, array) is not None,
+    )
+    sightings = list(search.sightings())
+    placed = ((s.t_s, place_source(s, array)) for s in sightings)
+    found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
+    return search, sightings, found
 
 
 def _complaint(samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry) -> str:

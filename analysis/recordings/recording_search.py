@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
+from analysis.recordings.consistent_lags import consistent_lags
 from analysis.recordings.recording_spectra import RecordingSpectra
 from systems.hearing.steered_response import (
     LAG_DENSITY,
@@ -34,6 +35,11 @@ _LEAST_DIRECT = 0.1
 # To choose among the peaks of a stretch its neighbours help: how many on either
 # side, and by which share.
 _NEIGHBOURS, _HELP = 4, 0.5
+# Places that are looked at more closely for a sound that stands alone. Sound that has
+# come straight is the earlier, though it may agree a little less: delays are alike
+# within the one time, and earlier beyond the other, s.
+_CANDIDATES = 8
+_DIRECT, _ALIKE_S, _EARLIER_S = 0.75, 1e-4, 4e-4
 
 
 @dataclass(frozen=True)
@@ -56,7 +62,9 @@ class RecordingSearch:
     shape: ArrayShape
     c: float
     snapshots: int
-    """Of a stretch; stretches overlap by half."""
+    """Of a stretch; stretches overlap by half, unless each is one snapshot."""
+    has_place: Callable[[AlignedDelays], bool] = field(default=lambda _: True)
+    """Whether delays belong to some place; asked where there is a choice."""
 
     @cached_property
     def stretches(self) -> list[slice]:
@@ -90,14 +98,17 @@ class RecordingSearch:
         least = LAG_DENSITY * self.recording.high_hz * self._window_s
         return int(fft.next_fast_len(math.ceil(least), real=True))
 
-    def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
-        """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""
+    def _correlations(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
+        """(p, 2 m + 1) of the pairs' cross-spectra (p, f), which add up to 1."""
         whole = np.zeros((len(cross), self._length // 2 + 1), dtype=np.complex64)
         whole[:, self.recording.bins] = cross
         correlation = fft.irfft(whole, self._length) * (0.5 * self._length)
         m = self.grid.max_lag
-        gated = np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
-        return steered_response(gated, self.grid)
+        return np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
+
+    def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
+        """(g,) of the pairs' cross-spectra (p, f), which add up to 1."""
+        return steered_response(self._correlations(cross), self.grid)
 
     @cached_property
     def diffuse_response(self) -> NDArray[np.float32]:
@@ -148,6 +159,11 @@ class RecordingSearch:
     def _stretch_response(self, stretch: slice, weight: float) -> NDArray[np.float32]:
         if weight < _LEAST_WEIGHT:
             return np.zeros(len(self.grid.lags), dtype=np.float32)
+        cross = self._cross(stretch)
+        return self._responses(cross / self.recording.weights[stretch].sum())
+
+    def _cross(self, stretch: slice) -> NDArray[np.complex64]:
+        """(p, f) whitened cross-spectra of the pairs, weighted."""
         weights = self.recording.weights[stretch]
         spectra = self.recording.spectra(stretch)
         power = np.mean(np.abs(spectra) ** 2, axis=0)
@@ -156,7 +172,7 @@ class RecordingSearch:
         cross = np.empty((len(first), spectra.shape[2]), dtype=np.complex64)
         for p, (i, j) in enumerate(zip(first, second, strict=True)):
             cross[p] = np.sum(spectra[i].conj() * spectra[j], axis=0)
-        return self._responses(cross / weights.sum())
+        return cross
 
     def _sighting(
         self,
@@ -167,16 +183,49 @@ class RecordingSearch:
     ) -> Sighting | None:
         if weight < _LEAST_WEIGHT:
             return None
-        best = int(np.argmax(response + _HELP * near))
-        if response[best] < self._threshold(best, stretch):
-            return None
-        fit = self._delays(best, stretch)
+        if self.snapshots == 1:
+            fit = self._consistent(response, stretch)
+        else:
+            best = int(np.argmax(response + _HELP * near))
+            heard = response[best] >= self._threshold(best, stretch)
+            fit = self._delays(best, stretch) if heard else None
         if fit is None:
             return None
         recording = self.recording
         first, last = recording.starts[[stretch.start, stretch.stop - 1]]
         ends = float(first + last + recording.window.size)
         return Sighting(**vars(fit), t_s=ends / (2.0 * recording.sample_rate_hz))
+
+    def _consistent(
+        self, response: NDArray[np.float32], stretch: slice
+    ) -> AlignedDelays | None:
+        """The delays on which all channels agree best, of a sound that stands out.
+
+        In a short window an echo at one microphone may pass for the sound: a wrong
+        place then has the greatest response of a coarse grid, though most pairs
+        alone agree on it.
+        """
+        best = int(np.argmax(response))
+        if response[best] < self._threshold(best, stretch):
+            return None
+        weight = float(self.recording.weights[stretch].sum())
+        rate = self._length / self._window_s
+        sets = consistent_lags(
+            self._correlations(self._cross(stretch) / weight),
+            self.shape.pairs,
+            np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64),
+            _CANDIDATES,
+        )
+        found = [self._delays_at(lags / rate, stretch) for lags in sets]
+        found.append(self._delays(best, stretch))
+        heard = [fit for fit in found if fit is not None and self.has_place(fit)]
+        heard.sort(key=lambda fit: -fit.agreement)
+        best_fit = heard[0] if heard else None
+        for fit in heard[1:]:
+            assert best_fit is not None
+            if fit.agreement > _DIRECT * heard[0].agreement and _earlier(fit, best_fit):
+                best_fit = fit
+        return best_fit
 
     def _threshold(self, place: int, stretch: slice) -> float:
         # Windows that overlap by half, with the shape used, are worth half as
@@ -189,16 +238,34 @@ class RecordingSearch:
 
     def _delays(self, place: int, stretch: slice) -> AlignedDelays | None:
         """Delays of the channels, aligned for a place of the grid first."""
-        grid, rate = self.grid, self.recording.sample_rate_hz
+        grid = self.grid
         chosen = slice(place, place + 1)
         later = centroid_delays(
             grid.p_AS[chosen], grid.inverse_range[chosen], self.shape, self.c
         )[0]
+        return self._delays_at(later, stretch, grid.coarseness)
+
+    def _delays_at(
+        self, later: NDArray[np.float64], stretch: slice, coarseness: float = 1.0
+    ) -> AlignedDelays | None:
+        """Delays of the channels, aligned for these (n,) first, s."""
+        rate = self.recording.sample_rate_hz
         lags = np.rint(later * rate).astype(np.int64)
         fit = fit_aligned_delays(
             self.recording.spectra(stretch, lags),
             self.recording.weights[stretch],
             self.recording.angular_frequency,
-            grid.coarseness,
+            coarseness,
         )
         return fit and replace(fit, tau=fit.tau + (lags[1:] - lags[0]) / rate)
+
+
+def _earlier(one: AlignedDelays, other: AlignedDelays) -> bool:
+    """Whether most channels hear both alike, and the rest hear the one earlier."""
+    later = np.concatenate(([0.0], other.tau - one.tau))
+    for common in later:
+        off = later - common
+        alike = np.abs(off) < _ALIKE_S
+        if 2 * alike.sum() >= off.size:
+            return bool(np.all(off[~alike] > _EARLIER_S) and not alike.all())
+    return False

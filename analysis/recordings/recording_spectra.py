@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["RecordingSpectra"]
+__all__ = ["ABOVE_NOISE", "RecordingSpectra"]
 
 WINDOW_S = 0.032
 #: Windows are at least this many times as long as sound takes along the array.
@@ -27,8 +27,8 @@ _QUIET = 0.1
 _QUIET_TO_MEAN = 1.5
 # A recording whose level varies by less holds no quiet snapshots, dB.
 _LEAST_CONTRAST_DB = 6.0
-# What is below this much of the noise's power counts nothing.
-_ABOVE_NOISE = 2.0
+#: What is below this much of the noise's power counts nothing.
+ABOVE_NOISE = 2.0
 # A room's echo: reverberation time, and the share of it that is taken away.
 _REVERBERATION_S = 0.5
 _ECHO_SHARE = 0.8
@@ -137,7 +137,7 @@ class RecordingSpectra:
         echo = np.zeros_like(power)
         for k in range(1, len(power)):
             echo[k] = decay * np.maximum(echo[k - 1], power[k - 1])
-        above = 1.0 - np.minimum(_ABOVE_NOISE * self.noise, power) / power
+        above = 1.0 - np.minimum(ABOVE_NOISE * self.noise, power) / power
         direct = 1.0 - np.minimum(_ECHO_SHARE * echo, power) / power
         # Digital silence is worth nothing, however long ago its last echo was.
         return (above * direct * (self.power > tiny)).astype(np.float32)

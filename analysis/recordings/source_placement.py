@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.recordings.aligned_delays import AlignedDelays
 from analysis.recordings.array_geometry import KnownArray
-from analysis.recordings.recording_search import Sighting
 from systems.hearing.far_field import locate_far_source
 from systems.hearing.multilateration import angles_of, locate_source
 from systems.hearing.range_posterior import range_posterior
@@ -61,11 +61,11 @@ class PlacedSource:
     """The same place with the errors of the budget alone."""
 
 
-def place_source(sighting: Sighting, array: KnownArray) -> PlacedSource | None:
+def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     """Where the sound of a stretch came from.
 
     Args:
-        sighting: Delays and their errors.
+        delays: Of the channels, with their errors.
         array: The microphones and their budget.
 
     Returns:
@@ -73,8 +73,8 @@ def place_source(sighting: Sighting, array: KnownArray) -> PlacedSource | None:
         of it that the array names. None where no place fits the delays, or where
         the budget supports no bearing.
     """
-    tau, shape, c = sighting.tau, array.shape, array.c
-    own = sighting.covariance + _reflections(sighting, array)
+    tau, shape, c = delays.tau, array.shape, array.c
+    own = delays.covariance + _reflections(delays, array)
     bent = inverse_range_std(shape)
     lying = shape.dimension == 2 and shape.kind == "plane"
     u = _direction(tau, own, array)
@@ -208,25 +208,25 @@ def _of_budget(
     )
 
 
-def _reflections(sighting: Sighting, array: KnownArray) -> NDArray[np.float64]:
+def _reflections(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     """(n - 1, n - 1) s^2 of delays by reflections that are alike in all bands."""
-    share = _REFLECTED_SHARE * (1.0 - min(sighting.coherence, 1.0))
+    share = _REFLECTED_SHARE * (1.0 - min(delays.coherence, 1.0))
     moved = share * min(array.shape.max_delay(array.c), _UNRESOLVED_S)
-    return moved**2 * (np.eye(len(sighting.tau)) + 1.0)
+    return moved**2 * (np.eye(len(delays.tau)) + 1.0)
 
 
-def tolerance(sighting: Sighting, array: KnownArray) -> NDArray[np.float64]:
+def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     """Covariance of delays by all but noise, for a source far away.
 
     Args:
-        sighting: Its n - 1 delays and its coherence.
+        delays: n - 1 of them, with their coherence.
         array: The microphones and their budget.
 
     Returns:
         (n - 1, n - 1) s^2, to be added to that from noise.
     """
-    reflected = _reflections(sighting, array)
-    u = _direction(sighting.tau, sighting.covariance + reflected, array)
+    reflected = _reflections(delays, array)
+    u = _direction(delays.tau, delays.covariance + reflected, array)
     return reflected + _budget(u, 0.0, array)
 
 

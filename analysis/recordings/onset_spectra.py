@@ -1,0 +1,142 @@
+"""Short sounds of a recording: one window each, which begins where the sound does.
+
+A click or a chirp of a few milliseconds is over before its first echo has come, or
+soon after. A window that begins just before it and ends soon after holds the direct
+sound and few echoes, however much of them follows.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import fft
+from scipy.ndimage import maximum_filter1d
+from scipy.signal import butter, sosfilt
+
+from analysis.recordings.recording_spectra import ABOVE_NOISE, RecordingSpectra
+
+__all__ = ["AFTER_S", "OnsetSpectra"]
+
+# A window begins so long before an onset, beside what sound takes along the array, and
+# ends as softly.
+_BEFORE_S = 0.003
+#: How long windows may last after an onset, s: for clicks, and for what takes longer.
+AFTER_S = (0.014, 0.04, 0.11)
+
+# Steps in which onsets are looked for. Within the attack, in steps, they rise over all
+# that was heard for some time before it, and over the quiet parts of the recording, by
+# the one, and have begun where they are above it by the other.
+_STEP_S = 0.001
+_QUIET_BEFORE_S = 0.05
+_ATTACK = 15
+_RISE_DB, _BEGUN_DB = 10.0, 5.0
+_QUIET = 0.2
+
+# A sound is short where this share of it has come within this time of its onset,
+# echoes included; so is the recording where most of it are short sounds.
+_MOST, _SHORT_S = 0.9, 0.25
+_LONGEST_S = 0.6
+
+# Of the sample rate, highest corner of the filter.
+_HIGHEST = 0.49
+
+
+@dataclass(frozen=True)
+class OnsetSpectra(RecordingSpectra):
+    """As a recording of short sounds, of which each is a snapshot."""
+
+    after_s: float = AFTER_S[0]
+    """How long a window lasts after the onset, s."""
+
+    @cached_property
+    def window(self) -> NDArray[np.float32]:
+        """(w,) shape of a snapshot: soft before the onset and at its end."""
+        soft = round(_BEFORE_S * self.sample_rate_hz)
+        flat = round(self.after_s * self.sample_rate_hz)
+        rise = np.sin(0.5 * math.pi * (np.arange(soft) + 0.5) / soft) ** 2
+        return np.concatenate((rise, np.ones(flat), rise[::-1])).astype(np.float32)
+
+    @cached_property
+    def energy(self) -> NDArray[np.float64]:
+        """(k,) power in the band in steps of a millisecond, all channels."""
+        step = round(_STEP_S * self.sample_rate_hz)
+        # Causal: nothing of a sound may come before it.
+        high_hz = min(self.high_hz, _HIGHEST * self.sample_rate_hz)
+        band = butter(
+            2, (self.low_hz, high_hz), "band", fs=self.sample_rate_hz, output="sos"
+        )
+        heard = sosfilt(band, self.channels, axis=1)
+        count = heard.shape[1] // step
+        power = np.mean(heard[:, : count * step] ** 2, axis=0, dtype=np.float64)
+        return power.reshape(count, step).mean(axis=1)
+
+    @cached_property
+    def onsets(self) -> NDArray[np.int64]:
+        """(s,) steps at which a sound begins."""
+        energy, before = self.energy, round(_QUIET_BEFORE_S / _STEP_S)
+        if energy.size <= before:
+            return np.zeros(0, dtype=np.int64)
+        # The louder of the steps that end so long before this one.
+        past = maximum_filter1d(energy, before, origin=before - 1 - before // 2)
+        past = np.concatenate((np.full(_ATTACK, np.inf), past[:-_ATTACK]))
+        past = np.maximum(past, np.quantile(energy, _QUIET))
+        high = energy > 10.0 ** (_RISE_DB / 10.0) * past
+        high[: before + _ATTACK] = False
+        steps = np.flatnonzero(high)
+        begun = steps[np.diff(steps, prepend=-before) >= before]
+        # A slow attack has begun before it is as loud as that.
+        for row, k in enumerate(begun):
+            rising = energy[k - _ATTACK : k] > 10.0 ** (_BEGUN_DB / 10.0) * past[k]
+            quiet = np.flatnonzero(~rising)
+            begun[row] = k - _ATTACK + (quiet[-1] + 1 if quiet.size else 0)
+        return begun
+
+    @cached_property
+    def starts(self) -> NDArray[np.int64]:
+        """(s,) first samples of the snapshots."""
+        step = round(_STEP_S * self.sample_rate_hz)
+        lead = self.travel_s * self.sample_rate_hz + self._soft
+        first = self.onsets * step - round(lead)
+        last = self.channels.shape[1] - self.window.size
+        return first[(first >= 0) & (first <= last)]
+
+    @property
+    def are_most(self) -> bool:
+        """Whether most of what the recording holds are short sounds."""
+        energy = self.energy - np.quantile(self.energy, _QUIET)
+        ends = np.append(self.onsets, energy.size)[1:]
+        longest = round(_LONGEST_S / _STEP_S)
+        short, whole = 0.0, float(np.maximum(energy, 0.0).sum())
+        for first, last in zip(self.onsets, ends, strict=True):
+            sound = np.maximum(energy[first : min(last, first + longest)], 0.0)
+            come = np.cumsum(sound)
+            if np.searchsorted(come, _MOST * come[-1]) * _STEP_S <= _SHORT_S:
+                short += float(come[-1])
+        return short > _MOST * whole > 0.0
+
+    @property
+    def _soft(self) -> float:
+        return _BEFORE_S * self.sample_rate_hz
+
+    @cached_property
+    def noise_before(self) -> NDArray[np.float32]:
+        """(s, f) power in a window that ends where a snapshot begins."""
+        take = self.starts[:, np.newaxis] + np.arange(-self.window.size, 0)
+        frames = self.channels[:, np.maximum(take, 0)] * self.window
+        spectra = fft.rfft(frames, axis=-1)[..., self.bins]
+        return np.mean(np.abs(spectra) ** 2, axis=0)
+
+    @cached_property
+    def weights(self) -> NDArray[np.float32]:
+        """(s, f) what each snapshot is worth, 0 to 1."""
+        power = np.maximum(self.power, np.finfo(np.float32).tiny)
+        kernel = np.full(5, 0.2, dtype=np.float32)
+        noise = np.array(
+            [np.convolve(row, kernel, "same") for row in self.noise_before]
+        )
+        above = 1.0 - np.minimum(ABOVE_NOISE * noise, power) / power
+        return (above * (self.power > np.finfo(np.float32).tiny)).astype(np.float32)
