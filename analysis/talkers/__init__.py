@@ -1,0 +1,1 @@
+"""Several talkers at once: simulated recordings, and what is found in them."""

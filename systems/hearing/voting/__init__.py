@@ -1,0 +1,20 @@
+"""Directions of single times and frequencies, gathered into sources and tracks."""
+
+from systems.hearing.voting.direction_votes import (
+    DirectionVotes,
+    VoteMemory,
+    VotePlan,
+    cast_votes,
+    join_votes,
+)
+from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
+
+__all__ = [
+    "DirectionVotes",
+    "VoteMemory",
+    "VotePlan",
+    "VotedSource",
+    "cast_votes",
+    "gather_sources",
+    "join_votes",
+]
