@@ -14,6 +14,7 @@ from analysis.recordings.array_geometry import (
     load_geometry,
 )
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
+from analysis.recordings.heard_sources import heard_sources
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
 from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
 from analysis.recordings.recording_faults import channels_without_faults
@@ -39,6 +40,9 @@ _TOP_OF_RATE = 0.45
 # which fewer show too little.
 _SNAPSHOTS = (8, 32, 128)
 _LEAST_ESTIMATES = 3
+
+# Microphones may stand so many deviations farther apart than it is stated.
+_SLACK = 4.0
 
 # Faults that make channels seem late.
 _EXPLAINS_LATENESS = ("size", "near")
@@ -95,7 +99,16 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
-    return LocateResult(array, shape, estimates, len(search.stretches), faults)
+    sources, tracks = heard_sources(
+        recording.channels,
+        shape,
+        known.c,
+        float(rate),
+        (recording.low_hz, recording.high_hz),
+    )
+    return LocateResult(
+        array, shape, estimates, len(search.stretches), faults, sources, tracks
+    )
 
 
 def _recording(
@@ -170,6 +183,7 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
         array.shape,
         array.c,
         snapshots,
+        slack_s=_SLACK * array.budget.position_std / array.c,
         has_place=lambda delays: place_source(delays, array) is not None,
     )
     sightings = list(search.sightings())

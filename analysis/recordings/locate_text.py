@@ -27,7 +27,8 @@ def locate_text(result: LocateResult) -> str:
     faults = [fault.message for fault in result.faults]
     if not result.estimates:
         return "\n".join([f"{heard}: nothing to locate{_WHY_NOTHING}", *faults])
-    lines = [heard, *_direction(result), _range(result), *faults, ""]
+    lines = [heard, *_direction(result), _range(result), *_sources(result)]
+    lines += [*faults, ""]
     lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
     lines += [_row(estimate) for estimate in result.estimates]
     return "\n".join(lines)
@@ -64,6 +65,17 @@ def _range(result: LocateResult) -> str:
         size = 100.0 * result.shape.aperture_m
         return f"range not observable (microphones within {size:.1f} cm)"
     return f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f})"
+
+
+def _sources(result: LocateResult) -> list[str]:
+    """Where there are several; one is what the lines above speak of."""
+    if len(result.sources) < 2:
+        return []
+    each = [
+        f"{source.bearing_deg:.1f} deg ({100.0 * source.share:.0f} %)"
+        for source in result.sources
+    ]
+    return [f"{len(each)} sources: {', '.join(each)} of what is heard"]
 
 
 def _row(estimate: SourceEstimate) -> str:

@@ -63,6 +63,8 @@ class RecordingSearch:
     c: float
     snapshots: int
     """Of a stretch; stretches overlap by half, unless each is one snapshot."""
+    slack_s: float = 0.0
+    """By how much delays may be longer than the stated places allow, s."""
     has_place: Callable[[AlignedDelays], bool] = field(default=lambda _: True)
     """Whether delays belong to some place; asked where there is a choice."""
 
@@ -98,12 +100,14 @@ class RecordingSearch:
         least = LAG_DENSITY * self.recording.high_hz * self._window_s
         return int(fft.next_fast_len(math.ceil(least), real=True))
 
-    def _correlations(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
+    def _correlations(
+        self, cross: NDArray[np.complex64], slack: int = 0
+    ) -> NDArray[np.float32]:
         """(p, 2 m + 1) of the pairs' cross-spectra (p, f), which add up to 1."""
         whole = np.zeros((len(cross), self._length // 2 + 1), dtype=np.complex64)
         whole[:, self.recording.bins] = cross
         correlation = fft.irfft(whole, self._length) * (0.5 * self._length)
-        m = self.grid.max_lag
+        m = self.grid.max_lag + slack
         return np.concatenate((correlation[:, -m:], correlation[:, : m + 1]), axis=1)
 
     def _responses(self, cross: NDArray[np.complex64]) -> NDArray[np.float32]:
@@ -210,10 +214,12 @@ class RecordingSearch:
             return None
         weight = float(self.recording.weights[stretch].sum())
         rate = self._length / self._window_s
+        slack = math.ceil(self.slack_s * rate)
+        reach = np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64)
         sets = consistent_lags(
-            self._correlations(self._cross(stretch) / weight),
+            self._correlations(self._cross(stretch) / weight, slack),
             self.shape.pairs,
-            np.ceil(self.shape.distances_m / self.c * rate).astype(np.int64),
+            reach + slack,
             _CANDIDATES,
         )
         found = [self._delays_at(lags / rate, stretch) for lags in sets]

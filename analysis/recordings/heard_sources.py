@@ -1,0 +1,153 @@
+"""All sources of a recording: where each is, and its track over time."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from systems.hearing.voting import (
+    DirectionVotes,
+    VotedSource,
+    VotePlan,
+    cast_votes,
+    gather_sources,
+    join_votes,
+)
+from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["FollowedSource", "HeardSource", "heard_sources", "vote_plan"]
+
+# Samples of a channel that vote at once.
+_BLOCK = 2**16
+
+# Where a source was not heard for longer its place is a guess, s.
+_PAUSE_S = 0.3
+
+# Speech and most noises have what is told apart below this.
+_HIGHEST_HZ = 8_000.0
+
+
+@dataclass(frozen=True)
+class HeardSource:
+    """A direction from which sound came, over the whole recording."""
+
+    bearing_deg: float
+    """Azimuth from the microphones' centroid, CCW from +x, in (-180, 180]."""
+    bearing_std_deg: float
+    """By the scatter of what votes for it; errors of the array are not in it."""
+    elevation_deg: float | None
+    """From the x-y plane; None where the array does not tell it."""
+    share: float
+    """Of all that votes, 0 to 1."""
+    confidence: float
+    """0 to 1."""
+
+    @classmethod
+    def of(cls, voted: VotedSource) -> HeardSource:
+        """From a peak of votes.
+
+        Args:
+            voted: The peak.
+
+        Returns:
+            The same in deg.
+        """
+        height = voted.elevation
+        return cls(
+            bearing_deg=math.degrees(voted.bearing),
+            bearing_std_deg=math.degrees(voted.bearing_std),
+            elevation_deg=None if height is None else math.degrees(height),
+            share=voted.share,
+            confidence=voted.confidence,
+        )
+
+
+@dataclass(frozen=True)
+class FollowedSource:
+    """A source that was followed for some time."""
+
+    identity: int
+    """From 1, in the order in which they began."""
+    t_s: list[float]
+    """Times, s from the start of the recording."""
+    bearing_deg: list[float]
+    """Its bearing at each."""
+    confidence: float
+    """Greatest probability that it existed, 0 to 1."""
+
+
+def vote_plan(
+    shape: ArrayShape, c: float, sample_rate_hz: float, band_hz: tuple[float, float]
+) -> VotePlan:
+    """How an array votes in a band that may be wider than what is told apart.
+
+    Args:
+        shape: The n microphones; they must tell bearings.
+        c: Speed of sound, m/s.
+        sample_rate_hz: Of the samples, Hz.
+        band_hz: Lowest and highest frequency that counts, Hz.
+
+    Returns:
+        The plan.
+
+    Raises:
+        InputError: The array tells no bearings.
+    """
+    highest = min(band_hz[1], max(_HIGHEST_HZ, 2.0 * band_hz[0]))
+    return VotePlan.of(shape, c, sample_rate_hz, band_hz=(band_hz[0], highest))
+
+
+def heard_sources(
+    channels: NDArray[np.float32],
+    shape: ArrayShape,
+    c: float,
+    sample_rate_hz: float,
+    band_hz: tuple[float, float],
+) -> tuple[list[HeardSource], list[FollowedSource]]:
+    """Every source that stands out, and its track.
+
+    Args:
+        channels: (n, samples).
+        shape: The n microphones.
+        c: Speed of sound, m/s.
+        sample_rate_hz: Of the samples, Hz.
+        band_hz: Lowest and highest frequency that counts, Hz.
+
+    Returns:
+        The sources, the one that is heard most first; and the tracks, in order of
+        their begin. Empty for an array that tells no bearings.
+    """
+    if "bearing" not in shape.angles:
+        return [], []
+    plan = vote_plan(shape, c, sample_rate_hz, band_hz)
+    memory, parts = plan.blank(), []
+    for first in range(0, channels.shape[1], _BLOCK):
+        votes, memory = cast_votes(plan, memory, channels[:, first : first + _BLOCK])
+        parts.append(votes)
+    votes = join_votes(parts)
+    sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
+    return sources, _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+
+
+def _tracks(
+    votes: DirectionVotes, seconds: float, plan: VotePlan
+) -> list[FollowedSource]:
+    tracks: dict[int, FollowedSource] = {}
+    for step in follow_sources(votes, seconds, plan, ListenerParameters()):
+        for track in step.tracks:
+            if step.t_s - track.t_heard > _PAUSE_S:
+                continue
+            known = tracks.setdefault(
+                track.identity, FollowedSource(track.identity, [], [], 0.0)
+            )
+            known.t_s.append(round(step.t_s, 6))
+            known.bearing_deg.append(math.degrees(track.bearing))
+            sure = max(known.confidence, track.confidence)
+            tracks[track.identity] = FollowedSource(
+                track.identity, known.t_s, known.bearing_deg, sure
+            )
+    return list(tracks.values())
