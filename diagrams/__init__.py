@@ -1,5 +1,6 @@
 """Scenarios, the builder that wires blocks, and the run."""
 
+from diagrams.audio.run_audio import RunAudio, check_audible
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.loading import dump_scenario, library_scenarios, load_scenario
 from diagrams.scenario import Scenario
@@ -14,10 +15,12 @@ from systems.framework.input_error import InputError
 
 __all__ = [
     "InputError",
+    "RunAudio",
     "RunResult",
     "Scenario",
     "SoundFollower",
     "build_sound_follower",
+    "check_audible",
     "dump_scenario",
     "library_scenarios",
     "load_compiled_code",

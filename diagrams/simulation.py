@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
+from diagrams.audio.diagram_audio import DiagramAudio
+from diagrams.audio.run_audio import RunAudio
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.compiled.loop import CompiledLoop, compile_loop
 from diagrams.compiled.loop_blocks import shared_blocks, shared_world
@@ -57,6 +59,7 @@ def simulate(
     follower: SoundFollower | None = None,
     progress: Callable[[float], None] | None = None,
     engine: Engine | None = None,
+    audio: RunAudio | None = None,
 ) -> RunResult:
     """Runs a scenario to its end.
 
@@ -69,6 +72,7 @@ def simulate(
         engine: ``drake``, or ``compiled``: the same blocks in one compiled loop; they
             are compiled for up to 15 s when they are first used, and kept on the disk.
             None: that of the scenario, Drake's if that is ``auto``.
+        audio: Opened files for what is heard and played; none: nothing is saved.
 
     Returns:
         ``RunResult``.
@@ -77,9 +81,12 @@ def simulate(
         InputError: The law is not known.
         InputError: The sound file cannot be played, or a value became NaN.
         InputError: The scenario or its law cannot be compiled.
+        OSError: Sound cannot be written any more.
     """
+    if audio is not None:
+        audio.check_unused(scenario)
     if (engine or scenario.engine) == "compiled":
-        return _run_compiled(scenario, progress)
+        return _run_compiled(scenario, progress, audio)
     follower = follower or build_sound_follower(scenario, log=True)
     logs = [parts.log for parts in follower.robots.values()]
     if follower.scenario != scenario or None in logs:
@@ -89,7 +96,7 @@ def simulate(
     load_compiled_code(follower)
     simulator = make_simulator(follower)
     rules = StopRules(follower)
-    simulator.set_monitor(rules)
+    simulator.set_monitor(_monitor(follower, rules, audio))
     start = perf_counter()
     simulator.Initialize()
     views = _python_views(follower, simulator.get_context())
@@ -115,17 +122,39 @@ def simulate(
     return gather_result(scenario, rules.robots, columns, wall_s, world=world)
 
 
-def prepared_loop(scenario: Scenario) -> CompiledLoop:
+def _monitor(
+    follower: SoundFollower, rules: StopRules, audio: RunAudio | None
+) -> Callable[[Any], Any]:
+    """What the simulator calls after every step: saves the sound, and judges."""
+    if audio is None:
+        return rules
+    save = DiagramAudio(follower, audio)
+
+    def monitor(context: Any) -> Any:
+        save(context)
+        return rules(context)
+
+    return monitor
+
+
+def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
     """The compiled loop of a scenario, compiled or loaded, before its first tick.
+
+    Args:
+        scenario: What to run.
+        audio: Where its sound goes, if it is saved.
+
+    Returns:
+        The loop.
 
     Raises:
         InputError: As ``simulate``.
     """
-    loop = _new_loop(scenario)
+    loop = _new_loop(scenario, audio)
     loop.prepare()
-    audio = any(robot.listens for robot in scenario.all_robots.values())
+    listens = any(robot.listens for robot in scenario.all_robots.values())
     kind = "compiled", *_kind(scenario)
-    if audio and kind not in _LOADED:
+    if listens and kind not in _LOADED:
         # What it calls in Python is compiled, too; errors are the run's to raise.
         aside = _new_loop(scenario)
         with suppress(ValueError):
@@ -134,17 +163,18 @@ def prepared_loop(scenario: Scenario) -> CompiledLoop:
     return loop
 
 
-def _new_loop(scenario: Scenario) -> CompiledLoop:
-    return compile_loop(
-        scenario, shared_blocks(scenario), RunRules(scenario), shared_world(scenario)
-    )
+def _new_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
+    blocks, world = shared_blocks(scenario), shared_world(scenario)
+    return compile_loop(scenario, blocks, RunRules(scenario), world, audio)
 
 
 def _run_compiled(
-    scenario: Scenario, progress: Callable[[float], None] | None
+    scenario: Scenario,
+    progress: Callable[[float], None] | None,
+    audio: RunAudio | None,
 ) -> RunResult:
     """``simulate`` by a compiled loop."""
-    loop = prepared_loop(scenario)
+    loop = prepared_loop(scenario, audio)
     start = perf_counter()
     ticks_a_second = max(1, round(1.0 / scenario.tick_s))
     while not loop.over:

@@ -265,11 +265,11 @@ import phonotaxis
 
 simulate = diagrams.simulate
 
-def telling(scenario, *, follower, progress):
+def telling(scenario, *, progress, **others):
     def tell(time_s):
         print("runs", flush=True)
         progress(time_s)
-    return simulate(scenario, follower=follower, progress=tell)
+    return simulate(scenario, progress=tell, **others)
 
 diagrams.simulate = telling
 sys.exit(phonotaxis.main())

@@ -39,12 +39,10 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
                 job = command.prepare(options, partial(_take, stack, interrupts))
                 found, summary = _run(job, interrupts)
     except KeyboardInterrupt:
-        if job is None or job.kept is None:
+        left = _left(job) if job is not None else ""
+        if not left:
             raise
-        raise RunError(
-            f"interrupted; {job.kept()} of {job.total} runs are kept: go on with "
-            f"--out {job.out} --resume"
-        ) from None
+        raise RunError(f"interrupted; {left}") from None
     try:
         interrupts.release()
         _print(job, found, summary, as_json=options.json)
@@ -55,6 +53,16 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
             raise
         raise RunError(f"interrupted; the results are in {job.out}") from None
     job.demand(found)
+
+
+def _left(job: Job[Any]) -> str:
+    """What an interrupt leaves behind, in words."""
+    if job.kept is None:
+        return job.left()
+    return (
+        f"{job.kept()} of {job.total} runs are kept: go on with --out {job.out} "
+        "--resume"
+    )
 
 
 def _take(stack: ExitStack, interrupts: Interrupts, out: str | None) -> Place:

@@ -52,6 +52,8 @@ class Job(Generic[Found]):
     """Of what it counts."""
     kept: Callable[[], int] | None = None
     """Number of runs in ``out``, which an interrupt leaves there for ``--resume``."""
+    left: Callable[[], str] = lambda: ""
+    """Says what an interrupt of it leaves behind, if it leaves anything."""
     remarks: Callable[[Found], Sequence[str]] = lambda found: ()
     """Lines for standard error."""
     demand: Callable[[Found], None] = lambda found: None

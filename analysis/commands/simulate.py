@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 import logging
 from argparse import ArgumentParser, Namespace
-from typing import TYPE_CHECKING
+from contextlib import nullcontext
+from typing import TYPE_CHECKING, Any
 
 from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
+from analysis.commands.saved_audio import SavedAudio
 
 if TYPE_CHECKING:
     from diagrams import RunResult
@@ -21,6 +23,11 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("--sound", metavar="FILE", help="sound file to play")
     parser.add_argument("--law", help=LAW_HELP)
     take_scenario(parser)
+    parser.add_argument(
+        "--save-audio",
+        metavar="DIR",
+        help="new directory for what the robots hear and the loudspeakers play",
+    )
     take_output(parser)
 
 
@@ -39,6 +46,9 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     scenario = load_scenario(options.scenario, _settings(options))
     for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
+    saved: SavedAudio | None = None
+    if options.save_audio is not None:
+        saved = SavedAudio(options.save_audio, place.out, scenario)
     follower = None
     if scenario.engine == "compiled":
         prepared_loop(scenario)
@@ -46,20 +56,32 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         follower = build_sound_follower(scenario, log=True)
 
     def run(progress: Progress) -> RunResult:
-        try:
-            return simulate(scenario, follower=follower, progress=progress)
-        except InputError as error:  # found after the input had been accepted
-            raise RunError(str(error)) from error
+        with saved.opened() if saved else nullcontext() as audio:
+            try:
+                return simulate(
+                    scenario, follower=follower, progress=progress, audio=audio
+                )
+            except InputError as error:  # found after the input had been accepted
+                raise RunError(str(error)) from error
+
+    def summary(result: RunResult) -> dict[str, Any]:
+        audio = {"audio": saved.facts()} if saved else {}
+        return {**run_summary(result, place.out), **audio}
+
+    def text(result: RunResult, document: dict[str, Any]) -> str:
+        lines = [summary_text(result, document), *([saved.text()] if saved else [])]
+        return "\n".join(lines)
 
     return Job(
         run=run,
-        summary=lambda result: run_summary(result, place.out),
-        text=summary_text,
+        summary=summary,
+        text=text,
         out=place.out,
         write=lambda result, summary: write_run(result, summary, place.directory),
         where=f"{'results':<21} {{out}}",
         total=scenario.duration_s,
         unit="s simulated",
+        left=saved.left if saved else lambda: "",
     )
 
 

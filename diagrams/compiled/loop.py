@@ -18,6 +18,8 @@ import numpy as np
 from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
+from diagrams.audio.run_audio import RunAudio
+from diagrams.compiled.loop_audio import save_sounds
 from diagrams.compiled.loop_blocks import LoopBlocks
 from diagrams.compiled.parts import run_parts
 from diagrams.compiled.plan import LoopPlan, LoopRobot, LoopWorld
@@ -153,6 +155,7 @@ def compile_loop(
     blocks: Mapping[str, LoopBlocks],
     rules: RunRules,
     shared: LoopBlocks | None = None,
+    audio: RunAudio | None = None,
 ) -> CompiledLoop:
     """The loop of a scenario that has one.
 
@@ -161,6 +164,7 @@ def compile_loop(
         blocks: Of each robot; they may be made for another start or seed.
         rules: When the run ends.
         shared: What all robots share, if they share anything.
+        audio: Where its sound goes, if it is saved.
 
     Returns:
         The loop, before its first tick.
@@ -184,6 +188,8 @@ def compile_loop(
         plan.remember(name, function)
     for each in (*((world,) if world else ()), *robots.values()):
         plan.add(each)
+    if audio is not None:
+        save_sounds(plan, robots, sounds, audio)
     plan.judge(rules, scenario.tick_s)
     width, columns = 0, {}
     logged: dict[str, LoopRobot | LoopWorld] = {**robots}

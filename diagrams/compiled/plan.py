@@ -157,6 +157,19 @@ class LoopPlan:
         step = host_step(function, sum(map(len, motion)), 0, 1)
         self._filled.append(self._step(step, motion, ()))
 
+    def show(
+        self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
+    ) -> None:
+        """Shows numbers to a Python function, after what is done before the log.
+
+        Args:
+            view: (n,) what a port carries.
+            function: Takes them.
+            period_ticks: From one time to the next, ticks.
+        """
+        step = host_step(function, len(view), 0, period_ticks)
+        self._early.append(self._step(step, (view,), ()))
+
     def _step(
         self, step: Step, inputs: tuple[Any, ...], outputs: tuple[Any, ...]
     ) -> int:

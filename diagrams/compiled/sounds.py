@@ -28,6 +28,9 @@ class Sounds(NamedTuple):
     carried: dict[str, HostFunction]
     """Of each robot with a loudspeaker, what has to see its pose and velocity at every
     tick before anybody hears it."""
+    played: dict[str, Callable[[int], Emission]]
+    """Of each source and loudspeaker, the emission at a tick; empty where nobody hears
+    waves."""
 
 
 def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
@@ -44,7 +47,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
         InputError: A sound file cannot be played.
     """
     robots = scenario.all_robots
-    sounds = Sounds({name: {} for name in robots}, {})
+    sounds = Sounds({name: {} for name in robots}, {}, {})
     hearing = [name for name, own in robots.items() if own.listens]
     ticks = history_ticks(
         microphone_reach(scenario.room, scenario.acoustics),
@@ -70,6 +73,7 @@ def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
         emission = emissions_along(
             p_WS, v_WS, waveform, sound, ticks, scenario.tick_s, on_since
         )
+        sounds.played[source] = emission
         for name in hearing:
             followed = scenario.target(name) == source
             sounds.heard[name]["emission" if followed else f"emission_{source}"] = (

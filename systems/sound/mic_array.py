@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -243,8 +244,9 @@ class MicArray(LeafSystem):
                 emissions = [emission(tick) for emission in emitted]
             before, memory = memory, recorder.remembered(emissions, time, now, memory)
 
+        @lru_cache(maxsize=1)
         def audio(tick: int) -> AudioFrame:
-            """Made when it is asked for: not everybody listens all the time."""
+            """Made when it is asked for, once: not everybody listens all the time."""
             emissions = [emission(tick) for emission in emitted]
             time = tick * run.tick_s
             return recorder.record(emissions, time, now, before, recorder.array)

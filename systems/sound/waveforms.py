@@ -21,6 +21,7 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.sound_file import read_sound
 
 __all__ = [
+    "LARGEST_CREST",
     "MICROPHONE_BAND_HZ",
     "SoundParameters",
     "band_limited",
