@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from analysis.commands import (
+    calibrate,
     compare,
     design,
     laws,
@@ -40,6 +41,7 @@ COMMANDS: dict[str, Command] = {
         laws,
         locate,
         listen,
+        calibrate,
         localization,
         compare,
         stability,

@@ -13,6 +13,7 @@ from systems.sound.recorder import microphones_B
 __all__ = ["geometry_text"]
 
 #: Places are written to a nanometre: sums of floats have longer tails.
+_LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
 _DECIMALS = 9
 
 
@@ -42,7 +43,16 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     if scenario.room is not None and scenario.room.rise_m:
         rise = scenario.room.rise_m
         comments.append(f"The microphones are {rise:g} m above the loudspeakers.")
-    document = dump_yaml({"microphones": places, "sound_speed": scenario.acoustics.c})
+    # Uniform within its tolerance, and no better than the rounding of a drawing.
+    drawn = own.microphones.position_tolerance_m / 3.0**0.5
+    document = dump_yaml(
+        {
+            "microphones": places,
+            "position_std_m": max(drawn, _LEAST_POSITION_STD_M),
+            "sound_speed": scenario.acoustics.c,
+            "sound_speed_std": _SOUND_SPEED_STD,
+        }
+    )
     return "".join(f"# {line}\n" for line in comments) + document
 
 

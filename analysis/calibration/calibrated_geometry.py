@@ -1,0 +1,97 @@
+"""A calibrated array as a geometry file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.calibration.calibration import Calibration
+from analysis.recordings.array_geometry import ArrayGeometry
+from analysis.reporting.plain_values import write_json
+from diagrams.yaml_text import LARGEST_BYTES, dump_yaml
+from systems.framework.input_error import InputError
+from systems.sound.array_shape import ArrayShape
+
+__all__ = ["calibrated_fields", "write_calibration"]
+
+_Side = Literal["ahead", "behind", "above", "below"]
+
+# Fields that the calibration replaces.
+_REPLACED = frozenset(
+    {
+        "microphones",
+        "position_std_m",
+        "position_covariance_m2",
+        "sound_speed",
+        "sound_speed_std",
+        "temperature_c",
+        "temperature_std_c",
+    }
+)
+
+# Digits of a covariance, and characters about each of its numbers.
+_DIGITS, _AROUND = (17, 9), 8
+
+
+def calibrated_fields(
+    calibration: Calibration, geometry: ArrayGeometry
+) -> dict[str, Any]:
+    """Fields of a geometry file.
+
+    Args:
+        calibration: What was found.
+        geometry: The array as stated, of which all else is kept.
+
+    Returns:
+        Plain values by field. Of a large array that no file could hold, the
+        covariance becomes a deviation for each microphone; a side that microphones
+        off their plane do not have any more is left out.
+    """
+    fields = {
+        "microphones": calibration.places.tolist(),
+        **_uncertainty(calibration),
+        "sound_speed": calibration.c,
+        "sound_speed_std": calibration.speed_std,
+    }
+    dropped = set(_REPLACED)
+    if geometry.side is not None and not _has_side(calibration, geometry.side):
+        dropped.add("side")
+    kept = geometry.model_dump(mode="json", exclude_none=True, exclude=dropped)
+    return {**fields, **kept}
+
+
+def write_calibration(document: dict[str, Any], folder: Path) -> None:
+    """Writes array.yaml, as ``load_geometry`` reads it, and calibration.json.
+
+    Args:
+        document: Of a calibration.
+        folder: Where to.
+    """
+    write_json(document, folder / "calibration.json")
+    text = dump_yaml(document["geometry"])
+    (folder / "array.yaml").write_text(text, encoding="utf-8")
+
+
+def _has_side(calibration: Calibration, side: _Side) -> bool:
+    try:
+        ArrayShape.of(calibration.places).facing(side)
+    except InputError:
+        return False
+    return True
+
+
+def _uncertainty(calibration: Calibration) -> dict[str, Any]:
+    covariance = calibration.of_places
+    for digits in _DIGITS:
+        if covariance.size * (digits + _AROUND) < LARGEST_BYTES:
+            return {"position_covariance_m2": _rounded(covariance, digits)}
+    variances = np.diag(covariance).reshape(calibration.places.shape)
+    return {"position_std_m": np.sqrt(variances.mean(axis=1)).tolist()}
+
+
+def _rounded(matrix: NDArray[np.float64], digits: int) -> list[list[float]]:
+    symmetric = (matrix + matrix.T) / 2.0
+    return [[float(f"{value:.{digits}g}") for value in row] for row in symmetric]

@@ -1,0 +1,136 @@
+"""Whether sounds and geometry agree, and which of them is most to blame if not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import chi2
+
+from analysis.calibration.calibration import Calibration, Fit, place_weight
+from analysis.calibration.wave_fronts import wave_front
+
+__all__ = ["CalibrationMisfit", "calibration_misfit"]
+
+# A chi-square that chance exceeds less often does not fit.
+_CHANCE = 1e-3
+
+# Of a matrix' largest eigenvalue: what is below is none.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class CalibrationMisfit:
+    """A chi-square that does not fit, and what it fits without."""
+
+    kind: Literal["sound", "microphone", "channel"]
+    """What is most to blame: a sound, the place of a microphone, or a channel's
+    delay."""
+    index: int
+    """Which one, from 0."""
+    chi_square: float
+    """Without it."""
+    freedom: int
+    """What that is expected to be."""
+
+    @property
+    def explains(self) -> bool:
+        """Whether all else fits without it."""
+        return bool(chi2.sf(self.chi_square, max(self.freedom, 1)) > _CHANCE)
+
+
+def calibration_misfit(calibration: Calibration) -> CalibrationMisfit | None:
+    """What does not fit.
+
+    To first order about the solution: by how much chi-square falls without a sound,
+    or with a microphone anywhere, or with a channel late by any time.
+
+    Args:
+        calibration: The calibration.
+
+    Returns:
+        What is most to blame: that without which the rest fits best. None: all fits.
+    """
+    whole, freedom = calibration.chi_square, calibration.freedom
+    if freedom < 1 or chi2.sf(whole, freedom) > _CHANCE:
+        return None
+    precision = np.eye(len(calibration.information)) + calibration.information
+    covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
+    found = [
+        CalibrationMisfit("sound", j, max(whole - drop, 0.0), freedom - rank)
+        for j, (drop, rank) in enumerate(
+            _without_sound(fit, covariance) for fit in calibration.fits
+        )
+    ]
+    found += _by_channel(calibration, covariance)
+    telling = [m for m in found if m.freedom > 0] or found
+    return max(telling, key=lambda m: chi2.logsf(m.chi_square, max(m.freedom, 1)))
+
+
+def _by_channel(
+    calibration: Calibration, covariance: NDArray[np.float64]
+) -> list[CalibrationMisfit]:
+    """Without the place of each microphone, or without each channel's delay."""
+    count, dimension = calibration.places.shape
+    late = np.eye(count)[1:] - np.eye(count)[0]
+    found = []
+    for k in range(count):
+        own = slice(k * dimension, (k + 1) * dimension)
+        moves = [_moves(calibration, fit)[:, own] for fit in calibration.fits]
+        delays = [fit.root @ late[:, k : k + 1] for fit in calibration.fits]
+        drop = _drop_of(calibration.fits, moves, covariance)
+        left, freedom = calibration.chi_square - drop, calibration.freedom - dimension
+        found.append(CalibrationMisfit("microphone", k, max(left, 0.0), freedom))
+        left = calibration.chi_square - _drop_of(calibration.fits, delays, covariance)
+        freedom = calibration.freedom - 1
+        found.append(CalibrationMisfit("channel", k, max(left, 0.0), freedom))
+    return found
+
+
+def _left(fit: Fit) -> NDArray[np.float64]:
+    """(n - 1,) residual about the place as it was expected, in deviations."""
+    return fit.residual + fit.by_place @ (fit.place.weights * fit.place.off)
+
+
+def _moves(calibration: Calibration, fit: Fit) -> NDArray[np.float64]:
+    """(n - 1, n d) slopes along the microphones' coordinates, deviations a metre."""
+    about = calibration.places - calibration.unknowns.origin
+    front = wave_front(about, calibration.c, fit.place.h, fit.place.w)
+    return fit.root @ front.by_places
+
+
+def _without_sound(fit: Fit, covariance: NDArray[np.float64]) -> tuple[float, int]:
+    """By how much chi-square falls without a sound, and of how many values that is."""
+    rank = len(fit.residual) - (0 if fit.place.stated else fit.place.h.size)
+    if rank <= 0:
+        return 0.0, 0
+    weights, axes = np.linalg.eigh(place_weight(fit))
+    root = axes[:, -rank:] * np.sqrt(np.maximum(weights[-rank:], _ROUNDING))
+    value, slopes = root.T @ _left(fit), root.T @ fit.by_array
+    spread = np.eye(rank) - slopes @ covariance @ slopes.T
+    own, axes = np.linalg.eigh((spread + spread.T) / 2.0)
+    return float(np.sum((axes.T @ value) ** 2 / np.maximum(own, _ROUNDING))), rank
+
+
+def _drop_of(
+    fits: Sequence[Fit],
+    columns: Sequence[NDArray[np.float64]],
+    covariance: NDArray[np.float64],
+) -> float:
+    """By how much chi-square falls if more may be free: slopes (n - 1, f) a sound."""
+    free = columns[0].shape[1]
+    pull, own = np.zeros(free), np.zeros((free, free))
+    shared = np.zeros((free, len(covariance)))
+    for fit, column in zip(fits, columns, strict=True):
+        weighted = column.T @ place_weight(fit)
+        pull += weighted @ _left(fit)
+        own += weighted @ column
+        shared += weighted @ fit.by_array
+    information = own - shared @ covariance @ shared.T
+    floor = _ROUNDING * max(float(np.abs(own).max()), 1e-30)
+    known, axes = np.linalg.eigh((information + information.T) / 2.0)
+    told = known > floor
+    return float(np.sum((axes.T @ pull)[told] ** 2 / known[told]))
