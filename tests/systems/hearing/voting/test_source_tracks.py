@@ -1,0 +1,58 @@
+"""Tracks of sources whose ways are known."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from systems.hearing.voting.source_tracks import (
+    Detection,
+    TrackMemory,
+    TrackParameters,
+    step_tracks,
+)
+
+STD = math.radians(2.0)
+
+
+def follow(ways, steps, step_s=0.1, seed=0):
+    """Tracks over time of sources that are heard apart, or as one within 12 deg."""
+    rng, memory, told = np.random.default_rng(seed), TrackMemory(), []
+    for k in range(steps):
+        t = k * step_s
+        at = [way(t) for way in ways if way(t) is not None]
+        if len(at) == 2 and abs(at[0] - at[1]) < 12.0:
+            at = [0.5 * (at[0] + at[1])]
+        detections = [
+            Detection(math.radians(a + 2.0 * rng.standard_normal()), STD, None)
+            for a in at
+        ]
+        tracks, memory = step_tracks(detections, t, memory, TrackParameters())
+        told.append((t, tracks))
+    return told
+
+
+def test_a_track_begins_within_half_a_second_and_ends_within_two():
+    told = follow([lambda t: 170.0 if 1.0 <= t < 3.0 else None], 60)
+    heard = [t for t, tracks in told if tracks]
+    assert heard[0] <= 1.5
+    assert 3.0 <= heard[-1] <= 5.0
+
+
+def test_two_that_cross_keep_their_identities():
+    kept = 0
+    for seed in range(20):
+        ways = (lambda t: 30.0 - 10.0 * t, lambda t: -30.0 + 10.0 * t)
+        told = follow(ways, 60, seed=seed)
+        begin = {t.identity: t.bearing for t in told[12][1]}
+        end = {t.identity: t.bearing for t in told[-1][1]}
+        kept += len(begin) == 2 and all(begin[k] * end.get(k, 0.0) < 0.0 for k in begin)
+    assert kept >= 16
+
+
+def test_time_must_run_forward():
+    _, memory = step_tracks([], 1.0, TrackMemory(), TrackParameters())
+    with pytest.raises(ValueError, match="before the last step"):
+        step_tracks([], 0.5, memory, TrackParameters())
