@@ -1,19 +1,21 @@
 """How late ``phonotaxis listen`` tells what it hears, from a pipe at real-time pace.
 
-``python -m benchmarks.listen [SECONDS]`` pipes four channels of a simulated talker at
-48 kHz, 10 ms at a time, each block when its last sample would have been made; 60 s
-unless told. A line is late by the time from then to when it can be read.
+``taskset -c 0 python -m benchmarks.listen [SECONDS]`` pipes four channels of two
+simulated talkers at 48 kHz, 10 ms at a time, each block when its last sample would have
+been made; 60 s unless told. A line is late by the time from when the last block of its
+sound was sent to when it can be read here: where the computer wakes this program late
+to send, that is told apart. The memory is that of ``listen``, from Linux's /proc.
 """
 
 from __future__ import annotations
 
 import json
-import resource
 import subprocess
 import sys
 import tempfile
 import threading
 import time
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -22,10 +24,34 @@ from analysis.talkers.talker_trials import TALKER_ARRAYS, draw_talkers, record_t
 
 RATE, BLOCK_S, LOOP_S = 48_000, 0.01, 10.0
 ARRAY = "square, 4.6 cm"
+# What is imported and compiled is done before the clock starts: the program then waits.
+IDLE_S, WARM_SAMPLES = 2.0, 4
+PARTS, SETTLED_S = 4, 30.0
+
+
+@dataclass
+class Listened:
+    """What the program told, and what it took."""
+
+    t_s: list[float] = field(default_factory=list)
+    """Of each line, in the sound, s."""
+    late_s: list[float] = field(default_factory=list)
+    """From the end of its sound to the line, s."""
+    memory_mb: list[float] = field(default_factory=list)
+    """Every ten seconds, once the program has settled."""
+    woken_late_s: list[float] = field(default_factory=list)
+    """Of each block, s."""
+    blocked: int = 0
+    """Blocks that the pipe did not take at once."""
+    sent_s: float = 0.0
+    core_s: float = 0.0
+    """Time on a processor."""
+    end: dict = field(default_factory=dict)
+    """The last line."""
 
 
 def main(seconds: float) -> None:
-    """Prints a table.
+    """Prints what came of it.
 
     Args:
         seconds: How long to listen, s.
@@ -40,53 +66,114 @@ def main(seconds: float) -> None:
         geometry = Path(folder) / "array.yaml"
         places = TALKER_ARRAYS[ARRAY].tolist()
         geometry.write_text(f"microphones: {places}\n", encoding="utf-8")
-        late, end = _pipe(samples, geometry, seconds)
-    spent = resource.getrusage(resource.RUSAGE_CHILDREN)
-    share = 100.0 * (spent.ru_utime + spent.ru_stime) / seconds
+        told = pipe(samples, geometry, seconds)
+    print(f"sent {told.sent_s:.6f} s, heard {told.end['seconds']:.6f} s")
+    print(f"status: {told.end['status']}; faults: {told.end['faults']}")
+    t_s, late = np.array(told.t_s), 1e3 * np.array(told.late_s)
+    for part in range(PARTS):
+        first, last = (seconds * (part + k) / PARTS for k in (0, 1))
+        here = late[(t_s > first) & (t_s <= last)]
+        print(
+            f"{first:6.0f} to {last:6.0f} s: {here.size} lines, late by "
+            f"{np.median(here):.0f} ms (median), {np.quantile(here, 0.99):.0f} (99 %), "
+            f"{here.max():.0f} (most); {np.mean(here > 100.0):.2%} above 100 ms"
+        )
+    woken = 1e3 * np.array(told.woken_late_s)
     print(
-        f"listened {end['seconds']:.1f} of {seconds:g} s, {len(late)} lines; late by "
-        f"{1e3 * np.median(late):.0f} ms (median), {1e3 * np.quantile(late, 0.99):.0f} "
-        f"(99 %), {1e3 * np.max(late):.0f} (most); {share:.1f} % of one core"
+        f"blocks sent late by {np.quantile(woken, 0.99):.0f} ms (99 %), "
+        f"{woken.max():.0f} (most); {told.blocked} that the pipe did not take at once"
     )
+    print(f"{100.0 * told.core_s / seconds:.1f} % of one core")
+    if told.memory_mb:
+        print(f"memory {told.memory_mb[0]:.0f} MB, {told.memory_mb[-1]:.0f} at the end")
 
 
-def _pipe(
-    samples: np.ndarray, geometry: Path, seconds: float
-) -> tuple[np.ndarray, dict]:
+def pipe(samples: np.ndarray, geometry: Path, seconds: float) -> Listened:
+    """Pipes sound at its own pace.
+
+    Args:
+        samples: (k, 4) counts, again and again.
+        geometry: Of the array.
+        seconds: How long, s.
+
+    Returns:
+        What came of it.
+    """
     command = [sys.executable, "-m", "phonotaxis", "listen", "--json"]
     command += ["--geometry", str(geometry), "--rate", str(RATE), "--channels", "4"]
-    late, lines, begun = [], [], []
+    told, begun = Listened(), [0.0]
     with subprocess.Popen(
-        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=False
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as child:
         assert child.stdin is not None
-        assert child.stdout is not None
 
         def read() -> None:
             for line in child.stdout or ():
                 document = json.loads(line)
-                lines.append(document)
-                if "t_s" in document:
-                    late.append(time.monotonic() - begun[0] - document["t_s"])
+                now = time.monotonic() - begun[0]
+                if "bearing_deg" in document:
+                    last = round(document["t_s"] / BLOCK_S) - 1
+                    woken = max(0.0, told.woken_late_s[last])
+                    told.t_s.append(document["t_s"])
+                    told.late_s.append(now - document["t_s"] - woken)
+                told.end = document
 
         reader = threading.Thread(target=read)
         reader.start()
-        size = round(BLOCK_S * RATE)
-        # What is compiled and imported is done before the clock starts.
-        child.stdin.write(samples[:1].tobytes() * 4)
+        child.stdin.write(samples[:1].tobytes() * WARM_SAMPLES)
         child.stdin.flush()
-        time.sleep(5.0)
-        begun.append(time.monotonic() - 4.0 / RATE)
-        for k in range(round(seconds / BLOCK_S)):
-            first = k * size % (len(samples) - size)
+        warm = core_seconds(child.pid)
+        time.sleep(2.0 * IDLE_S)
+        while (now := core_seconds(child.pid)) > warm + 0.05:
+            warm = now
+            time.sleep(IDLE_S)
+        begun[0] = time.monotonic() - WARM_SAMPLES / RATE
+        warm, size = core_seconds(child.pid), round(BLOCK_S * RATE)
+        sent, blocks = WARM_SAMPLES, round(seconds / BLOCK_S)
+        for k in range(blocks):
+            first = k * size % (len(samples) - size + 1)
             wait = begun[0] + (k + 1) * BLOCK_S - time.monotonic()
             if wait > 0.0:
                 time.sleep(wait)
+            woken = time.monotonic()
+            told.woken_late_s.append(woken - begun[0] - (k + 1) * BLOCK_S)
             child.stdin.write(samples[first : first + size].tobytes())
             child.stdin.flush()
+            told.blocked += time.monotonic() - woken > BLOCK_S
+            sent += size
+            if k % round(10.0 / BLOCK_S) == 0 and k * BLOCK_S >= SETTLED_S:
+                told.memory_mb.append(memory_mb(child.pid))
+        told.core_s = core_seconds(child.pid) - warm
         child.stdin.close()
         reader.join()
-    return np.array(late), lines[-1]
+    told.sent_s = sent / RATE
+    return told
+
+
+def core_seconds(pid: int) -> float:
+    """Time that a process has had on a processor.
+
+    Args:
+        pid: Its number.
+
+    Returns:
+        s, in user and in system mode.
+    """
+    words = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(words[11]) + int(words[12])) / 100.0
+
+
+def memory_mb(pid: int) -> float:
+    """Memory of a process that is its own and in use.
+
+    Args:
+        pid: Its number.
+
+    Returns:
+        MB.
+    """
+    status = Path(f"/proc/{pid}/status").read_text()
+    return int(status.partition("VmRSS:")[2].split()[0]) / 1024.0
 
 
 if __name__ == "__main__":

@@ -75,6 +75,11 @@ class Interrupts:
         if self._struck:
             raise KeyboardInterrupt
 
+    def take(self) -> None:
+        """One has ended what goes on until then: it counts no longer."""
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        self._struck = False
+
     def release(self) -> None:
         """From here on interrupts strike where they come.
 

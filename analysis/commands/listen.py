@@ -2,25 +2,28 @@
 
 from __future__ import annotations
 
-import json
-import math
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
 
 if TYPE_CHECKING:
+    from analysis.commands.listen_view import Teller
     from analysis.recordings.live_hearing import HeardStream
     from analysis.recordings.sound_stream import SoundStream
-    from systems.hearing.voting.source_listener import TrackedSources
 
 __all__ = ["COMMAND"]
 
-# Columns of the terminal's view of all bearings.
-_COLUMNS = 60
+# From thread to thread; a tenth of what Python takes.
+_SWITCH_S = 5e-4
+
+
+class _Stated(TypedDict):
+    channels: int | None
+    sample_rate_hz: int | None
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -29,7 +32,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         nargs="?",
         default="-",
         metavar="FILE",
-        help="WAV or raw samples; - is standard input (default)",
+        help="WAV, FLAC or raw samples; - is standard input (default)",
     )
     parser.add_argument(
         "--geometry", metavar="FILE.yaml", help="places of the microphones"
@@ -59,50 +62,66 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
-    from analysis.recordings.live_hearing import LiveHearing, listen, track_document
+    from analysis.recordings.live_hearing import LiveHearing, listen
+    from analysis.run_error import RunError
 
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
+    teller = _teller(as_json=options.json)
     stream = _stream(options, max(geometry.columns) + 1)
-    hearing = LiveHearing(stream, geometry)
+    hearing = LiveHearing(stream, geometry, teller.name_fault)
 
-    def tell(step: TrackedSources) -> None:
-        if options.json:
-            for line in track_document(step):
-                print(json.dumps(line, allow_nan=False))
-            sys.stdout.flush()
-        elif sys.stdout.isatty():
-            print(f"\r{_view(step)}\x1b[K", end="", flush=True)
-        elif round(step.t_s, 6) % 1.0 == 0.0:
-            print(_view(step), flush=True)
-
-    def run(_: Progress) -> HeardStream:
-        return listen(hearing, tell)
+    def run(progress: Progress) -> HeardStream:
+        # Whoever listens must not wait long for the thread that looks at channels.
+        sys.setswitchinterval(_SWITCH_S)
+        with teller:
+            try:
+                listen(hearing, teller.tell)
+            except KeyboardInterrupt:
+                progress.take_interrupt()
+                hearing.heard.status = "interrupted"
+        return hearing.heard
 
     def text(heard: HeardStream, document: dict[str, Any]) -> str:
         return (
-            f"\n{heard.status} after {heard.seconds:.1f} s; sources: "
+            f"{heard.status}; {heard.seconds:.1f} s heard, sources: "
             f"{document['sources']}"
         )
 
+    def demand(heard: HeardStream) -> None:
+        if heard.failed:
+            raise RunError(heard.status)
+
     return Job(
-        run=run,
-        summary=lambda heard: heard.document(),
-        text=text,
-        remarks=lambda heard: heard.faults,
+        run=run, summary=lambda heard: heard.document(), text=text, demand=demand
     )
 
 
-def _stream(options: Namespace, channels: int) -> SoundStream:
-    from analysis.recordings.sound_stream import open_card, open_pipe
+def _teller(*, as_json: bool) -> Teller:
+    from analysis.commands.listen_view import JsonLines, Screen, TextLines
+
+    if as_json:
+        return JsonLines()
+    return Screen() if sys.stdout.isatty() else TextLines()
+
+
+def _stream(options: Namespace, raw_channels: int) -> SoundStream:
+    from analysis.recordings.sound_card import open_card
+    from analysis.recordings.sound_pipe import open_flac, open_pipe
     from systems.framework.input_error import InputError
 
-    channels = options.channels or channels
+    for name in ("rate", "channels"):
+        if (value := getattr(options, name)) is not None and value < 1:
+            raise InputError(f"--{name}", f"is {value}; give a number above 0")
     if options.device is not None:
         name = options.device
         device = int(name) if name.isdigit() else None if name == "default" else name
-        rate = options.rate or 48_000
-        return open_card(device, channels=channels, sample_rate_hz=rate)
+        return open_card(
+            device,
+            channels=options.channels or raw_channels,
+            sample_rate_hz=options.rate or 48_000,
+        )
+    stated: _Stated = {"channels": options.channels, "sample_rate_hz": options.rate}
     if options.input == "-":
         if sys.stdin is None or sys.stdin.isatty():
             raise InputError(
@@ -111,32 +130,20 @@ def _stream(options: Namespace, channels: int) -> SoundStream:
             )
         pipe = sys.stdin.buffer
     else:
+        path = Path(options.input)
         try:
-            pipe = Path(options.input).open("rb")  # noqa: SIM115  # read to its end
+            with path.open("rb") as file:
+                is_flac = path.is_file() and file.read(4) == b"fLaC"
+            if is_flac:
+                return open_flac(path, **stated)
+            pipe = path.open("rb")  # read to its end
         except OSError as error:
             raise InputError(
                 "input", f"cannot read it ({error}); name a file"
             ) from None
     return open_pipe(
-        pipe,
-        channels=channels,
-        sample_rate_hz=options.rate,
-        sample_format=options.format,
+        pipe, raw_channels=raw_channels, sample_format=options.format, **stated
     )
-
-
-def _view(step: TrackedSources) -> str:
-    """All bearings from right behind over the left and ahead to right behind."""
-    line = ["."] * _COLUMNS
-    line[_COLUMNS // 2] = "|"
-    for track in step.tracks:
-        turn = 0.5 - track.bearing / (2.0 * math.pi)
-        line[int(turn * _COLUMNS) % _COLUMNS] = str(track.identity % 10)
-    each = "  ".join(
-        f"{track.identity}: {math.degrees(track.bearing):+.0f} deg"
-        for track in step.tracks
-    )
-    return f"{step.t_s:8.1f} s  {''.join(line)}  {each}"
 
 
 COMMAND = Command(

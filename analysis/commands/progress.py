@@ -50,6 +50,10 @@ class Progress:
         self._bar.update(done - self._bar.n)
         self._interrupts.check()
 
+    def take_interrupt(self) -> None:
+        """An interrupt is how the command ends well."""
+        self._interrupts.take()
+
     def step(self, title: str) -> None:
         """Names what comes next; what came before is done.
 

@@ -59,7 +59,7 @@ class ChannelFault:
 
     kind: Literal[
         "nan", "dead", "copied", "clipped", "inverted", "swapped", "near", "geometry",
-        "units", "size", "late"
+        "units", "size", "late", "drift"
     ]  # fmt: skip
     channels: tuple[int, ...]
     """Their numbers, from 0; empty where all are concerned."""

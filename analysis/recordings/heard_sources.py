@@ -15,20 +15,18 @@ from systems.hearing.voting import (
     cast_votes,
     gather_sources,
     join_votes,
+    vote_plan,
 )
 from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["FollowedSource", "HeardSource", "heard_sources", "vote_plan"]
+__all__ = ["FollowedSource", "HeardSource", "heard_sources"]
 
 # Samples of a channel that vote at once.
 _BLOCK = 2**16
 
 # Where a source was not heard for longer its place is a guess, s.
 _PAUSE_S = 0.3
-
-# Speech and most noises have what is told apart below this.
-_HIGHEST_HZ = 8_000.0
 
 
 @dataclass(frozen=True)
@@ -78,27 +76,6 @@ class FollowedSource:
     """Its bearing at each."""
     confidence: float
     """Greatest probability that it existed, 0 to 1."""
-
-
-def vote_plan(
-    shape: ArrayShape, c: float, sample_rate_hz: float, band_hz: tuple[float, float]
-) -> VotePlan:
-    """How an array votes in a band that may be wider than what is told apart.
-
-    Args:
-        shape: The n microphones; they must tell bearings.
-        c: Speed of sound, m/s.
-        sample_rate_hz: Of the samples, Hz.
-        band_hz: Lowest and highest frequency that counts, Hz.
-
-    Returns:
-        The plan.
-
-    Raises:
-        InputError: The array tells no bearings.
-    """
-    highest = min(band_hz[1], max(_HIGHEST_HZ, 2.0 * band_hz[0]))
-    return VotePlan.of(shape, c, sample_rate_hz, band_hz=(band_hz[0], highest))
 
 
 def heard_sources(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,9 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.array_geometry import ArrayGeometry
-from analysis.recordings.heard_sources import vote_plan
-from analysis.recordings.sound_stream import SoundStream
+from analysis.recordings.array_match import array_mismatch, chosen_microphones
+from analysis.recordings.channel_faults import ChannelFault
+from analysis.recordings.live_faults import LiveFaults
+from analysis.recordings.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from systems.framework.input_error import InputError
+from systems.hearing.voting import VotePlan, vote_plan
 from systems.hearing.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -21,15 +24,18 @@ from systems.hearing.voting.source_listener import (
     hear_sources,
 )
 
-__all__ = ["HeardStream", "LiveHearing", "listen", "track_document"]
+__all__ = ["HeardStep", "HeardStream", "LiveHearing", "listen", "track_document"]
 
 _BAND_HZ = (200.0, 15_000.0)
 _TOP_OF_RATE = 0.45
 
-# What is said of channels: samples at full scale of the last while, and a level so far
-# below that of the others, after so long.
-_CLIPPED, _CLIPPED_SHARE = 0.999, 1e-3
-_DEAD_DB, _LOOK_S = 40.0, 2.0
+# With these, bearings are wrong: it is the user who has to mend them.
+_FATAL = ("copied", "swapped", "units", "drift")
+
+_QUIET_DB = -120.0
+
+# What is larger, of a full scale of 1, is no sound.
+_WILD = 1e3
 
 
 @dataclass
@@ -42,107 +48,167 @@ class HeardStream:
     faults: list[str] = field(default_factory=list)
     """Each named once."""
     status: str = "the stream has ended"
+    failed: bool = False
+    """Whether it ended otherwise than by its end or by an interrupt."""
 
     def document(self) -> dict[str, Any]:
         """The last line of JSON."""
         return {
             "status": self.status,
-            "seconds": self.seconds,
+            "seconds": round(self.seconds, 6),
             "sources": len(self.identities),
             "faults": self.faults,
         }
 
 
-@dataclass
+@dataclass(frozen=True)
+class HeardStep:
+    """What there is to tell of a step."""
+
+    sources: TrackedSources
+    level_db: float
+    """RMS of all channels since the last step, of full scale 1, dB."""
+
+
 class LiveHearing:
-    """A stream and the array that hears it."""
+    """A stream and the array that hears it.
 
-    stream: SoundStream
-    geometry: ArrayGeometry
-    heard: HeardStream = field(default_factory=HeardStream)
+    Args:
+        stream: The sound.
+        geometry: The array.
+        name_fault: Called with each fault and the time in s, once, as soon as it is
+            seen.
 
-    def __post_init__(self) -> None:
-        """Checks that the stream is of the array."""
-        known, rate = self.geometry.known, self.stream.sample_rate_hz
-        most = max(self.geometry.columns)
-        if most >= self.stream.channels:
-            raise InputError(
-                "input",
-                f"it has {self.stream.channels} channels, but the array needs "
-                f"{most + 1}; record every microphone on a channel of its own",
+    Raises:
+        InputError: The stream is not of the array, or that tells no bearings.
+    """
+
+    def __init__(
+        self,
+        stream: SoundStream,
+        geometry: ArrayGeometry,
+        name_fault: Callable[[str, float], None] = lambda fault, t_s: None,
+    ) -> None:
+        rate = stream.sample_rate_hz
+        complaint = array_mismatch(geometry, stream.channels, rate)
+        if complaint:
+            raise InputError("input", f"it {complaint}")
+        self.heard = HeardStream()
+        self._stream, self._geometry = stream, geometry
+        self._name_fault = name_fault
+        self._named: set[Hashable] = set()
+        self._alive = list(range(len(geometry.microphones)))
+        self._signs = np.ones((len(self._alive), 1), np.float32)
+        self._plan = self._voting(geometry)
+        self._memory = ListenerMemory.blank(self._plan)
+
+    def _voting(self, geometry: ArrayGeometry) -> VotePlan:
+        rate, known = float(self._stream.sample_rate_hz), geometry.known
+        band = geometry.band or (_BAND_HZ[0], min(_BAND_HZ[1], _TOP_OF_RATE * rate))
+        return vote_plan(known.shape, known.c, rate, band)
+
+    def steps(self) -> Iterator[HeardStep]:
+        """The sources of each step, as soon as its sound has come.
+
+        Raises:
+            StreamBrokenError: The stream broke off, or no array is left that hears it.
+        """
+        looks = LiveFaults(self._geometry, self._stream.sample_rate_hz)
+        powers: list[float] = []
+        try:
+            for block in self._stream.blocks:
+                channels = self._accepted(block, looks)
+                for fault in looks.look(channels):
+                    self._mend(fault, looks)
+                alive = channels[self._alive]
+                powers.append(float(np.mean(np.square(alive))) if alive.size else 0.0)
+                steps, self._memory = hear_sources(
+                    alive, self._memory, self._plan, ListenerParameters()
+                )
+                for step in steps:
+                    self.heard.identities |= {track.identity for track in step.tracks}
+                    yield HeardStep(step, _decibels(float(np.mean(powers))))
+                    powers.clear()
+        finally:
+            looks.close()
+
+    def _accepted(self, block: SoundBlock, looks: LiveFaults) -> NDArray[np.float32]:
+        """The array's channels of a block, which are samples beyond doubt."""
+        channels = block.samples[list(self._geometry.columns)]
+        self.heard.seconds += channels.shape[1] / self._stream.sample_rate_hz
+        for fault in block.faults:
+            self._name(fault)
+        if block.gap:
+            looks.begin()
+            self._memory = self._memory.after_gap(self._plan, keeps_tracks=False)
+        wild = ~(np.abs(channels) < _WILD)
+        if wild.any():
+            k, first = np.argwhere(wild)[0]
+            self._name(
+                f"channel {k + 1}: a sample is {channels[k, first]:g}, of a full scale "
+                "of 1; such blocks count as silence; check --format and the sender"
             )
-        band = self.geometry.band or (
-            _BAND_HZ[0],
-            min(_BAND_HZ[1], _TOP_OF_RATE * rate),
-        )
-        self._plan = vote_plan(known.shape, known.c, float(rate), band)
-        self._power = np.zeros(known.shape.count)
-        self._clipped = np.zeros(known.shape.count)
-        self._since = 0.0
+            return np.zeros_like(channels)
+        return self._signs * channels
 
-    def steps(self) -> Iterator[TrackedSources]:
-        """The sources of each step, as soon as its sound has come."""
-        memory = ListenerMemory.blank(self._plan)
-        columns = list(self.geometry.columns)
-        for block in self.stream.blocks:
-            channels = block[columns]
-            self.heard.seconds += channels.shape[1] / self.stream.sample_rate_hz
-            self._look(channels)
-            steps, memory = hear_sources(
-                channels, memory, self._plan, ListenerParameters()
-            )
-            for step in steps:
-                self.heard.identities |= {track.identity for track in step.tracks}
-                yield step
-        if self.stream.trouble.cut:
-            self._name("the stream ended within a sample of all channels")
-
-    def _look(self, channels: NDArray[np.float32]) -> None:
-        """Names what is wrong with channels, once."""
-        if not np.isfinite(channels).all():
-            raise InputError(
-                "input", f"at {self.heard.seconds:.2f} s: not a number; send samples"
-            )
-        self._power += np.sum(channels**2, axis=1)
-        self._clipped += np.sum(np.abs(channels) >= _CLIPPED, axis=1)
-        self._since += channels.shape[1]
-        if self.stream.trouble.overruns:
-            self._name("samples were lost; close other programs, or lower the rate")
-        if self._since < _LOOK_S * self.stream.sample_rate_hz:
+    def _mend(self, fault: ChannelFault, looks: LiveFaults) -> None:
+        """Names a fault, and goes on without what it is of."""
+        if fault.kind == "dead" and not set(fault.channels) & set(self._alive):
             return
-        level = 10.0 * np.log10(np.maximum(self._power, 1e-30))
-        for k in np.flatnonzero(level < np.median(level) - _DEAD_DB):
-            self._name(f"channel {k + 1}: dead; check its microphone")
-        for k in np.flatnonzero(self._clipped > _CLIPPED_SHARE * self._since):
-            self._name(f"channel {k + 1}: clipped; record with less gain")
-        self._power[:] = self._clipped[:] = self._since = 0.0
+        self._name(fault.message, (fault.kind, *fault.channels))
+        if fault.kind in _FATAL:
+            raise StreamBrokenError(fault.message)
+        if fault.kind == "inverted":
+            self._signs[list(fault.channels)] *= -1.0
+        elif fault.kind == "dead":
+            self._alive = [k for k in self._alive if k not in fault.channels]
+            try:
+                self._plan = self._voting(
+                    chosen_microphones(self._geometry, self._alive)
+                )
+            except ValueError:
+                raise StreamBrokenError(
+                    f"{fault.message}; those that are left tell no bearings"
+                ) from None
+        else:
+            return
+        looks.begin(self._alive)
+        self._memory = self._memory.after_gap(self._plan, keeps_tracks=True)
 
-    def _name(self, fault: str) -> None:
-        if fault not in self.heard.faults:
+    def _name(self, fault: str, about: Hashable = None) -> None:
+        if (about or fault) not in self._named:
+            self._named.add(about or fault)
             self.heard.faults.append(fault)
+            self._name_fault(fault, self.heard.seconds)
 
 
-def listen(hearing: LiveHearing, tell: Callable[[TrackedSources], None]) -> HeardStream:
-    """Listens to the end of a stream, or until it is interrupted.
+def _decibels(power: float) -> float:
+    return max(_QUIET_DB, 10.0 * math.log10(max(power, 1e-30)))
+
+
+def listen(hearing: LiveHearing, tell: Callable[[HeardStep], None]) -> HeardStream:
+    """Listens to the end of a stream.
 
     Args:
         hearing: The stream and its array.
         tell: Called for each step.
 
     Returns:
-        What was heard.
+        What was heard; its status says how the stream ended.
+
+    Raises:
+        InputError: The stream turns out to be none at its first sample.
     """
     try:
         for step in hearing.steps():
             tell(step)
-    except KeyboardInterrupt:
-        hearing.heard.status = "interrupted"
-    except OSError as error:
-        hearing.heard.status = f"the stream broke off ({error})"
+    except StreamBrokenError as error:
+        hearing.heard.status = f"stopped: {error}"
+        hearing.heard.failed = True
     return hearing.heard
 
 
-def track_document(step: TrackedSources) -> list[dict[str, Any]]:
+def track_document(step: HeardStep) -> list[dict[str, Any]]:
     """A line of JSON for each source of a step.
 
     Args:
@@ -153,7 +219,7 @@ def track_document(step: TrackedSources) -> list[dict[str, Any]]:
     """
     return [
         {
-            "t_s": round(step.t_s, 6),
+            "t_s": round(step.sources.t_s, 6),
             "source": track.identity,
             "bearing_deg": round(math.degrees(track.bearing), 3),
             "bearing_std_deg": round(math.degrees(track.bearing_std), 3),
@@ -163,5 +229,5 @@ def track_document(step: TrackedSources) -> list[dict[str, Any]]:
             "confidence": round(track.confidence, 4),
             "sounding": round(track.sounding, 4),
         }
-        for track in step.tracks
+        for track in step.sources.tracks
     ]

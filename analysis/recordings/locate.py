@@ -13,7 +13,9 @@ from analysis.recordings.array_geometry import (
     KnownArray,
     load_geometry,
 )
+from analysis.recordings.array_match import array_mismatch
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
+from analysis.recordings.clock_drift import recording_drift
 from analysis.recordings.heard_sources import heard_sources
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
 from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
@@ -26,8 +28,6 @@ from systems.framework.input_error import InputError
 from systems.sound.sound_file import read_sound
 
 __all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
-
-_RATES_HZ = (8_000, 192_000)
 
 # Where a geometry names no band.
 _BAND_HZ = (300.0, 15_000.0)
@@ -66,7 +66,7 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     geometry = geometry or ROBOT_ARRAY
     samples, rate = read_sound(path, "recording")
     where = repr(str(path))
-    complaint = _complaint(samples, rate, geometry)
+    complaint = array_mismatch(geometry, len(samples), rate)
     if complaint:
         raise InputError("recording", f"{where} {complaint}")
     known = geometry.known
@@ -132,8 +132,14 @@ def _recording(
         search = RecordingSearch(spectra(channels), shape, array.c, _SNAPSHOTS[0])
         return search.mean_response()
 
-    faults = find_channel_faults(
-        channels, array, sample_rate_hz=float(rate), band_hz=band
+    drift = recording_drift(channels, float(rate), shape.p_AM, array.c)
+    # What drifts belongs to no place, nor anything else that follows from delays.
+    faults = (
+        [drift]
+        if drift
+        else find_channel_faults(
+            channels, array, sample_rate_hz=float(rate), band_hz=band
+        )
     )
     channels, faults = channels_without_faults(channels, faults, agreement, where)
     return spectra(channels), faults
@@ -190,38 +196,3 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
     placed = ((s.t_s, place_source(s, array)) for s in sightings)
     found = [SourceEstimate.of(t_s, at) for t_s, at in placed if at is not None]
     return search, sightings, found
-
-
-def _complaint(samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry) -> str:
-    """Why an array cannot have made a recording; empty if it can."""
-    count, needed = len(samples), len(geometry.microphones)
-    if geometry.channels is not None and max(geometry.channels) >= count >= needed:
-        return (
-            f"has {count} channels, numbers 0 to {count - 1}; 'channels' in the "
-            f"geometry file counts from 0 and names {max(geometry.channels)}"
-        )
-    if max(geometry.columns) >= count:
-        what = "is mono" if count == 1 else f"has {count} channels"
-        return (
-            f"{what}, but the array needs {max(needed, max(geometry.columns) + 1)}; "
-            "record every microphone on a channel of its own"
-        )
-    if geometry.channels is None and count > needed:
-        default = geometry.microphones == ROBOT_ARRAY.microphones
-        remedy = (
-            "give the places of its microphones by --geometry FILE"
-            if default
-            else "name the channels to use in the geometry file, as "
-            f"'channels: {list(range(needed))}'"
-        )
-        whose = "the robot's own array" if default else "the array"
-        return f"has {count} channels, but {whose} {needed} microphones; {remedy}"
-    if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
-        low, high = _RATES_HZ
-        return f"has a sample rate of {rate} Hz; record at {low} to {high} Hz"
-    if geometry.band is not None and rate < 2.0 * geometry.band[1]:
-        return (
-            f"has a sample rate of {rate} Hz, below twice the band's upper end of "
-            f"{geometry.band[1]:g} Hz; lower the band or record at a higher rate"
-        )
-    return ""

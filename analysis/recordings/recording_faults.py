@@ -15,7 +15,7 @@ from systems.framework.input_error import InputError
 __all__ = ["channels_without_faults"]
 
 # What leaves nothing to locate with.
-_FATAL = ("nan", "dead", "copied", "units")
+_FATAL = ("nan", "dead", "copied", "units", "drift")
 
 # Channels that one message names.
 _MOST_NAMED = 8

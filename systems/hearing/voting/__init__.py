@@ -7,6 +7,7 @@ from systems.hearing.voting.direction_votes import (
     cast_votes,
     join_votes,
 )
+from systems.hearing.voting.listening_plan import vote_plan
 from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
 
 __all__ = [
@@ -17,4 +18,5 @@ __all__ = [
     "cast_votes",
     "gather_sources",
     "join_votes",
+    "vote_plan",
 ]

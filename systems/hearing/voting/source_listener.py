@@ -86,6 +86,21 @@ class ListenerMemory:
         """
         return cls(plan.blank(), join_votes([]), TrackMemory(), 0, 0)
 
+    def after_gap(self, plan: VotePlan, *, keeps_tracks: bool) -> ListenerMemory:
+        """Where samples are missing, or from where on other channels count.
+
+        Args:
+            plan: How the array votes from here on.
+            keeps_tracks: Whether the sources are still those of before.
+
+        Returns:
+            The memory; times go on, and no identity is used again.
+        """
+        # The first group of frames after it begins within a hop of where it should.
+        votes = plan.blank()._replace(groups=round(self.samples / plan.hop))
+        tracks = self.tracks if keeps_tracks else replace(self.tracks, tracks=())
+        return replace(self, votes=votes, recent=join_votes([]), tracks=tracks)
+
 
 def hear_sources(
     block: NDArray[np.floating | np.integer],

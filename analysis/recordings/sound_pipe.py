@@ -1,0 +1,343 @@
+"""Sound from a pipe or a file: WAV, FLAC, or raw samples of all channels in turn."""
+
+from __future__ import annotations
+
+import os
+import select
+import struct
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, Literal, NamedTuple
+
+import numpy as np
+import soundfile
+from numpy.typing import NDArray
+
+from analysis.recordings.sound_stream import (
+    BLOCK_S,
+    SILENT_AFTER_S,
+    STOPPED,
+    Pace,
+    SoundBlock,
+    SoundStream,
+    StreamBrokenError,
+)
+from systems.framework.input_error import InputError
+
+__all__ = ["SAMPLE_FORMATS", "SampleFormat", "open_flac", "open_pipe"]
+
+SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
+
+#: Names of raw samples, as other programs use them, and their bytes.
+SAMPLE_FORMATS: dict[SampleFormat, int] = {
+    "s16le": 2,
+    "s24le": 3,
+    "s32le": 4,
+    "f32le": 4,
+}
+
+_PCM, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE
+_MOST_HEADER, _MOST_CHUNKS = 2**16, 64
+
+# Recorders that write to a pipe state lengths of 0, or at about the limits of signed
+# and unsigned numbers.
+_UNKNOWN = 0x7FFF_0000
+
+# What stands in another WAV, and so many bytes after its begin.
+_AGAIN, _AGAIN_AT = b"WAVEfmt ", 8
+
+# First bytes of files that are neither WAV nor raw.
+_OTHERS = {
+    b"fLaC": "FLAC; name the file, or decode it: flac -dc FILE.flac |",
+    b"OggS": "Ogg; decode it: ffmpeg -i FILE -f wav - |",
+    b"RIFX": "a WAV of big-endian samples; convert it: sox FILE -t wav - |",
+    b"RF64": "an RF64 file; convert it: ffmpeg -i FILE -f wav - |",
+    b"FORM": "AIFF; convert it: sox FILE -t wav - |",
+    b"ID3\x03": "MP3; decode it: ffmpeg -i FILE -f wav - |",
+    b"ID3\x04": "MP3; decode it: ffmpeg -i FILE -f wav - |",
+}
+
+
+class _Format(NamedTuple):
+    channels: int
+    sample_rate_hz: int
+    samples: SampleFormat
+
+    @property
+    def width(self) -> int:
+        """Bytes of a sample of all channels."""
+        return self.channels * SAMPLE_FORMATS[self.samples]
+
+    def __str__(self) -> str:
+        return f"{self.channels} channels, {self.sample_rate_hz} Hz, {self.samples}"
+
+
+def open_pipe(
+    pipe: BinaryIO,
+    *,
+    raw_channels: int,
+    channels: int | None = None,
+    sample_rate_hz: int | None = None,
+    sample_format: SampleFormat = "s16le",
+) -> SoundStream:
+    """Sound from a pipe or a file, which is read to its end, and never sought in.
+
+    Args:
+        pipe: With a file descriptor; nothing was read from it before.
+        raw_channels: Of raw samples, where nothing is stated.
+        channels: That are stated; none: those of the WAV header.
+        sample_rate_hz: That is stated, Hz; none: that of the WAV header.
+        sample_format: Of raw samples.
+
+    Returns:
+        The stream.
+
+    Raises:
+        InputError: It is empty, its header is of another kind or contradicts what is
+            stated, or it is raw and nobody says its rate.
+    """
+    source = _Source(pipe)
+    start = source.read(4)
+    if not start:
+        raise InputError("input", "it is empty; pipe in WAV or raw samples")
+    if start in _OTHERS:
+        raise InputError("input", f"it is {_OTHERS[start]} phonotaxis listen")
+    if start == b"RIFF":
+        form, length = _wav_header(source)
+        _check_stated(form.channels, form.sample_rate_hz, channels, sample_rate_hz)
+    elif sample_rate_hz is None:
+        raise InputError(
+            "input", "it is no WAV; say what it is, as --rate 48000 --format s16le"
+        )
+    else:
+        form = _Format(channels or raw_channels, sample_rate_hz, sample_format)
+        length = None
+        source.unread(start)
+    blocks = _blocks(source, form, length)
+    return SoundStream(form.channels, form.sample_rate_hz, blocks)
+
+
+class _Source:
+    """Bytes of a pipe or file, and how long they were waited for."""
+
+    def __init__(self, pipe: BinaryIO) -> None:
+        self._pipe = pipe  # it would close itself if nobody had it
+        self._descriptor = pipe.fileno()
+        self._unread = b""
+        self.waited_s = 0.0
+
+    def unread(self, data: bytes) -> None:
+        """Comes next."""
+        self._unread = data + self._unread
+
+    def some(self, size: int) -> bytes | None:
+        """Up to ``size`` bytes; none at the end, None where nothing has come."""
+        if self._unread:
+            data, self._unread = self._unread[:size], self._unread[size:]
+            return data
+        begun = time.monotonic()
+        ready, _, _ = select.select([self._descriptor], [], [], SILENT_AFTER_S)
+        self.waited_s += time.monotonic() - begun
+        return os.read(self._descriptor, size) if ready else None
+
+    def read(self, size: int) -> bytes:
+        """So many bytes, or all until the end."""
+        data = b""
+        while len(data) < size:
+            more = self.some(size - len(data))
+            if more == b"":
+                break
+            data += more or b""
+        return data
+
+
+def open_flac(
+    path: Path, *, channels: int | None = None, sample_rate_hz: int | None = None
+) -> SoundStream:
+    """Sound from a FLAC file.
+
+    Args:
+        path: The file.
+        channels: That are stated; none: those of the file.
+        sample_rate_hz: That is stated, Hz; none: that of the file.
+
+    Returns:
+        The stream.
+
+    Raises:
+        InputError: It cannot be decoded, or contradicts what is stated.
+    """
+    try:
+        sound = soundfile.SoundFile(path)
+    except soundfile.SoundFileError as error:
+        raise InputError(
+            "input", f"cannot be decoded ({error}); record it again"
+        ) from None
+    _check_stated(sound.channels, sound.samplerate, channels, sample_rate_hz)
+    size = round(BLOCK_S * sound.samplerate)
+
+    def blocks() -> Iterator[SoundBlock]:
+        with sound:
+            while len(samples := sound.read(size, dtype="float32", always_2d=True)):
+                yield SoundBlock(samples.T)
+
+    return SoundStream(sound.channels, sound.samplerate, blocks())
+
+
+def _check_stated(
+    channels: int, rate: int, stated_channels: int | None, stated_rate: int | None
+) -> None:
+    if stated_rate not in (None, rate):
+        raise InputError(
+            "--rate", f"is {stated_rate} Hz, but the file says {rate} Hz; leave it out"
+        )
+    if stated_channels not in (None, channels):
+        raise InputError(
+            "--channels",
+            f"is {stated_channels}, but the file has {channels}; leave it out",
+        )
+
+
+def _wav_header(source: _Source) -> tuple[_Format, int | None]:
+    """Reads from behind RIFF up to the samples.
+
+    Returns:
+        What they are, and their bytes; None where the header leaves that open.
+    """
+    _exactly(source, 4)
+    if _exactly(source, 4) != b"WAVE":
+        raise InputError("input", "it begins like a WAV and is none; convert it")
+    found = None
+    for _ in range(_MOST_CHUNKS):
+        name, size = struct.unpack("<4sI", _exactly(source, 8))
+        if name == b"data":
+            break
+        if size > _MOST_HEADER:
+            raise InputError("input", "the WAV header is not whole; record it again")
+        chunk = _exactly(source, size + size % 2)
+        if name == b"fmt ":
+            found = chunk
+    if found is None or len(found) < 16:
+        raise InputError("input", "the WAV header is not whole; record it again")
+    kind, channels, rate, _, _, bits = struct.unpack("<HHIIHH", found[:16])
+    if kind == _EXTENSIBLE and len(found) >= 26:
+        kind = struct.unpack("<H", found[24:26])[0]
+    formats: dict[tuple[int, int], SampleFormat] = {
+        (_PCM, 16): "s16le",
+        (_PCM, 24): "s24le",
+        (_PCM, 32): "s32le",
+        (_FLOAT, 32): "f32le",
+    }
+    if (kind, bits) not in formats or not channels:
+        raise InputError(
+            "input",
+            f"the WAV has {channels} channels of {bits} bits of kind {kind}; convert "
+            "it to 16, 24 or 32 bits",
+        )
+    form = _Format(channels, rate, formats[kind, bits])
+    return form, size if 0 < size < _UNKNOWN else None
+
+
+def _exactly(source: _Source, size: int) -> bytes:
+    data = source.read(size)
+    if len(data) < size:
+        raise InputError("input", "it ends within the WAV header; record it again")
+    return data
+
+
+def _blocks(source: _Source, form: _Format, length: int | None) -> Iterator[SoundBlock]:
+    """The samples, ``length`` bytes if that is known, and those of WAV that follow."""
+    pace, gap, cut = Pace(form.sample_rate_hz), False, 0
+    for data in _chunks(source, form, length):
+        if data is None:
+            if not gap:
+                yield SoundBlock(_samples(b"", form), (STOPPED,))
+            gap = True
+            pace.begin()
+            continue
+        cut = len(data) % form.width
+        whole = data[: len(data) - cut]
+        faults = pace.came(len(whole) // form.width, source.waited_s)
+        source.waited_s = 0.0
+        yield SoundBlock(_samples(whole, form), faults, gap)
+        gap = False
+    if cut:
+        fault = "the stream ended within a sample of all channels"
+        yield SoundBlock(_samples(b"", form), (fault,))
+
+
+def _chunks(
+    source: _Source, form: _Format, length: int | None
+) -> Iterator[bytes | None]:
+    """Whole samples, but for the last ones; None where nothing has come for a while."""
+    most, tail = form.width * max(1, round(BLOCK_S * form.sample_rate_hz)), b""
+    while True:
+        data = b""
+        size = most if length is None else min(most, length - length % form.width)
+        while len(data) < size:
+            more = source.some(size - len(data))
+            if more == b"":
+                if data:
+                    yield data
+                return
+            if more is None:
+                yield None
+            data += more or b""
+        joined = tail + data
+        again = joined.find(_AGAIN) - _AGAIN_AT
+        if length is None and again >= 0:
+            before = max(0, again - len(tail))
+            yield data[: before - before % form.width]
+            source.unread(joined[again + 4 :])
+            length, tail = _another(source, form), b""
+            continue
+        yield data
+        tail = data[1 - _AGAIN_AT - len(_AGAIN) :]
+        if length is None:
+            continue
+        length -= len(data)
+        if length < form.width:
+            source.read(length + length % 2)
+            if not _reaches_another(source):
+                return
+            length, tail = _another(source, form), b""
+
+
+def _reaches_another(source: _Source) -> bool:
+    """Reads what stands behind the samples of a WAV, up to one that is joined to it."""
+    while (name := source.read(4)) != b"RIFF":
+        size = source.read(4)
+        if len(name + size) < 8:
+            return False
+        count = struct.unpack("<I", size)[0]
+        source.read(count + count % 2)
+    return True
+
+
+def _another(source: _Source, form: _Format) -> int | None:
+    """Reads the header of a further WAV from behind RIFF on; its bytes, if known."""
+    other, length = _wav_header(source)
+    if other != form:
+        # Times and delays are counted in samples of one rate.
+        raise StreamBrokenError(
+            f"the stream changes from {form} to {other}; listen to that by itself"
+        )
+    return length
+
+
+def _samples(data: bytes, form: _Format) -> NDArray[np.float32]:
+    """(channels, k), full scale 1."""
+    return _numbers(data, form.samples).reshape(-1, form.channels).T
+
+
+def _numbers(data: bytes, sample_format: SampleFormat) -> NDArray[np.float32]:
+    if sample_format == "f32le":
+        return np.frombuffer(data, dtype="<f4").astype(np.float32)
+    if sample_format == "s16le":
+        return np.frombuffer(data, dtype="<i2").astype(np.float32) / np.float32(2**15)
+    if sample_format == "s32le":
+        return np.frombuffer(data, dtype="<i4").astype(np.float32) / np.float32(2**31)
+    wide = np.zeros((len(data) // 3, 4), dtype=np.uint8)
+    wide[:, 1:] = np.frombuffer(data, dtype=np.uint8).reshape(-1, 3)
+    return wide.view("<i4")[:, 0].astype(np.float32) / np.float32(2**31)
