@@ -23,6 +23,7 @@ from systems.hearing.cross_power_estimator import CrossPowerEstimator
 from systems.hearing.ideal_source_sensor import IdealSourceSensor, IdealSourceSensor_
 from systems.hearing.source_tracker import SourceTracker, SourceTracker_
 from systems.hearing.tdoa_estimator import TDOAEstimator
+from systems.hearing.voting.source_listener_block import SourceListener
 from systems.laws.active_impedance_2017_controller import (
     ActiveImpedance2017Controller,
     ActiveImpedance2017Controller_,
@@ -130,6 +131,7 @@ __all__ = [
     "SinkMonitor",
     "SoundEmitter",
     "SoundSearch",
+    "SourceListener",
     "SourceRobot",
     "SourceRobot_",
     "SourceTracker",

@@ -33,6 +33,7 @@ BLOCKS = {
     "PathIntegralController",
     "ReciprocalAvoidanceController",
     "SoundEmitter",
+    "SourceListener",
     "SourceRobot",
     "SourceTracker",
     "StopWhenNearController",

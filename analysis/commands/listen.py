@@ -11,9 +11,9 @@ from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from analysis.commands.listen_view import Teller
-    from analysis.recordings.live_hearing import HeardStream
-    from analysis.recordings.sound_stream import SoundStream
+    from analysis.listening.live_hearing import HeardStream
+    from analysis.listening.sound_stream import SoundStream
+    from analysis.listening.step_views import Teller
 
 __all__ = ["COMMAND"]
 
@@ -61,8 +61,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
+    from analysis.listening.live_hearing import LiveHearing, listen
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
-    from analysis.recordings.live_hearing import LiveHearing, listen
     from analysis.run_error import RunError
 
     given = options.geometry
@@ -98,16 +98,17 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
 
 
 def _teller(*, as_json: bool) -> Teller:
-    from analysis.commands.listen_view import JsonLines, Screen, TextLines
+    from analysis.listening.step_views import JsonLines, Screen, TextLines
 
     if as_json:
-        return JsonLines()
-    return Screen() if sys.stdout.isatty() else TextLines()
+        return JsonLines(sys.stdout, sys.stderr)
+    view = Screen if sys.stdout.isatty() else TextLines
+    return view(sys.stdout, sys.stderr)
 
 
 def _stream(options: Namespace, raw_channels: int) -> SoundStream:
-    from analysis.recordings.sound_card import open_card
-    from analysis.recordings.sound_pipe import open_flac, open_pipe
+    from analysis.listening.sound_card import open_card
+    from analysis.listening.sound_pipe import open_flac, open_pipe
     from systems.framework.input_error import InputError
 
     for name in ("rate", "channels"):

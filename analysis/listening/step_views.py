@@ -5,11 +5,10 @@ from __future__ import annotations
 import json
 import math
 import shutil
-import sys
 from types import TracebackType
-from typing import Protocol
+from typing import Protocol, TextIO
 
-from analysis.recordings.live_hearing import HeardStep, track_document
+from analysis.listening.live_hearing import HeardStep, track_document
 from systems.hearing.voting.source_tracks import SourceTrack
 
 __all__ = ["JsonLines", "Screen", "Teller", "TextLines", "view"]
@@ -45,18 +44,28 @@ class Teller(Protocol):
 
 
 class TextLines:
-    """A line a second."""
+    """A line a second.
+
+    Args:
+        out: Where sources are told.
+        errors: Where faults are named.
+    """
+
+    def __init__(self, out: TextIO, errors: TextIO) -> None:
+        self._out, self._errors = out, errors
 
     def tell(self, step: HeardStep) -> None:
         """The sources of a step, if a second is full."""
         t_s = step.sources.t_s
         if abs(t_s - round(t_s)) < 1e-6:
             each = "  ".join(_words(track) for track in step.sources.tracks)
-            print(f"{t_s:8.1f} s  {step.level_db:4.0f} dB  {each}", flush=True)
+            self._out.write(f"{t_s:8.1f} s  {step.level_db:4.0f} dB  {each}\n")
+            self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
         """A fault, on standard error."""
-        print(f"phonotaxis: at {t_s:.1f} s: {fault}", file=sys.stderr, flush=True)
+        self._errors.write(f"phonotaxis: at {t_s:.1f} s: {fault}\n")
+        self._errors.flush()
 
     def __enter__(self) -> TextLines:
         return self
@@ -76,30 +85,37 @@ class JsonLines(TextLines):
     def tell(self, step: HeardStep) -> None:
         """The sources of a step, at once."""
         for line in track_document(step):
-            print(json.dumps(line, allow_nan=False))
-        sys.stdout.flush()
+            self._out.write(f"{json.dumps(line, allow_nan=False)}\n")
+        self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
         """A fault, on both streams."""
         super().name_fault(fault, t_s)
-        print(json.dumps({"t_s": round(t_s, 6), "fault": fault}), flush=True)
+        self._out.write(f"{json.dumps({'t_s': round(t_s, 6), 'fault': fault})}\n")
+        self._out.flush()
 
 
 class Screen(TextLines):
-    """All of it in place, each step written at once over the last one."""
+    """All of it in place, each step written at once over the last one.
 
-    def __init__(self) -> None:
+    Args:
+        out: A terminal.
+        errors: Not used: faults stay on the screen.
+    """
+
+    def __init__(self, out: TextIO, errors: TextIO) -> None:
+        super().__init__(out, errors)
         self._faults: list[str] = []
         self._height = 0
 
     def tell(self, step: HeardStep) -> None:
         """Draws a step over the last one."""
-        width = shutil.get_terminal_size().columns
-        lines = [line[: width - 1] for line in view(step, width, self._faults)]
+        size = shutil.get_terminal_size()
+        lines = view(step, size.columns, self._faults)[: size.lines - 1]
         back = f"\x1b[{self._height}F" if self._height else ""
-        text = "".join(f"{line}{_TO_END}\n" for line in lines)
-        sys.stdout.write(f"{back}{text}{_BELOW}")
-        sys.stdout.flush()
+        text = "".join(f"{line[: size.columns - 1]}{_TO_END}\n" for line in lines)
+        self._out.write(f"{back}{text}{_BELOW}")
+        self._out.flush()
         self._height = len(lines)
 
     def name_fault(self, fault: str, t_s: float) -> None:
@@ -107,7 +123,7 @@ class Screen(TextLines):
         self._faults.append(f"! {t_s:.1f} s: {fault}")
 
     def __enter__(self) -> Screen:
-        sys.stdout.write(_HIDE)
+        self._out.write(_HIDE)
         return self
 
     def __exit__(
@@ -117,8 +133,8 @@ class Screen(TextLines):
         trace: TracebackType | None,
     ) -> None:
         """Leaves the last step where it is, and the cursor below it."""
-        sys.stdout.write(_SHOW)
-        sys.stdout.flush()
+        self._out.write(_SHOW)
+        self._out.flush()
 
 
 def view(step: HeardStep, width: int, faults: list[str]) -> list[str]:

@@ -135,5 +135,5 @@ def _dead(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
     if others < _LEAST_DB:
         return
     for k in np.flatnonzero(level < others - _DEAD_DB):
-        message = f"channel {k + 1}: dead; check its microphone"
+        message = f"channel {k + 1}: dead, and left out; check its microphone"
         yield ChannelFault("dead", (int(k),), message)

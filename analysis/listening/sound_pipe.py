@@ -14,7 +14,7 @@ import numpy as np
 import soundfile
 from numpy.typing import NDArray
 
-from analysis.recordings.sound_stream import (
+from analysis.listening.sound_stream import (
     BLOCK_S,
     SILENT_AFTER_S,
     STOPPED,

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.listening.live_faults import LiveFaults
+from analysis.listening.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.array_match import array_mismatch, chosen_microphones
 from analysis.recordings.channel_faults import ChannelFault
-from analysis.recordings.live_faults import LiveFaults
-from analysis.recordings.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from systems.framework.input_error import InputError
 from systems.hearing.voting import VotePlan, vote_plan
 from systems.hearing.voting.source_listener import (
@@ -155,25 +155,29 @@ class LiveHearing:
         """Names a fault, and goes on without what it is of."""
         if fault.kind == "dead" and not set(fault.channels) & set(self._alive):
             return
-        self._name(fault.message, (fault.kind, *fault.channels))
         if fault.kind in _FATAL:
-            raise StreamBrokenError(fault.message)
+            raise self._end(fault.message)
         if fault.kind == "inverted":
             self._signs[list(fault.channels)] *= -1.0
         elif fault.kind == "dead":
-            self._alive = [k for k in self._alive if k not in fault.channels]
-            try:
-                self._plan = self._voting(
-                    chosen_microphones(self._geometry, self._alive)
-                )
-            except ValueError:
-                raise StreamBrokenError(
-                    f"{fault.message}; those that are left tell no bearings"
-                ) from None
-        else:
-            return
-        looks.begin(self._alive)
-        self._memory = self._memory.after_gap(self._plan, keeps_tracks=True)
+            self._leave_out(fault)
+        self._name(fault.message, (fault.kind, *fault.channels))
+        if fault.kind in ("inverted", "dead"):
+            looks.begin(self._alive)
+            self._memory = self._memory.after_gap(self._plan, keeps_tracks=True)
+
+    def _leave_out(self, fault: ChannelFault) -> None:
+        self._alive = [k for k in self._alive if k not in fault.channels]
+        try:
+            self._plan = self._voting(chosen_microphones(self._geometry, self._alive))
+        except ValueError:
+            raise self._end(
+                f"{fault.message}; those that are left tell no bearings"
+            ) from None
+
+    def _end(self, fault: str) -> StreamBrokenError:
+        self.heard.faults.append(fault)
+        return StreamBrokenError(fault)
 
     def _name(self, fault: str, about: Hashable = None) -> None:
         if (about or fault) not in self._named:

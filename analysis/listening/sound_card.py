@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from analysis.recordings.sound_stream import (
+from analysis.listening.sound_stream import (
     BLOCK_S,
     SILENT_AFTER_S,
     STOPPED,
