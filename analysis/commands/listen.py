@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
@@ -129,7 +130,7 @@ def _stream(options: Namespace, raw_channels: int) -> SoundStream:
                 "input",
                 "nothing is piped in; name a file, pipe in sound, or give --device",
             )
-        pipe = sys.stdin.buffer
+        pipe = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     else:
         path = Path(options.input)
         try:

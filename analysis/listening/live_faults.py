@@ -131,7 +131,8 @@ def _clipped(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
 
 def _dead(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
     level = 10.0 * np.log10(np.maximum(np.var(stretch, axis=1), 1e-30))
-    others = float(np.median(level))
+    # The loudest alone may have the source at its microphone.
+    others = float(np.sort(level)[-2])
     if others < _LEAST_DB:
         return
     for k in np.flatnonzero(level < others - _DEAD_DB):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Hashable, Iterator
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -91,15 +92,19 @@ class LiveHearing:
     ) -> None:
         rate = stream.sample_rate_hz
         complaint = array_mismatch(geometry, stream.channels, rate)
-        if complaint:
-            raise InputError("input", f"it {complaint}")
         self.heard = HeardStream()
         self._stream, self._geometry = stream, geometry
         self._name_fault = name_fault
+        self._samples = 0
         self._named: set[Hashable] = set()
         self._alive = list(range(len(geometry.microphones)))
         self._signs = np.ones((len(self._alive), 1), np.float32)
-        self._plan = self._voting(geometry)
+        with ExitStack() as stack:
+            stack.callback(stream.close)
+            if complaint:
+                raise InputError("input", f"it {complaint}")
+            self._plan = self._voting(geometry)
+            stack.pop_all()
         self._memory = ListenerMemory.blank(self._plan)
 
     def _voting(self, geometry: ArrayGeometry) -> VotePlan:
@@ -131,11 +136,13 @@ class LiveHearing:
                     powers.clear()
         finally:
             looks.close()
+            self._stream.close()
 
     def _accepted(self, block: SoundBlock, looks: LiveFaults) -> NDArray[np.float32]:
         """The array's channels of a block, which are samples beyond doubt."""
         channels = block.samples[list(self._geometry.columns)]
-        self.heard.seconds += channels.shape[1] / self._stream.sample_rate_hz
+        self._samples += channels.shape[1]
+        self.heard.seconds = self._samples / self._stream.sample_rate_hz
         for fault in block.faults:
             self._name(fault)
         if block.gap:
@@ -164,7 +171,9 @@ class LiveHearing:
         self._name(fault.message, (fault.kind, *fault.channels))
         if fault.kind in ("inverted", "dead"):
             looks.begin(self._alive)
-            self._memory = self._memory.after_gap(self._plan, keeps_tracks=True)
+            # What an inverted channel made of a source is none.
+            keeps_tracks = fault.kind == "dead"
+            self._memory = self._memory.after_gap(self._plan, keeps_tracks=keeps_tracks)
 
     def _leave_out(self, fault: ChannelFault) -> None:
         self._alive = [k for k in self._alive if k not in fault.channels]

@@ -7,6 +7,7 @@ import select
 import struct
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 from typing import BinaryIO, Literal, NamedTuple
 
@@ -84,7 +85,8 @@ def open_pipe(
     """Sound from a pipe or a file, which is read to its end, and never sought in.
 
     Args:
-        pipe: With a file descriptor; nothing was read from it before.
+        pipe: With a file descriptor; nothing was read from it before. It is the
+            stream's from here on, and closed with it.
         raw_channels: Of raw samples, where nothing is stated.
         channels: That are stated; none: those of the WAV header.
         sample_rate_hz: That is stated, Hz; none: that of the WAV header.
@@ -97,32 +99,41 @@ def open_pipe(
         InputError: It is empty, its header is of another kind or contradicts what is
             stated, or it is raw and nobody says its rate.
     """
-    source = _Source(pipe)
+    with ExitStack() as stack:
+        stack.callback(pipe.close)
+        source = _Source(pipe)
+        raw = None
+        if sample_rate_hz is not None:
+            raw = _Format(channels or raw_channels, sample_rate_hz, sample_format)
+        form, length = _begin(source, raw)
+        if form is not raw:
+            _check_stated(form.channels, form.sample_rate_hz, channels, sample_rate_hz)
+        stack.pop_all()
+    blocks = _blocks(source, form, length)
+    return SoundStream(form.channels, form.sample_rate_hz, blocks, pipe.close)
+
+
+def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
+    """What comes, and its bytes if that is known; ``raw`` where there is no header."""
     start = source.read(4)
     if not start:
         raise InputError("input", "it is empty; pipe in WAV or raw samples")
     if start in _OTHERS:
         raise InputError("input", f"it is {_OTHERS[start]} phonotaxis listen")
     if start == b"RIFF":
-        form, length = _wav_header(source)
-        _check_stated(form.channels, form.sample_rate_hz, channels, sample_rate_hz)
-    elif sample_rate_hz is None:
+        return _wav_header(source)
+    if raw is None:
         raise InputError(
             "input", "it is no WAV; say what it is, as --rate 48000 --format s16le"
         )
-    else:
-        form = _Format(channels or raw_channels, sample_rate_hz, sample_format)
-        length = None
-        source.unread(start)
-    blocks = _blocks(source, form, length)
-    return SoundStream(form.channels, form.sample_rate_hz, blocks)
+    source.unread(start)
+    return raw, None
 
 
 class _Source:
     """Bytes of a pipe or file, and how long they were waited for."""
 
     def __init__(self, pipe: BinaryIO) -> None:
-        self._pipe = pipe  # it would close itself if nobody had it
         self._descriptor = pipe.fileno()
         self._unread = b""
         self.waited_s = 0.0
@@ -174,15 +185,17 @@ def open_flac(
         raise InputError(
             "input", f"cannot be decoded ({error}); record it again"
         ) from None
-    _check_stated(sound.channels, sound.samplerate, channels, sample_rate_hz)
+    with ExitStack() as stack:
+        stack.callback(sound.close)
+        _check_stated(sound.channels, sound.samplerate, channels, sample_rate_hz)
+        stack.pop_all()
     size = round(BLOCK_S * sound.samplerate)
 
     def blocks() -> Iterator[SoundBlock]:
-        with sound:
-            while len(samples := sound.read(size, dtype="float32", always_2d=True)):
-                yield SoundBlock(samples.T)
+        while len(samples := sound.read(size, dtype="float32", always_2d=True)):
+            yield SoundBlock(samples.T)
 
-    return SoundStream(sound.channels, sound.samplerate, blocks())
+    return SoundStream(sound.channels, sound.samplerate, blocks(), sound.close)
 
 
 def _check_stated(

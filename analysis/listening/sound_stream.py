@@ -59,6 +59,8 @@ class SoundStream:
     sample_rate_hz: int
     blocks: Iterator[SoundBlock] = field(repr=False)
     """They end with the stream, and raise ``StreamBrokenError`` where it breaks off."""
+    close: Callable[[], None] = field(default=lambda: None, repr=False)
+    """Gives back what it comes from; called by whoever hears it, or refuses to."""
 
 
 class Pace:

@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Protocol, TextIO
 
 from analysis.listening.live_hearing import HeardStep, track_document
+from systems.hearing.voting.source_listener import TrackedSources
 from systems.hearing.voting.source_tracks import SourceTrack
 
 __all__ = ["JsonLines", "Screen", "Teller", "TextLines", "view"]
@@ -106,21 +107,27 @@ class Screen(TextLines):
     def __init__(self, out: TextIO, errors: TextIO) -> None:
         super().__init__(out, errors)
         self._faults: list[str] = []
+        self._step = HeardStep(TrackedSources(0.0, ()), _LEVELS_DB[0])
         self._height = 0
 
     def tell(self, step: HeardStep) -> None:
         """Draws a step over the last one."""
+        self._step = step
+        self._draw()
+
+    def name_fault(self, fault: str, t_s: float) -> None:
+        """A fault stays on the screen."""
+        self._faults.append(f"! {t_s:.1f} s: {fault}")
+        self._draw()
+
+    def _draw(self) -> None:
         size = shutil.get_terminal_size()
-        lines = view(step, size.columns, self._faults)[: size.lines - 1]
+        lines = view(self._step, size.columns, self._faults)[: size.lines - 1]
         back = f"\x1b[{self._height}F" if self._height else ""
         text = "".join(f"{line[: size.columns - 1]}{_TO_END}\n" for line in lines)
         self._out.write(f"{back}{text}{_BELOW}")
         self._out.flush()
         self._height = len(lines)
-
-    def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault stays on the screen."""
-        self._faults.append(f"! {t_s:.1f} s: {fault}")
 
     def __enter__(self) -> Screen:
         self._out.write(_HIDE)

@@ -37,6 +37,9 @@ _LEAST, _LEAST_S, _MOST = 8, 4.0, 240
 # By how much delays have to exceed what the array allows.
 _BEYOND = 1.15
 
+# Channels whose delays grow by at least this share of the fastest drift with it.
+_TOGETHER = 0.5
+
 # Clocks that are worse than this are no clocks, 1.
 _MOST_DRIFT = 2e-3
 
@@ -92,24 +95,28 @@ def clock_drift(
     """
     numbers = list(range(len(p_AM)) if channels is None else channels)
     allowed = np.linalg.norm(p_AM[numbers[1:]] - p_AM[numbers[0]], axis=1) / c
-    slopes = np.array(
-        [_slope(t_s, lag, most) for lag, most in zip(lags.T, allowed, strict=True)]
-    )
-    fastest = slopes[np.argmax(np.abs(slopes))]
-    if fastest == 0.0:
+    found = [_slope(t_s, lag, most) for lag, most in zip(lags.T, allowed, strict=True)]
+    beyond = [slope for slope, is_beyond in found if is_beyond]
+    if not beyond:
         return None
-    drifting = np.append(0.0, slopes) / fastest > 0.5
-    late = tuple(k for k, drifts in zip(numbers, drifting, strict=True) if drifts)
-    names = [
-        " and ".join(str(k + 1) for k in numbers if (k in late) == drifts)
-        for drifts in (True, False)
-    ]
+    fastest = max(beyond, key=abs)
+    drifting = [False, *(slope / fastest > _TOGETHER for slope, _ in found)]
+    late, others = (
+        [k for k, drifts in zip(numbers, drifting, strict=True) if drifts == which]
+        for which in (True, False)
+    )
+    clock = "its clock drifts" if len(late) == 1 else "their clock drifts"
     return ChannelFault(
         "drift",
-        late,
-        f"channels {names[0]}: their clock drifts from that of {names[1]} by "
+        tuple(late),
+        f"{_names(late)}: {clock} from that of {_names(others)} by "
         f"{1e6 * abs(fastest):.0f} us a second; record all channels by one clock",
     )
+
+
+def _names(channels: Sequence[int]) -> str:
+    word = "channel" if len(channels) == 1 else "channels"
+    return f"{word} {' and '.join(str(k + 1) for k in channels)}"
 
 
 def recording_drift(
@@ -140,18 +147,20 @@ def recording_drift(
     return clock_drift((starts + 0.5 * size) / sample_rate_hz, lags, p_AM, c)
 
 
-def _slope(t_s: NDArray[np.float64], lag: NDArray[np.float64], allowed: float) -> float:
-    """Of delays that follow a line out of what is allowed; else 0."""
+def _slope(
+    t_s: NDArray[np.float64], lag: NDArray[np.float64], allowed: float
+) -> tuple[float, bool]:
+    """Of a line through delays, and whether that leads out of what is allowed."""
     heard = np.isfinite(lag)
     if np.count_nonzero(heard) < _LEAST:
-        return 0.0
+        return 0.0, False
     t, lag = t_s[heard], lag[heard]
     if t[-1] - t[0] < _LEAST_S:
-        return 0.0
+        return 0.0, False
     slope, offset, low, high = theilslopes(lag, t)
     line = offset + slope * t
     off = float(np.median(np.abs(lag - line)))
-    leaves = np.abs(line[[0, -1]]).max() > _BEYOND * allowed
+    leaves = float(np.abs(line[[0, -1]]).max()) > _BEYOND * allowed
     grows = abs(slope) * (t[-1] - t[0]) > allowed and low * high > 0.0
     steady = off < allowed and abs(slope) < _MOST_DRIFT
-    return float(slope) if leaves and grows and steady else 0.0
+    return float(slope), leaves and grows and steady

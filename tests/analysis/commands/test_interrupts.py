@@ -165,3 +165,13 @@ sys.exit(1)
         check=False,
     )
     assert (done.returncode, done.stderr) == (1, "")
+
+
+def test_one_that_is_taken_counts_no_longer():
+    with Interrupts() as interrupts:
+        with pytest.raises(KeyboardInterrupt):
+            strike()
+        interrupts.take()
+        interrupts.check()
+        time.sleep(0.3)  # it would strike again
+    assert signal.getitimer(signal.ITIMER_REAL) == (0.0, 0.0)
