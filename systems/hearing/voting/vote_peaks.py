@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
 
 from systems.hearing.voting.direction_votes import DirectionVotes
 
@@ -110,6 +109,8 @@ def _density(
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:
     """Cells of the peaks that are high and stand out."""
+    from scipy.signal import find_peaks  # takes a second, which not everyone needs
+
     # From the lowest cell around to itself nothing is cut.
     first = int(np.argmin(density))
     turned = np.append(np.roll(density, -first), density[first])
