@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,18 +15,29 @@ from systems.hearing.voting import (
     VotePlan,
     cast_votes,
     gather_sources,
+    is_steady,
     join_votes,
+    steered_only,
 )
 from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["FollowedSource", "HeardSource", "heard_sources", "vote_plan"]
+__all__ = [
+    "FollowedSource",
+    "HeardSource",
+    "HeardSources",
+    "heard_sources",
+    "vote_plan",
+]
 
 # Samples of a channel that vote at once.
 _BLOCK = 2**16
 
 # Where a source was not heard for longer its place is a guess, s.
 _PAUSE_S = 0.3
+
+# What is not told has no greater confidence.
+_NOT_TOLD = 0.5
 
 # Speech and most noises have what is told apart below this.
 _HIGHEST_HZ = 8_000.0
@@ -80,6 +92,22 @@ class FollowedSource:
     """Greatest probability that it existed, 0 to 1."""
 
 
+@dataclass(frozen=True)
+class HeardSources:
+    """All that was heard in a recording."""
+
+    sources: list[HeardSource] = field(default_factory=list)
+    """The one that is heard most first."""
+    tracks: list[FollowedSource] = field(default_factory=list)
+    """In order of their begin."""
+    steady: bool = False
+    """The sound is steady: where most of it comes from is told, but not whether it
+    is one source or several. No confidence is above 0.5."""
+
+
+_Told = TypeVar("_Told", HeardSource, FollowedSource)
+
+
 def vote_plan(
     shape: ArrayShape, c: float, sample_rate_hz: float, band_hz: tuple[float, float]
 ) -> VotePlan:
@@ -107,7 +135,7 @@ def heard_sources(
     c: float,
     sample_rate_hz: float,
     band_hz: tuple[float, float],
-) -> tuple[list[HeardSource], list[FollowedSource]]:
+) -> HeardSources:
     """Every source that stands out, and its track.
 
     Args:
@@ -118,19 +146,29 @@ def heard_sources(
         band_hz: Lowest and highest frequency that counts, Hz.
 
     Returns:
-        The sources, the one that is heard most first; and the tracks, in order of
-        their begin. Empty for an array that tells no bearings.
+        The sources and tracks; none for an array that tells no bearings.
     """
     if "bearing" not in shape.angles:
-        return [], []
+        return HeardSources()
     plan = vote_plan(shape, c, sample_rate_hz, band_hz)
     memory, parts = plan.blank(), []
     for first in range(0, channels.shape[1], _BLOCK):
         votes, memory = cast_votes(plan, memory, channels[:, first : first + _BLOCK])
         parts.append(votes)
     votes = join_votes(parts)
+    steady = is_steady(votes)
+    if steady:
+        votes = steered_only(votes)
     sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
-    return sources, _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+    tracks = _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+    if steady:
+        sources = [_doubted(source) for source in sources[:1]]
+        tracks = [_doubted(track) for track in tracks]
+    return HeardSources(sources, tracks, steady)
+
+
+def _doubted(told: _Told) -> _Told:
+    return replace(told, confidence=min(told.confidence, _NOT_TOLD))
 
 
 def _tracks(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.channel_faults import ChannelFault
-from analysis.recordings.heard_sources import FollowedSource, HeardSource
+from analysis.recordings.heard_sources import HeardSources
 from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
@@ -102,10 +102,8 @@ class LocateResult:
     """Stretches of the recording, of which each may have an estimate."""
     faults: list[ChannelFault] = field(default_factory=list)
     """Channels that are not as they should be."""
-    sources: list[HeardSource] = field(default_factory=list)
-    """All that were heard over the recording, the one that is heard most first."""
-    tracks: list[FollowedSource] = field(default_factory=list)
-    """The same over time, in order of their begin."""
+    heard: HeardSources = field(default_factory=HeardSources)
+    """All sources over the recording, and their tracks."""
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.
@@ -178,8 +176,8 @@ class LocateResult:
             "array": self.array,
             "estimates": [asdict(estimate) for estimate in self.estimates],
             "summary": self.summary(),
-            "sources": [asdict(source) for source in self.sources],
-            "tracks": [asdict(track) for track in self.tracks],
+            "sources": [asdict(source) for source in self.heard.sources],
+            "tracks": [asdict(track) for track in self.heard.tracks],
         }
 
 

@@ -69,11 +69,11 @@ def _range(result: LocateResult) -> str:
 
 def _sources(result: LocateResult) -> list[str]:
     """Where there are several; one is what the lines above speak of."""
-    if len(result.sources) < 2:
+    if len(result.heard.sources) < 2:
         return []
     each = [
         f"{source.bearing_deg:.1f} deg ({100.0 * source.share:.0f} %)"
-        for source in result.sources
+        for source in result.heard.sources
     ]
     return [f"{len(each)} sources: {', '.join(each)} of what is heard"]
 

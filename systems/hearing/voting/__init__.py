@@ -7,6 +7,7 @@ from systems.hearing.voting.direction_votes import (
     cast_votes,
     join_votes,
 )
+from systems.hearing.voting.steady_sound import is_steady, steered_only
 from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
 
 __all__ = [
@@ -16,5 +17,7 @@ __all__ = [
     "VotedSource",
     "cast_votes",
     "gather_sources",
+    "is_steady",
     "join_votes",
+    "steered_only",
 ]
