@@ -175,14 +175,17 @@ def _tracks(
     votes: DirectionVotes, seconds: float, plan: VotePlan
 ) -> list[FollowedSource]:
     tracks: dict[int, FollowedSource] = {}
-    for step in follow_sources(votes, seconds, plan, ListenerParameters()):
+    parameters = ListenerParameters()
+    # A step ends with the sound that it gathers: the bearing is that of its middle.
+    late = 0.5 * parameters.window_s
+    for step in follow_sources(votes, seconds, plan, parameters):
         for track in step.tracks:
             if step.t_s - track.t_heard > _PAUSE_S:
                 continue
             known = tracks.setdefault(
                 track.identity, FollowedSource(track.identity, [], [], 0.0)
             )
-            known.t_s.append(round(step.t_s, 6))
+            known.t_s.append(round(step.t_s - late, 6))
             known.bearing_deg.append(math.degrees(track.bearing))
             sure = max(known.confidence, track.confidence)
             tracks[track.identity] = FollowedSource(
