@@ -42,7 +42,7 @@ SECONDS = 3.0
 SNR_DB = 20.0
 
 # Recordings from one room, and voices made of one by playing it faster and slower.
-_OF_A_ROOM = 10
+_OF_A_ROOM = 25
 _SPEEDS = (88, 94, 100, 106, 112)
 
 Voices = Sequence[NDArray[np.float64]] | None
@@ -175,4 +175,3 @@ def _heard(
 ) -> NDArray[np.float32]:
     parts = [heard_from(r, s) for r, s in zip(responses, sounds, strict=True)]
     return with_noise(np.sum(parts, axis=0), SNR_DB, rng).astype(np.float32)
-

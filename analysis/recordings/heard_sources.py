@@ -36,6 +36,9 @@ _BLOCK = 2**16
 # Where a source was not heard for longer its place is a guess, s.
 _PAUSE_S = 0.3
 
+# A track that turns by more moves, and what is within so much of it is the same, deg.
+_MOVES_DEG, _NEAR_DEG = 20.0, 8.0
+
 # What is not told has no greater confidence.
 _NOT_TOLD = 0.5
 
@@ -161,10 +164,36 @@ def heard_sources(
         votes = steered_only(votes)
     sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
     tracks = _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+    sources = _counted_once(sources, tracks)
     if steady:
         sources = [_doubted(source) for source in sources[:1]]
         tracks = [_doubted(track) for track in tracks]
     return HeardSources(sources, tracks, steady)
+
+
+def _counted_once(
+    sources: list[HeardSource], tracks: list[FollowedSource]
+) -> list[HeardSource]:
+    """Without directions that sources passed which count already."""
+    moving = [track for track in tracks if _extent_deg(track) > _MOVES_DEG]
+    kept: list[HeardSource] = []
+    for source in sources:
+        passing = [track for track in moving if _passes(track, source)]
+        known = sum(any(_passes(track, k) for track in passing) for k in kept)
+        if not passing or known < len(passing):
+            kept.append(source)
+    return kept
+
+
+def _extent_deg(track: FollowedSource) -> float:
+    """How far it moved between the places where it was most of the time."""
+    turned = np.unwrap(track.bearing_deg, period=360.0)
+    return float(np.ptp(np.quantile(turned, (0.1, 0.9))))
+
+
+def _passes(track: FollowedSource, source: HeardSource) -> bool:
+    off = np.array(track.bearing_deg) - source.bearing_deg
+    return bool(np.min(np.abs((off + 180.0) % 360.0 - 180.0)) < _NEAR_DEG)
 
 
 def _doubted(told: _Told) -> _Told:

@@ -106,9 +106,7 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         float(rate),
         (recording.low_hz, recording.high_hz),
     )
-    return LocateResult(
-        array, shape, estimates, len(search.stretches), faults, heard
-    )
+    return LocateResult(array, shape, estimates, len(search.stretches), faults, heard)
 
 
 def _recording(

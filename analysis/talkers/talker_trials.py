@@ -180,11 +180,10 @@ def talker_sounds(
             "voices", f"{len(voices)} given for {count} talkers; give one for each"
         )
     sounds = np.empty((count, round(seconds * sample_rate_hz)))
-    for sound, k in zip(sounds, rng.permutation(len(voices)), strict=False):
+    for row, k in enumerate(rng.permutation(len(voices))[:count]):
         turned = np.roll(voices[k], rng.integers(len(voices[k])))
-        sound[:] = np.resize(turned, sound.size)
-        sound /= np.sqrt(np.mean(sound**2))
-    return sounds
+        sounds[row] = np.resize(turned, sounds.shape[1])
+    return sounds / np.sqrt(np.mean(sounds**2, axis=1, keepdims=True))
 
 
 def impulse_responses(

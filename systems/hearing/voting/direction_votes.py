@@ -307,9 +307,7 @@ def _cast(
     """Votes of one kind, without the groups."""
     kind = np.full(len(t_s), steered)
     levels = np.empty((0, _LEVELS))
-    return DirectionVotes(
-        t_s, azimuth, elevation, weight, kind, np.empty(0), levels
-    )
+    return DirectionVotes(t_s, azimuth, elevation, weight, kind, np.empty(0), levels)
 
 
 def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:

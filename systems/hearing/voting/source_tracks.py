@@ -329,7 +329,7 @@ def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
 
 
 def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
-    """What is not told yet has no right to pause, nor what is hidden to do so for ever."""
+    """What is not told yet may not pause, and what is hidden not for ever."""
     silence = t_s - track.t_heard
     if track.identity == 0:
         return silence > p.begins_after_s
