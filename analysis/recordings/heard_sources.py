@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,19 +15,27 @@ from systems.hearing.voting import (
     VotePlan,
     cast_votes,
     gather_sources,
+    is_steady,
     join_votes,
+    steered_only,
     vote_plan,
 )
 from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["FollowedSource", "HeardSource", "heard_sources"]
+__all__ = ["FollowedSource", "HeardSource", "HeardSources", "heard_sources"]
 
 # Samples of a channel that vote at once.
 _BLOCK = 2**16
 
 # Where a source was not heard for longer its place is a guess, s.
 _PAUSE_S = 0.3
+
+# A track that turns by more moves, and what is within so much of it is the same, deg.
+_MOVES_DEG, _NEAR_DEG = 20.0, 8.0
+
+# What is not told has no greater confidence.
+_NOT_TOLD = 0.5
 
 
 @dataclass(frozen=True)
@@ -78,13 +87,29 @@ class FollowedSource:
     """Greatest probability that it existed, 0 to 1."""
 
 
+@dataclass(frozen=True)
+class HeardSources:
+    """All that was heard in a recording."""
+
+    sources: list[HeardSource] = field(default_factory=list)
+    """The one that is heard most first."""
+    tracks: list[FollowedSource] = field(default_factory=list)
+    """In order of their begin."""
+    steady: bool = False
+    """The sound is steady: where most of it comes from is told, but not whether it
+    is one source or several. No confidence is above 0.5."""
+
+
+_Told = TypeVar("_Told", HeardSource, FollowedSource)
+
+
 def heard_sources(
     channels: NDArray[np.float32],
     shape: ArrayShape,
     c: float,
     sample_rate_hz: float,
     band_hz: tuple[float, float],
-) -> tuple[list[HeardSource], list[FollowedSource]]:
+) -> HeardSources:
     """Every source that stands out, and its track.
 
     Args:
@@ -95,33 +120,72 @@ def heard_sources(
         band_hz: Lowest and highest frequency that counts, Hz.
 
     Returns:
-        The sources, the one that is heard most first; and the tracks, in order of
-        their begin. Empty for an array that tells no bearings.
+        The sources and tracks; none for an array that tells no bearings.
     """
     if "bearing" not in shape.angles:
-        return [], []
+        return HeardSources()
     plan = vote_plan(shape, c, sample_rate_hz, band_hz)
     memory, parts = plan.blank(), []
     for first in range(0, channels.shape[1], _BLOCK):
         votes, memory = cast_votes(plan, memory, channels[:, first : first + _BLOCK])
         parts.append(votes)
     votes = join_votes(parts)
+    steady = is_steady(votes)
+    if steady:
+        votes = steered_only(votes)
     sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
-    return sources, _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+    tracks = _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
+    sources = _counted_once(sources, tracks)
+    if steady:
+        sources = [_doubted(source) for source in sources[:1]]
+        tracks = [_doubted(track) for track in tracks]
+    return HeardSources(sources, tracks, steady)
+
+
+def _counted_once(
+    sources: list[HeardSource], tracks: list[FollowedSource]
+) -> list[HeardSource]:
+    """Without directions that sources passed which count already."""
+    moving = [track for track in tracks if _extent_deg(track) > _MOVES_DEG]
+    kept: list[HeardSource] = []
+    for source in sources:
+        passing = [track for track in moving if _passes(track, source)]
+        known = sum(any(_passes(track, k) for track in passing) for k in kept)
+        if not passing or known < len(passing):
+            kept.append(source)
+    return kept
+
+
+def _extent_deg(track: FollowedSource) -> float:
+    """How far it moved between the places where it was most of the time."""
+    turned = np.unwrap(track.bearing_deg, period=360.0)
+    return float(np.ptp(np.quantile(turned, (0.1, 0.9))))
+
+
+def _passes(track: FollowedSource, source: HeardSource) -> bool:
+    off = np.array(track.bearing_deg) - source.bearing_deg
+    return bool(np.min(np.abs((off + 180.0) % 360.0 - 180.0)) < _NEAR_DEG)
+
+
+def _doubted(told: _Told) -> _Told:
+    return replace(told, confidence=min(told.confidence, _NOT_TOLD))
 
 
 def _tracks(
     votes: DirectionVotes, seconds: float, plan: VotePlan
 ) -> list[FollowedSource]:
     tracks: dict[int, FollowedSource] = {}
-    for step in follow_sources(votes, seconds, plan, ListenerParameters()):
+    parameters = ListenerParameters()
+    # A step ends with the sound that it gathers: the bearing is that of its middle.
+    late = 0.5 * parameters.window_s
+    for step in follow_sources(votes, seconds, plan, parameters):
         for track in step.tracks:
             if step.t_s - track.t_heard > _PAUSE_S:
                 continue
             known = tracks.setdefault(
                 track.identity, FollowedSource(track.identity, [], [], 0.0)
             )
-            known.t_s.append(round(step.t_s, 6))
+            known.t_s.append(round(step.t_s - late, 6))
             known.bearing_deg.append(math.degrees(track.bearing))
             sure = max(known.confidence, track.confidence)
             tracks[track.identity] = FollowedSource(

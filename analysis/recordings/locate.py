@@ -99,16 +99,14 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
-    sources, tracks = heard_sources(
+    heard = heard_sources(
         recording.channels,
         shape,
         known.c,
         float(rate),
         (recording.low_hz, recording.high_hz),
     )
-    return LocateResult(
-        array, shape, estimates, len(search.stretches), faults, sources, tracks
-    )
+    return LocateResult(array, shape, estimates, len(search.stretches), faults, heard)
 
 
 def _recording(

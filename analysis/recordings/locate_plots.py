@@ -12,10 +12,13 @@ from matplotlib.figure import Figure
 
 from analysis.hearing.cramer_rao import polar_point
 from analysis.recordings.locate_result import LocateResult
-from analysis.reporting.palette import COLOURS, draw_grid
+from analysis.reporting.palette import COLOURS, ROBOT_COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
 
 __all__ = ["plot_locate", "write_locate"]
+
+# Tracks are not drawn over longer pauses, s.
+_GAP_S = 0.5
 
 _WIDTH_IN, _PANEL_IN, _PLAN_IN = 9.0, 1.9, 3.6
 
@@ -65,6 +68,10 @@ def plot_locate(result: LocateResult) -> Figure:
 
 def _title(result: LocateResult) -> str:
     heard = f"heard in {len(result.estimates)} of {result.frames} frames"
+    if result.heard.steady:
+        heard += "; steady: one source, or several, is not told"
+    elif len(result.heard.sources) > 1:
+        heard += f"; {len(result.heard.sources)} sources"
     summary = result.summary()
     if not result.estimates or "range" in summary["observable"]:
         return heard
@@ -84,7 +91,10 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     centre, std = summary[name], summary[std_name]
     if name == "bearing_deg" and centre is not None:
         # A bearing near 180 deg must not jump from top to bottom.
-        values = centre + (values - centre + 180.0) % 360.0 - 180.0
+        middle = _middle_deg(result, centre)
+        values = middle + (values - middle + 180.0) % 360.0 - 180.0
+        centre = middle + (centre - middle + 180.0) % 360.0 - 180.0
+        _tracks(axes, result, middle)
     axes.errorbar(
         times,
         values,
@@ -99,6 +109,46 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
         ends = centre - std, centre + std
         axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
+
+
+def _others(axes: Axes, result: LocateResult, length: float) -> None:
+    """The sources beside the main one."""
+    main = result.summary()["bearing_deg"]
+    if main is None or len(result.heard.sources) < 2:
+        return
+    bearings = [source.bearing_deg for source in result.heard.sources]
+    off = [abs((bearing - main + 180.0) % 360.0 - 180.0) for bearing in bearings]
+    del bearings[int(np.argmin(off))]
+    for k, bearing in enumerate(bearings):
+        x, y = polar_point(length, bearing)
+        label = "further sources" if k == 0 else None
+        axes.plot((0, x), (0, y), "-.", color=COLOURS["source"], label=label)
+
+
+def _middle_deg(result: LocateResult, main: float) -> float:
+    """Across from the widest gap between the sources; the main one, if it is alone."""
+    bearings = np.sort([source.bearing_deg for source in result.heard.sources])
+    if len(bearings) < 2:
+        return main
+    gaps = np.diff(bearings, append=bearings[0] + 360.0)
+    widest = int(gaps.argmax())
+    return float(bearings[widest] + 0.5 * gaps[widest] - 180.0)
+
+
+def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
+    """Where there are several: each in a colour of its own, gaps left open."""
+    if len(result.heard.tracks) < 2:
+        return
+    for k, track in enumerate(result.heard.tracks):
+        t_s, bearing = np.array(track.t_s), np.array(track.bearing_deg)
+        around = middle + (bearing - middle + 180.0) % 360.0 - 180.0
+        steps = np.diff(around, prepend=around[0]), np.diff(t_s, prepend=t_s[0])
+        around[(np.abs(steps[0]) > 180.0) | (steps[1] > _GAP_S)] = np.nan
+        colour = ROBOT_COLOURS[k % len(ROBOT_COLOURS)]
+        axes.plot(t_s, around, color=colour, label=f"{track.identity}")
+    axes.legend(
+        fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=8
+    )
 
 
 def _plan(axes: Axes, result: LocateResult) -> None:
@@ -119,6 +169,7 @@ def _plan(axes: Axes, result: LocateResult) -> None:
                 continue  # the mirror image lies below
             x, y = polar_point(0.95 * size, other["bearing_deg"])
             axes.plot((0, x), (0, y), "--", color=COLOURS["empty"], label="or")
+    _others(axes, result, 0.95 * size)
     axes.plot(*places.T, "o", color=COLOURS["robot"], markersize=4, label="microphones")
     for k, (x, y) in enumerate(places):
         axes.annotate(

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.recordings.channel_faults import ChannelFault
-from analysis.recordings.heard_sources import FollowedSource, HeardSource
+from analysis.recordings.heard_sources import HeardSource, HeardSources
 from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
@@ -102,18 +102,17 @@ class LocateResult:
     """Stretches of the recording, of which each may have an estimate."""
     faults: list[ChannelFault] = field(default_factory=list)
     """Channels that are not as they should be."""
-    sources: list[HeardSource] = field(default_factory=list)
-    """All that were heard over the recording, the one that is heard most first."""
-    tracks: list[FollowedSource] = field(default_factory=list)
-    """The same over time, in order of their begin."""
+    heard: HeardSources = field(default_factory=HeardSources)
+    """All sources over the recording, and their tracks."""
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.
 
-        The main source is that of the commonest direction: the estimates near
-        it, or all of them where most are not near any one direction.
+        The main source is the one of ``heard.sources`` that most estimates are near;
+        where most are near none of them, that of the commonest direction: the
+        estimates near it, or all of them where most are not near any one direction.
         """
-        main = _main_source(self.estimates)
+        main = _main_source(self.estimates, self.heard.sources)
         bearing, bearing_std = _median_angle(
             [(e.bearing_deg, e.bearing_std_deg) for e in main]
         )
@@ -139,6 +138,7 @@ class LocateResult:
             "range_systematic_m": _usual(
                 [e.range_systematic_m for e in main] if enough else []
             ),
+            "number_of_sources": self.number_of_sources,
             "observable": [name for name, value in told.items() if value is not None],
             "ambiguity": self.shape.ambiguity,
             "alternatives": self._alternatives(bearing, elevation),
@@ -147,6 +147,16 @@ class LocateResult:
             "frames_of_main_source": len(main),
             "faults": [asdict(fault) for fault in self.faults],
         }
+
+    @property
+    def number_of_sources(self) -> int | None:
+        """How many were heard; None where that is not told.
+
+        It is not of a steady sound, of too short a recording, and by an array that
+        tells no bearings.
+        """
+        count = len(self.heard.sources)
+        return None if self.heard.steady or (self.estimates and not count) else count
 
     def _alternatives(
         self, bearing: float | None, elevation: float | None
@@ -178,26 +188,38 @@ class LocateResult:
             "array": self.array,
             "estimates": [asdict(estimate) for estimate in self.estimates],
             "summary": self.summary(),
-            "sources": [asdict(source) for source in self.sources],
-            "tracks": [asdict(track) for track in self.tracks],
+            "sources": [asdict(source) for source in self.heard.sources],
+            "tracks": [asdict(track) for track in self.heard.tracks],
         }
 
 
-def _main_source(estimates: list[SourceEstimate]) -> list[SourceEstimate]:
-    """The estimates near the commonest direction; all, where most are not."""
+def _main_source(
+    estimates: list[SourceEstimate], sources: Sequence[HeardSource]
+) -> list[SourceEstimate]:
+    """The estimates near the main source; all, where most are near no direction."""
     if not estimates:
         return []
     azimuth = np.radians([e.bearing_deg or 0.0 for e in estimates])
     height = np.radians([e.elevation_deg or 0.0 for e in estimates])
     # Elevations are far less certain than azimuths, where there are both.
     upright = estimates[0].bearing_deg is None
-    angles = height if upright else azimuth
-    unit = np.exp(1j * angles)
-    near = np.abs(np.angle(unit[:, np.newaxis] / unit)) <= math.radians(_NEAR_DEG)
-    commonest = near[int(near.sum(axis=0).argmax())]
-    if 2 * commonest.sum() < len(estimates):
-        return estimates
+    known = np.radians([] if upright else [s.bearing_deg for s in sources])
+    near = _near(known, azimuth)
+    if 2 * np.count_nonzero(near.any(axis=0)) < len(estimates):
+        angles = height if upright else azimuth
+        near = _near(angles, angles)
+        if 2 * near.sum(axis=1).max() < len(estimates):
+            return estimates
+    commonest = near[int(near.sum(axis=1).argmax())]
     return [e for e, chosen in zip(estimates, commonest, strict=True) if chosen]
+
+
+def _near(
+    directions: NDArray[np.float64], angles: NDArray[np.float64]
+) -> NDArray[np.bool_]:
+    """(d, e) which angles are near which directions, all in rad."""
+    off = np.angle(np.exp(1j * (angles - directions[:, np.newaxis])))
+    return np.asarray(np.abs(off) <= math.radians(_NEAR_DEG))
 
 
 def _median(

@@ -69,13 +69,18 @@ def _range(result: LocateResult) -> str:
 
 def _sources(result: LocateResult) -> list[str]:
     """Where there are several; one is what the lines above speak of."""
-    if len(result.sources) < 2:
+    sources = result.heard.sources
+    if result.heard.steady:
+        return ["the sound is steady: one source, or several, is not told"]
+    if len(sources) < 2:
         return []
-    each = [
-        f"{source.bearing_deg:.1f} deg ({100.0 * source.share:.0f} %)"
-        for source in result.sources
+    lines = [f"{len(sources)} sources; the lines above are of the main one"]
+    lines += [
+        f"  bearing {source.bearing_deg:7.1f} deg, {100.0 * source.share:3.0f} % of "
+        f"what is heard, confidence {source.confidence:.2f}"
+        for source in sources
     ]
-    return [f"{len(each)} sources: {', '.join(each)} of what is heard"]
+    return lines
 
 
 def _row(estimate: SourceEstimate) -> str:

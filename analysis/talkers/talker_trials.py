@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.signal import oaconvolve
 
 from analysis.talkers.synthetic_speech import speech_like
 from systems.framework.input_error import InputError
@@ -18,8 +19,12 @@ __all__ = [
     "TalkerScene",
     "TalkerScore",
     "draw_talkers",
+    "heard_from",
+    "impulse_responses",
     "record_talkers",
     "score_bearings",
+    "talker_sounds",
+    "with_noise",
 ]
 
 ROOM_M = (6.0, 5.0, 2.8)
@@ -121,8 +126,7 @@ def record_talkers(
         seconds: How long.
         sample_rate_hz: Of the recording, Hz.
         c: Speed of sound, m/s.
-        voices: What is said, at that rate: different ones are drawn, repeated where
-            they are too short. None: ``speech_like``.
+        voices: As for ``talker_sounds``.
 
     Returns:
         (n, samples), full scale 1.
@@ -130,14 +134,78 @@ def record_talkers(
     Raises:
         InputError: There are fewer voices than talkers.
     """
+    count = len(scene.bearings_deg)
+    sounds = talker_sounds(
+        count, rng, seconds=seconds, sample_rate_hz=sample_rate_hz, voices=voices
+    )
+    responses = impulse_responses(
+        scene, microphones, sample_rate_hz=sample_rate_hz, c=c
+    )
+    heard = np.sum(
+        [heard_from(r, s) for r, s in zip(responses, sounds, strict=True)], axis=0
+    )
+    return with_noise(heard, scene.snr_db, rng)
+
+
+def talker_sounds(
+    count: int,
+    rng: np.random.Generator,
+    *,
+    seconds: float = 3.0,
+    sample_rate_hz: int = 16_000,
+    voices: Sequence[NDArray[np.float64]] | None = None,
+) -> NDArray[np.float64]:
+    """What talkers say.
+
+    Args:
+        count: Of the talkers.
+        rng: Draws what they say.
+        seconds: How long.
+        sample_rate_hz: Of the sounds, Hz.
+        voices: What is said, at that rate: different ones are drawn, repeated where
+            they are too short. None: ``speech_like``.
+
+    Returns:
+        (count, samples) of RMS 1.
+
+    Raises:
+        InputError: There are fewer voices than talkers.
+    """
+    if voices is None:
+        return np.array(
+            [speech_like(rng, seconds, sample_rate_hz) for _ in range(count)]
+        )
+    if len(voices) < count:
+        raise InputError(
+            "voices", f"{len(voices)} given for {count} talkers; give one for each"
+        )
+    sounds = np.empty((count, round(seconds * sample_rate_hz)))
+    for row, k in enumerate(rng.permutation(len(voices))[:count]):
+        turned = np.roll(voices[k], rng.integers(len(voices[k])))
+        sounds[row] = np.resize(turned, sounds.shape[1])
+    return sounds / np.sqrt(np.mean(sounds**2, axis=1, keepdims=True))
+
+
+def impulse_responses(
+    scene: TalkerScene,
+    microphones: ArrayLike,
+    *,
+    sample_rate_hz: int = 16_000,
+    c: float = 343.0,
+) -> NDArray[np.float64]:
+    """From each talker's place to each microphone, by image sources.
+
+    Args:
+        scene: Places and room.
+        microphones: (n, 3) about the array's centre, m.
+        sample_rate_hz: Of the responses, Hz.
+        c: Speed of sound, m/s.
+
+    Returns:
+        (talkers, n, samples).
+    """
     import pyroomacoustics as pra
 
-    talkers = len(scene.bearings_deg)
-    samples = round(seconds * sample_rate_hz)
-    if voices is not None and len(voices) < talkers:
-        raise InputError(
-            "voices", f"{len(voices)} given for {talkers} talkers; give one for each"
-        )
     absorption, order = 1.0, 0
     if scene.t60_s > 0.0:
         absorption, order = pra.inverse_sabine(scene.t60_s, ROOM_M, c)
@@ -148,21 +216,49 @@ def record_talkers(
         max_order=min(order, _MOST_REFLECTIONS),
     )
     room.set_sound_speed(c)
-    chosen = None if voices is None else rng.permutation(len(voices))[:talkers]
-    for k, direction in enumerate(_directions(scene)):
-        if voices is None or chosen is None:
-            sound = speech_like(rng, seconds, sample_rate_hz)
-        else:
-            sound = np.roll(voices[chosen[k]], rng.integers(len(voices[chosen[k]])))
-            sound = np.resize(sound, samples)
-            sound = sound / np.sqrt(np.mean(sound**2))
-        place = np.array(scene.centre_m) + scene.distances_m[k] * direction
-        room.add_source(place, signal=sound)
-    centred = np.asarray(microphones, dtype=np.float64)
-    room.add_microphone_array((centred + np.array(scene.centre_m)).T)
-    room.simulate()
-    heard = np.asarray(room.mic_array.signals)[:, :samples]
-    noise = heard.std() * 10.0 ** (-scene.snr_db / 20.0)
+    centre = np.array(scene.centre_m)
+    for distance, direction in zip(scene.distances_m, _directions(scene), strict=True):
+        room.add_source(centre + distance * direction)
+    room.add_microphone_array((np.asarray(microphones, dtype=np.float64) + centre).T)
+    room.compute_rir()
+    length = max(len(response) for row in room.rir for response in row)
+    responses = np.zeros((len(scene.distances_m), len(room.rir), length))
+    for n, row in enumerate(room.rir):
+        for k, response in enumerate(row):
+            responses[k, n, : len(response)] = response
+    return responses
+
+
+def heard_from(
+    responses: NDArray[np.float64], sound: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """What an array hears of a sound from one place.
+
+    Args:
+        responses: (n, taps) of that place.
+        sound: (samples,).
+
+    Returns:
+        (n, samples).
+    """
+    heard = oaconvolve(sound[np.newaxis], responses, axes=1)
+    return np.asarray(heard[:, : sound.size])
+
+
+def with_noise(
+    heard: NDArray[np.float64], snr_db: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """With white noise in each channel, scaled to be recorded.
+
+    Args:
+        heard: (n, samples).
+        snr_db: Of all channels over the noise, dB.
+        rng: Draws the noise.
+
+    Returns:
+        (n, samples), full scale 1.
+    """
+    noise = heard.std() * 10.0 ** (-snr_db / 20.0)
     heard = heard + noise * rng.standard_normal(heard.shape)
     return np.asarray(0.5 * heard / np.abs(heard).max())
 

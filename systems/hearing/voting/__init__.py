@@ -8,6 +8,7 @@ from systems.hearing.voting.direction_votes import (
     join_votes,
 )
 from systems.hearing.voting.listening_plan import vote_plan
+from systems.hearing.voting.steady_sound import is_steady, steered_only
 from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
 
 __all__ = [
@@ -17,6 +18,8 @@ __all__ = [
     "VotedSource",
     "cast_votes",
     "gather_sources",
+    "is_steady",
     "join_votes",
+    "steered_only",
     "vote_plan",
 ]

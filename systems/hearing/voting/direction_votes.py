@@ -51,6 +51,9 @@ _WEAKEST, _FOLLOW = 0.3, 0.1
 # that decays so far in a second, as in a room of T60 1 s.
 _RISE, _DECAY_DB_S = 1.6, 62.5
 
+# Frequencies whose levels are kept.
+_LEVELS = 24
+
 # A band that ends below this holds too little of speech.
 _LEAST_HIGHEST_HZ = 1_000.0
 
@@ -58,7 +61,7 @@ _SPEEDS_M_S = (100.0, 2_000.0)
 
 
 class DirectionVotes(NamedTuple):
-    """Votes in order of time, and how loud it was."""
+    """Votes in order of time, and levels over time."""
 
     t_s: NDArray[np.float64]
     """(k,) middle of the frames, s from the first sample."""
@@ -72,8 +75,9 @@ class DirectionVotes(NamedTuple):
     """(k,) whether it is a vote of the steered response, not of a single bin."""
     group_t_s: NDArray[np.float64]
     """(g,) middles of all groups of frames, s."""
-    group_power: NDArray[np.float64]
-    """(g,) of all channels within the band, unit of the samples squared."""
+    group_levels_db: NDArray[np.float64]
+    """(g, 24) power of all channels at some frequencies of the band, dB over the
+    unit of the samples."""
 
 
 class VoteMemory(NamedTuple):
@@ -226,8 +230,7 @@ def cast_votes(
     votes = join_votes(cast)
     tail = samples[:, groups * plan.hop :]
     after = VoteMemory(tail, memory.groups + groups, level, echo)
-    power = searched.sum(axis=1, dtype=np.float64)
-    return votes._replace(group_t_s=t_s, group_power=power), after
+    return votes._replace(group_t_s=t_s, group_levels_db=_levels_db(powers)), after
 
 
 def join_votes(parts: list[DirectionVotes]) -> DirectionVotes:
@@ -290,7 +293,29 @@ def _checked(
 
 def _no_votes() -> DirectionVotes:
     none = np.empty(0)
-    return DirectionVotes(none, none, none, none, np.empty(0, dtype=bool), none, none)
+    return _cast(none, none, none, none, steered=False)
+
+
+def _cast(
+    t_s: NDArray[np.float64],
+    azimuth: NDArray[np.float64],
+    elevation: NDArray[np.float64],
+    weight: NDArray[np.float64],
+    *,
+    steered: bool,
+) -> DirectionVotes:
+    """Votes of one kind, without the groups."""
+    kind = np.full(len(t_s), steered)
+    levels = np.empty((0, _LEVELS))
+    return DirectionVotes(t_s, azimuth, elevation, weight, kind, np.empty(0), levels)
+
+
+def _levels_db(powers: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(g, 24) levels of single bins, as many in each octave."""
+    last = powers.shape[1] - 1
+    kept = np.rint(np.geomspace(1.0, last + 1.0, _LEVELS)).astype(int) - 1
+    chosen = powers[:, kept].astype(np.float64)
+    return np.asarray(10.0 * np.log10(np.maximum(chosen, 1e-30)))
 
 
 def _louder(
@@ -341,11 +366,7 @@ def _steered_votes(
     if not found:
         return _no_votes()
     azimuth, elevation, weight = (np.concatenate(e) for e in zip(*found, strict=True))
-    steered = np.ones(len(azimuth), dtype=bool)
-    none = np.empty(0)
-    return DirectionVotes(
-        np.concatenate(times), azimuth, elevation, weight, steered, none, none
-    )
+    return _cast(np.concatenate(times), azimuth, elevation, weight, steered=True)
 
 
 def _bin_votes(
@@ -358,14 +379,10 @@ def _bin_votes(
     group, bins, pattern = find_rank_one(spectra, loud, plan.least_ratio)
     frequency = plan.frequencies_hz[bins]
     fits = plan.plane.fit(pattern, frequency)
-    steered = np.zeros(len(fits.azimuth), dtype=bool)
-    none = np.empty(0)
-    return DirectionVotes(
+    return _cast(
         t_s[group[fits.fits]],
         fits.azimuth,
         fits.elevation,
         frequency[fits.fits],
-        steered,
-        none,
-        none,
+        steered=False,
     )

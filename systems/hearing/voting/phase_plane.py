@@ -24,6 +24,13 @@ _LARGEST, _LEAST_LEVEL = 1.08, 0.35
 # An array in space measures all of the slowness, which sound has.
 _LEAST_IN_SPACE = 0.85
 
+# Beyond where phases of the shortest pairs wrap, all pairs together still tell where a
+# wave is from, up to this many times that frequency; but for directions that differ by
+# more than so much of the slowness and fit nearly as well: a mean cosine of the phases.
+_BEYOND, _APART, _ALMOST = 1.3, 0.6, 0.2
+# Guesses are so near to each other, in phase along the array, rad.
+_GUESS_STEP_RAD = 1.0
+
 # Largest phase by which pairs may be off the plane wave, RMS over all pairs, rad.
 _LARGEST_RESIDUAL_RAD = 0.6
 
@@ -51,8 +58,10 @@ class PhasePlane:
     """Speed of sound, m/s."""
     short: NDArray[np.int64]
     """(s,) which of ``shape.pairs`` they are."""
-    highest_hz: float
+    wraps_hz: float
     """Where sound along the longest of them turns by half a period, Hz."""
+    guesses: NDArray[np.float64]
+    """(g, r) directions, along ``shape.span``, to begin with above that."""
     to_slowness: NDArray[np.float64]
     """(r, s) along ``shape.span``, from the paths between short pairs."""
     refine: NDArray[np.float64]
@@ -80,15 +89,22 @@ class PhasePlane:
             rank = len(shape.span)
             if len(short) >= rank and extent[rank - 1] >= _LEAST_SPAN * extent[0]:
                 break
+        wraps_hz = 0.5 * c / float(shape.distances_m[short].max())
         return cls(
             shape=shape,
             c=c,
             short=short,
-            highest_hz=0.5 * c / float(shape.distances_m[short].max()),
+            wraps_hz=wraps_hz,
+            guesses=_guesses(shape, c / (_BEYOND * wraps_hz)),
             to_slowness=np.linalg.pinv(paths[short]),
             refine=np.linalg.pinv(paths),
             paths=paths,
         )
+
+    @property
+    def highest_hz(self) -> float:
+        """Up to which waves can be fitted, Hz."""
+        return _BEYOND * self.wraps_hz
 
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
@@ -97,7 +113,7 @@ class PhasePlane:
 
         Args:
             pattern: (k, n) what the channels have in common, up to any factor.
-            frequency_hz: (k,) Hz, below ``highest_hz``.
+            frequency_hz: (k,) Hz, up to ``highest_hz``.
 
         Returns:
             Those that a plane wave fits.
@@ -106,6 +122,11 @@ class PhasePlane:
         phase = np.angle(pattern[:, j] * pattern[:, i].conj())
         number = (2.0 * np.pi / self.c * frequency_hz)[:, np.newaxis]
         slowness = phase[:, self.short] @ self.to_slowness.T / number
+        wrapped = frequency_hz > self.wraps_hz
+        clear = np.ones(len(phase), dtype=bool)
+        slowness[wrapped], clear[wrapped] = self._guessed(
+            phase[wrapped], number[wrapped, 0]
+        )
         # The long pairs' phases are taken as near as they can be to the short ones'.
         left = _wrapped(phase - number * (slowness @ self.paths.T))
         turn = left @ self.refine.T / number
@@ -114,7 +135,7 @@ class PhasePlane:
         residual = np.sqrt(np.mean(left**2, axis=1))
         u, length = self._directions(slowness)
         level = np.hypot(u[:, 0], u[:, 1])
-        fits = residual < _LARGEST_RESIDUAL_RAD
+        fits = clear & (residual < _LARGEST_RESIDUAL_RAD)
         fits &= (length <= _LARGEST) & (level >= _LEAST_LEVEL)
         if self.shape.ahead is None and self.shape.dimension == 3:
             fits &= length >= _LEAST_IN_SPACE
@@ -123,6 +144,26 @@ class PhasePlane:
         if "elevation" in self.shape.angles:
             elevation = np.arctan2(u[:, 2], np.hypot(u[:, 0], u[:, 1]))
         return PlaneFits(np.arctan2(u[:, 1], u[:, 0]), elevation, fits)
+
+    def _guessed(
+        self, phase: NDArray[np.float64], number: NDArray[np.float64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        """(k, r) guesses that fit best, and (k,) where no other fits nearly as well."""
+        slowness = np.empty((len(phase), self.guesses.shape[1]))
+        clear = np.empty(len(phase), dtype=bool)
+        apart = np.linalg.norm(self.guesses[:, np.newaxis] - self.guesses, axis=2)
+        apart = apart > _APART
+        paths = self.paths @ self.guesses.T
+        for wave_number in np.unique(number):
+            mine = np.flatnonzero(number == wave_number)
+            waves = np.exp(-1j * wave_number * paths)
+            cosine = (np.exp(1j * phase[mine]) @ waves).real / len(paths)
+            best = cosine.argmax(axis=1)
+            highest = cosine[np.arange(len(mine)), best]
+            others = np.where(apart[best], cosine, -1.0).max(axis=1)
+            slowness[mine] = self.guesses[best]
+            clear[mine] = others < highest - _ALMOST
+        return slowness, clear
 
     def _directions(
         self, slowness: NDArray[np.float64]
@@ -138,6 +179,17 @@ class PhasePlane:
             off = np.sqrt(np.maximum(0.0, 1.0 - np.minimum(length, 1.0) ** 2))
             u += off[:, np.newaxis] * self.shape.ahead
         return u, length
+
+
+def _guesses(shape: ArrayShape, wavelength_m: float) -> NDArray[np.float64]:
+    """(g, r) slownesses side by side, all that sound from afar may have."""
+    step = _GUESS_STEP_RAD * wavelength_m / (2.0 * np.pi * shape.aperture_m)
+    count = int(np.ceil(2.0 / step)) + 1
+    axes = [np.linspace(-1.0, 1.0, count)] * len(shape.span)
+    grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes))
+    length = np.linalg.norm(grid, axis=1)
+    least = 0.0 if shape.ahead is not None or shape.dimension < 3 else 1.0 - step
+    return np.asarray(grid[(length <= 1.0) & (length >= least)])
 
 
 def _wrapped(phase: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -48,7 +48,9 @@ class TrackParameters(Parameters):
     """That a source which sounds is detected in a step."""
     false_detections: Positive = 0.05
     """Mean number in a step, anywhere around the circle."""
-    resolution_deg: float = Field(default=14.0, gt=0.0, le=90.0)
+    smear_s: Positive = 0.15
+    """Detections of a source that moves scatter by what it moves in so long, s."""
+    resolution_deg: float = Field(default=20.0, gt=0.0, le=90.0)
     """Sources nearer than this may be one detection, deg."""
     begins_after_s: Positive = 0.25
     """A track is told after so long, s."""
@@ -151,14 +153,17 @@ def step_tracks(
     if elapsed < 0.0:
         raise ValueError(f"t_s: {t_s:g} s is before the last step, {memory.t_s:g} s")
     tracks = [_predicted(track, elapsed, parameters) for track in memory.tracks]
-    chosen, shared = _assigned(tracks, detections, parameters)
+    chosen = _assigned(tracks, detections, parameters)
+    hidden = _hidden(tracks, detections, chosen, parameters)
     moved = [
-        _missed(track, parameters)
+        replace(track, t_shared=t_s)
+        if i in hidden
+        else replace(track, t_shared=t_s, t_heard=t_s)
+        if i in hidden.values()
+        else _missed(track, parameters)
         if k is None
-        else replace(track, t_shared=t_s)
-        if k in shared
         else _heard(track, detections[k], t_s, parameters)
-        for track, k in zip(tracks, chosen, strict=True)
+        for i, (track, k) in enumerate(zip(tracks, chosen, strict=True))
     ]
     taken = {k for k in chosen if k is not None}
     new = [
@@ -205,15 +210,15 @@ def _assigned(
     tracks: Sequence[SourceTrack],
     detections: Sequence[Detection],
     p: TrackParameters,
-) -> tuple[list[int | None], set[int]]:
-    """The detection of each track, and those that serve more than one."""
+) -> list[int | None]:
+    """The detection of each track."""
     chosen: list[int | None] = [None] * len(tracks)
     if not tracks or not detections:
-        return chosen, set()
+        return chosen
     cost = np.empty((len(tracks), len(detections)))
     for i, track in enumerate(tracks):
         for k, d in enumerate(detections):
-            variance = track.covariance[0, 0] + d.bearing_std**2
+            variance = float(track.covariance[0, 0]) + _scatter(track, d, p)
             off = _wrapped(d.bearing - track.bearing)
             # Tracks that were told come first: what is new must not take theirs.
             late = 0.0 if track.identity else 4.0
@@ -224,32 +229,37 @@ def _assigned(
     for i, k in zip(*linear_sum_assignment(finite), strict=True):
         if np.isfinite(cost[i, k]):
             chosen[i] = int(k)
-    return _merged(tracks, detections, chosen, p)
+    return chosen
 
 
-def _merged(
+def _hidden(
     tracks: Sequence[SourceTrack],
     detections: Sequence[Detection],
     chosen: list[int | None],
     p: TrackParameters,
-) -> tuple[list[int | None], set[int]]:
-    """Tracks without a detection share that of one which is near them both."""
+) -> dict[int, int]:
+    """Tracks without a detection that is near them and another one, by that one's."""
     resolution = math.radians(p.resolution_deg)
-    shared = set()
+    hidden: dict[int, int] = {}
     for i, track in enumerate(tracks):
         if chosen[i] is not None or not track.identity:
             continue
         for j, other in enumerate(tracks):
             k = chosen[j]
-            if k is None or not other.identity or j == i:
+            if k is None or not other.identity:
                 continue
             apart = abs(_wrapped(track.bearing - other.bearing))
             off = abs(_wrapped(detections[k].bearing - track.bearing))
             if apart < resolution and off < resolution:
-                chosen[i] = k
-                shared.add(k)
+                hidden[i] = j
                 break
-    return chosen, shared
+    return hidden
+
+
+def _scatter(track: SourceTrack, detection: Detection, p: TrackParameters) -> float:
+    """Variance of a detection about its track, rad^2."""
+    rate_squared = track.rate**2 + float(track.covariance[1, 1])
+    return detection.bearing_std**2 + p.smear_s**2 * rate_squared
 
 
 def _heard(
@@ -259,7 +269,7 @@ def _heard(
     p: TrackParameters,
 ) -> SourceTrack:
     """With its detection."""
-    of_detection = detection.bearing_std**2
+    of_detection = _scatter(track, detection, p)
     C = track.covariance
     variance = float(C[0, 0]) + of_detection
     off = _wrapped(detection.bearing - track.bearing)
@@ -319,12 +329,12 @@ def _is_told(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
 
 
 def _over(track: SourceTrack, t_s: float, p: TrackParameters) -> bool:
-    """What is not told yet has no right to pause."""
+    """What is not told yet may not pause, and what is hidden not for ever."""
     silence = t_s - track.t_heard
     if track.identity == 0:
         return silence > p.begins_after_s
-    hidden = t_s - track.t_shared < p.begins_after_s
-    return silence > (p.hidden_s if hidden else p.ends_after_s)
+    since_hidden = t_s - max(track.t_heard, track.t_shared)
+    return since_hidden > p.ends_after_s or silence > p.hidden_s
 
 
 def _single(tracks: list[SourceTrack], p: TrackParameters) -> list[SourceTrack]:

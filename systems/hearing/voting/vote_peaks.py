@@ -1,6 +1,8 @@
 """Sources at the peaks of a histogram of directions.
 
 A vote counts by its frequency: phases tell directions the better, the higher it is.
+Where both single bins and the steered response vote, sources are at the peaks of a
+geometric mean of their densities: echoes mislead each of them elsewhere.
 """
 
 from __future__ import annotations
@@ -22,10 +24,17 @@ _KERNEL_RAD = math.radians(4.5)
 
 # Of a peak, as a share of the highest one, and above the higher of the valleys beside
 # it, as a share of its own height.
-_LEAST_HEIGHT, _LEAST_PROMINENCE = 0.08, 0.12
+_LEAST_HEIGHT, _LEAST_PROMINENCE = 0.22, 0.12
+
+# Exponent of the single bins' density in the mean, and what either one has everywhere,
+# as a share of all: a source that one of them hardly hears is not lost.
+_OF_BINS, _ANYWHERE = 0.6, 0.1
 
 # Single bins that vote for a source, within this of its peak.
 _LEAST_VOTES, _NEAR_RAD = 15.0, math.radians(12.0)
+
+# Of bins near a peak that the steered response shows as well so much less will do.
+_AGREED = 0.5
 
 # Fewer steered votes than this in all are chance.
 _LEAST_STEERED = 3
@@ -60,7 +69,8 @@ def gather_sources(
 ) -> list[VotedSource]:
     """The sources of a span of time.
 
-    Single bins decide where enough of them vote, and the steered response where not.
+    Single bins and the steered response decide together where enough bins vote, and
+    the steered response alone where not.
 
     Args:
         votes: Of that time.
@@ -79,6 +89,10 @@ def gather_sources(
     if azimuth.size < least:
         return []
     density, centres = _density(azimuth, weight)
+    if enough and np.count_nonzero(votes.steered) >= _LEAST_STEERED:
+        other, _ = _density(votes.azimuth[votes.steered], votes.weight[votes.steered])
+        density = density**_OF_BINS * other ** (1.0 - _OF_BINS)
+        least *= _AGREED
     found = []
     peaks = _peaks(density)
     if not peaks.size:
@@ -98,13 +112,14 @@ def gather_sources(
 def _density(
     azimuth: NDArray[np.float64], weight: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """(c,) density of the votes around the circle, and the cells' bearings."""
+    """(c,) density of the votes in the cells of the circle, and their bearings."""
     cells = np.floor((azimuth + math.pi) / (2.0 * math.pi) * _CELLS).astype(int)
     histogram = np.bincount(cells % _CELLS, weight, _CELLS)
     centres = -math.pi + (np.arange(_CELLS) + 0.5) * 2.0 * math.pi / _CELLS
     kernel = np.exp((np.cos(centres - centres[0]) - 1.0) / _KERNEL_RAD**2)
     smooth = np.fft.irfft(np.fft.rfft(histogram) * np.fft.rfft(kernel), _CELLS)
-    return np.maximum(smooth, 0.0), centres
+    density = np.maximum(smooth, 0.0) / smooth.sum()
+    return density + _ANYWHERE / _CELLS, centres
 
 
 def _peaks(density: NDArray[np.float64]) -> NDArray[np.int64]:

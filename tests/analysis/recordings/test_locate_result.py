@@ -8,6 +8,7 @@ import math
 import numpy as np
 import pytest
 
+from analysis.recordings.heard_sources import HeardSource, HeardSources
 from analysis.recordings.locate_plots import plot_locate, write_locate
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
 from analysis.recordings.locate_text import locate_text
@@ -133,3 +134,52 @@ def test_picture_and_files(tmp_path):
     assert {p.name for p in tmp_path.iterdir()} == {"locate.json", "locate.png"}
     document = json.loads((tmp_path / "locate.json").read_text())
     assert document["summary"]["elevation_deg"] == pytest.approx(20.0)
+
+
+def talkers(*bearings, steady=False):
+    """Sources at some bearings that are heard alike."""
+    share = 1.0 / len(bearings)
+    return HeardSources(
+        [HeardSource(b, 1.0, None, share, 1.0) for b in bearings], [], steady
+    )
+
+
+def test_the_summary_is_of_one_of_the_sources_where_none_has_most_estimates():
+    bearings = [-90.0, -88.0, 0.0, 1.0, -1.0, 90.0, 91.0]
+    estimates = [estimate(0.1 * k, b) for k, b in enumerate(bearings)]
+    heard = talkers(-89.0, 0.0, 90.0)
+    found = LocateResult({}, ArrayShape.of(SQUARE), estimates, 20, heard=heard)
+    assert found.summary()["bearing_deg"] == pytest.approx(0.0, abs=1.0)
+    assert found.summary()["frames_of_main_source"] == 3
+    assert found.summary()["number_of_sources"] == 3
+    text = locate_text(found)
+    assert "3 sources" in text
+    assert text.count("% of what is heard") == 3
+
+
+def test_estimates_that_no_source_is_near_are_summed_up_as_before():
+    estimates = [estimate(0.1 * k, 10.0) for k in range(4)]
+    heard = talkers(100.0, -100.0)
+    found = LocateResult({}, ArrayShape.of(SQUARE), estimates, 20, heard=heard)
+    assert found.summary()["bearing_deg"] == pytest.approx(10.0)
+
+
+def test_the_number_of_sources_of_a_steady_sound_is_not_told():
+    estimates = [estimate(0.1 * k, 10.0) for k in range(4)]
+    heard = talkers(10.0, steady=True)
+    found = LocateResult({}, ArrayShape.of(SQUARE), estimates, 20, heard=heard)
+    assert found.summary()["number_of_sources"] is None
+    assert "steady: one source, or several, is not told" in locate_text(found)
+
+
+@pytest.mark.parametrize(
+    ("bearings", "middle"),
+    [((170.0, -170.0), 180.0), ((80.0, -80.0, 0.0), 0.0), ((90.0, 180.0), 135.0)],
+)
+def test_several_sources_are_drawn_without_a_cut_between_them(bearings, middle):
+    estimates = [estimate(0.1 * k, b) for k, b in enumerate(bearings)]
+    heard = talkers(*bearings)
+    found = LocateResult({}, ArrayShape.of(SQUARE), estimates, 20, heard=heard)
+    low, high = plot_locate(found).axes[0].get_ylim()
+    half = max(abs((b - middle + 180.0) % 360.0 - 180.0) for b in bearings)
+    assert high - low < 2.0 * half + 20.0

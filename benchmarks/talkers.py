@@ -1,0 +1,488 @@
+"""``python -m benchmarks.talkers``: several talkers at once, still and walking.
+
+Recordings of simulated rooms through what ``phonotaxis locate`` does, number of
+sources unknown: recall and false sources, single talkers, steady noises, talkers who
+cross, begin and end of tracks, and pyroomacoustics' searches beside ours. With
+``--voices`` the talkers say what is in the mono WAV files of a folder; with
+``--recordings`` real recordings of one source by a square of four microphones are
+located and mixed. Each row names its bound; those missed are listed at the end.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+import time
+from collections.abc import Callable, Iterable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.recordings.heard_sources import HeardSources, heard_sources, vote_plan
+from analysis.reporting.markdown import markdown_head, markdown_row
+from analysis.talkers import (
+    TALKER_ARRAYS,
+    draw_talkers,
+    heard_from,
+    impulse_responses,
+    score_bearings,
+    speech_like,
+    with_noise,
+)
+from benchmarks.figures import Figure
+from benchmarks.talker_peers import (
+    OPEN_PEERS,
+    PEERS,
+    by_file,
+    by_file_unknown,
+    by_votes,
+)
+from benchmarks.talker_rooms import (
+    RATE,
+    Recording,
+    Voices,
+    Walk,
+    crossings,
+    mixtures,
+    noises,
+    talkers,
+    voices_of,
+)
+from systems.hearing.voting.source_listener import (
+    ListenerMemory,
+    ListenerParameters,
+    TrackedSources,
+    hear_sources,
+)
+from systems.sound.array_shape import ArrayShape
+
+C = 343.0
+BAND_HZ = (300.0, 0.45 * RATE)
+SQUARE = "square, 4.6 cm"
+RECORDED_SQUARE_M = 0.02285 * np.array(
+    [[1.0, 1.0, 0.0], [-1.0, 1.0, 0.0], [-1.0, -1.0, 0.0], [1.0, -1.0, 0.0]]
+)
+RECORDED_DEG = 180.0
+
+#: Separation in deg, T60 in s, and the least recall.
+CELLS = (
+    (20.0, 0.0, 0.9),
+    (30.0, 0.3, 0.9),
+    (30.0, 0.6, 0.75),
+    (45.0, 0.3, 0.95),
+    (45.0, 0.6, 0.95),
+)
+MOST_FALSE, LEAST_SINGLE, LEAST_KEPT, LEAST_SURE = 0.1, 0.99, 0.8, 0.9
+
+Namer = Callable[[Recording], list[float]]
+
+
+class Tally:
+    """What was found of some recordings."""
+
+    def __init__(self) -> None:
+        self.recordings = self.found = self.talkers = self.false = self.exact = 0
+        self.errors: list[float] = []
+
+    def add(self, named_deg: list[float], true_deg: list[float]) -> None:
+        """One more recording."""
+        score = score_bearings(named_deg, true_deg)
+        self.recordings += 1
+        self.found += score.found
+        self.talkers += score.talkers
+        self.false += score.false
+        self.exact += score.found == score.talkers and score.false == 0
+        self.errors += score.errors_deg
+
+    @property
+    def recall(self) -> float:
+        """Share of the talkers that were named within 10 deg."""
+        return self.found / self.talkers
+
+    @property
+    def false_each(self) -> float:
+        """False sources a recording."""
+        return self.false / self.recordings
+
+    @property
+    def rms_deg(self) -> float:
+        """Of the errors of those found, deg."""
+        return math.sqrt(np.mean(np.square(self.errors))) if self.errors else math.nan
+
+
+def heard(channels: NDArray[np.float32], places: NDArray[np.float64]) -> HeardSources:
+    """As ``phonotaxis locate`` hears a recording."""
+    equal = channels - channels.mean(axis=1, keepdims=True)
+    equal = equal / equal.std(axis=1, keepdims=True)
+    return heard_sources(equal, ArrayShape.of(places), C, float(RATE), BAND_HZ)
+
+
+def tally(recordings: Iterable[Recording], name: Namer) -> Tally:
+    """What a method finds."""
+    counts = Tally()
+    for recording in recordings:
+        counts.add(name(recording), recording.bearings_deg)
+    return counts
+
+
+def product(places: NDArray[np.float64], sure: list[tuple[float, bool]]) -> Namer:
+    """Ours; each source's confidence and whether it is true goes into ``sure``."""
+
+    def name(recording: Recording) -> list[float]:
+        sources = heard(recording.channels, places).sources
+        for source in sources:
+            score = score_bearings([source.bearing_deg], recording.bearings_deg)
+            sure.append((source.confidence, score.found == 1))
+        return [source.bearing_deg for source in sources]
+
+    return name
+
+
+def talkers_table(
+    arrays: list[str], draws: int, seed: int, voices: Voices
+) -> list[Figure]:
+    """Two and three talkers, and single ones."""
+    print(
+        markdown_head(
+            (
+                "array",
+                "talkers",
+                "apart",
+                "T60",
+                "recordings",
+                "recall",
+                "asked",
+                "false each",
+                "all found, none false",
+                "rms error",
+            )
+        )
+    )
+    figures, sure = [], []
+    for array in arrays:
+        places = TALKER_ARRAYS[array]
+        share = draws if array == SQUARE else max(1, draws // 3)
+        name = product(places, sure)
+        for apart, t60, asked in CELLS:
+            for count in (2, 3):
+                rooms = talkers(array, count, apart, t60, share, seed, voices)
+                counts = tally(rooms, name)
+                cell = f"{array}, {count} at {apart:g} deg, T60 {t60:g} s"
+                figures += [
+                    Figure(f"{cell}: recall", counts.recall, ">=", asked),
+                    Figure(f"{cell}: false", counts.false_each, "<=", MOST_FALSE),
+                ]
+                _print_counts(array, str(count), f"{apart:g} deg", t60, counts, asked)
+        for t60 in (0.3, 0.6, 1.2):
+            many = 3 * share if t60 == 1.2 else share
+            counts = tally(talkers(array, 1, 0.0, t60, many, seed, voices), name)
+            exact = counts.exact / counts.recordings
+            cell = f"{array}, single, T60 {t60:g} s: exactly one"
+            figures.append(Figure(cell, exact, ">=", LEAST_SINGLE))
+            _print_counts(array, "1", "-", t60, counts, LEAST_SINGLE)
+    figures += _confidence_table(sure)
+    return figures
+
+
+def _print_counts(
+    array: str, count: str, apart: str, t60: float, counts: Tally, asked: float
+) -> None:
+    row = (
+        array,
+        count,
+        apart,
+        f"{t60:g} s",
+        str(counts.recordings),
+        f"{counts.recall:.3f}",
+        f"{asked:g}",
+        f"{counts.false_each:.3f}",
+        f"{counts.exact / counts.recordings:.3f}",
+        f"{counts.rms_deg:.1f} deg",
+    )
+    print(markdown_row(row), flush=True)
+
+
+def _confidence_table(sure: list[tuple[float, bool]]) -> list[Figure]:
+    """How many sources of a confidence are true."""
+    print()
+    print(markdown_head(("confidence", "sources", "true")))
+    figures = []
+    for low, high in ((0.0, 0.5), (0.5, 0.7), (0.7, 0.9), (0.9, 1.01)):
+        true = [is_true for confidence, is_true in sure if low <= confidence < high]
+        if not true:
+            continue
+        share = float(np.mean(true))
+        row = (f"{low:g} to {min(high, 1.0):g}", str(len(true)), f"{share:.3f}")
+        print(markdown_row(row))
+        if low == LEAST_SURE:
+            figures.append(Figure("true of those above 0.9", share, ">=", LEAST_SURE))
+    return figures
+
+
+def noises_table(draws: int, seed: int) -> list[Figure]:
+    """Stationary noises: their number is not told, nor is it for one."""
+    print()
+    print(
+        markdown_head(
+            (
+                "array",
+                "steady noises",
+                "T60",
+                "recordings",
+                "number not told",
+                "main source is one of them",
+                "largest confidence",
+            )
+        )
+    )
+    figures = []
+    for array, places in TALKER_ARRAYS.items():
+        for count in (1, 2):
+            for t60 in (0.0, 0.3, 0.6):
+                steady, right, confidence = [], [], [0.0]
+                for recording in noises(array, count, t60, draws, seed):
+                    told = heard(recording.channels, places)
+                    named = [source.bearing_deg for source in told.sources]
+                    score = score_bearings(named, recording.bearings_deg)
+                    steady.append(told.steady)
+                    right.append(score.found == 1 and score.false == 0)
+                    confidence += [source.confidence for source in told.sources]
+                row = (
+                    array,
+                    str(count),
+                    f"{t60:g} s",
+                    str(len(steady)),
+                    f"{np.mean(steady):.3f}",
+                    f"{np.mean(right):.3f}",
+                    f"{max(confidence):.2f}",
+                )
+                print(markdown_row(row), flush=True)
+                cell = f"{array}, {count} noises, T60 {t60:g} s"
+                figures.append(Figure(cell, float(np.mean(steady)), ">=", 0.99))
+    return figures
+
+
+def crossings_table(draws: int, seed: int) -> list[Figure]:
+    """Talkers who walk past each other, and tracks that begin and end."""
+    print()
+    print(markdown_head(("two who cross", "T60", "recordings", "identities kept")))
+    figures = []
+    for speeds in ((20.0, 0.0), (10.0, -10.0), (20.0, -20.0)):
+        for t60 in (0.0, 0.3):
+            seconds = 240.0 / (abs(speeds[0]) + abs(speeds[1]) + 20.0)
+            walks = crossings(SQUARE, speeds, t60, draws, seed, seconds)
+            kept = [_keeps(_steps(walk.channels), walk) for walk in walks]
+            share = float(np.mean(kept))
+            cell = f"{speeds[0]:g} and {speeds[1]:g} deg/s"
+            row = (cell, f"{t60:g} s", str(len(kept)), f"{share:.3f}")
+            print(markdown_row(row), flush=True)
+            figures.append(Figure(f"{cell}, T60 {t60:g} s", share, ">=", LEAST_KEPT))
+    return figures + _begins_and_ends(draws, seed)
+
+
+def _steps(channels: NDArray[np.float32]) -> list[TrackedSources]:
+    """As ``phonotaxis listen`` hears them, in blocks of 20 ms."""
+    plan = vote_plan(ArrayShape.of(TALKER_ARRAYS[SQUARE]), C, float(RATE), BAND_HZ)
+    memory, steps = ListenerMemory.blank(plan), []
+    size = round(0.02 * RATE)
+    for first in range(0, channels.shape[1], size):
+        block = channels[:, first : first + size]
+        told, memory = hear_sources(block, memory, plan, ListenerParameters())
+        steps += told
+    return steps
+
+
+def _keeps(steps: list[TrackedSources], walk: Walk) -> bool:
+    """Whether each talker has one identity before and after, and not the other's.
+
+    They are compared in the second before they are 20 deg apart, and in the one that
+    begins 0.2 s after they are so again.
+    """
+    near = np.flatnonzero(np.abs(np.diff(walk.bearings_deg, axis=0)[0]) < 20.0) / RATE
+    before = _identities(steps, walk, near[0] - 1.0, near[0])
+    after = _identities(steps, walk, near[-1] + 0.2, near[-1] + 1.2)
+    return None not in before and before == after and before[0] != before[1]
+
+
+def _identities(
+    steps: list[TrackedSources], walk: Walk, begin: float, end: float
+) -> list[int | None]:
+    """The track that is within 12 deg of each talker most of a time."""
+    late = 0.5 * ListenerParameters().window_s
+    found: list[int | None] = []
+    for way in walk.bearings_deg:
+        near = [
+            track.identity
+            for step in steps
+            if begin <= step.t_s - late < end
+            for track in step.tracks
+            if abs(
+                _wrapped_deg(
+                    math.degrees(track.bearing) - way[round((step.t_s - late) * RATE)]
+                )
+            )
+            < 12.0
+        ]
+        found.append(max(set(near), key=near.count) if near else None)
+    return found
+
+
+def _wrapped_deg(angle: float) -> float:
+    return 180.0 - (180.0 - angle) % 360.0
+
+
+def _begins_and_ends(draws: int, seed: int) -> list[Figure]:
+    """Silence, a talker for 3 s, and silence again."""
+    print()
+    print(
+        markdown_head(
+            ("T60", "recordings", "begins within 0.5 s", "ends within 2 s", "one track")
+        )
+    )
+    figures = []
+    rng = np.random.default_rng(seed)
+    for t60 in (0.0, 0.3, 0.6):
+        begins, ends, single = [], [], []
+        scene = draw_talkers(rng, 24, 15.0, t60_s=t60)
+        responses = impulse_responses(scene, TALKER_ARRAYS[SQUARE])
+        for _ in range(draws):
+            speech = speech_like(rng, 3.0, RATE)
+            speech = speech[np.flatnonzero(np.abs(speech) > 0.05)[0] :]
+            sound = np.zeros(7 * RATE)
+            sound[RATE : RATE + speech.size] = speech
+            channels = heard_from(responses[rng.integers(24)], sound)
+            steps = _steps(with_noise(channels, 20.0, rng).astype(np.float32))
+            told = [step.t_s for step in steps if step.tracks]
+            begins.append(bool(told) and told[0] <= 1.5 + 1e-9)
+            ends.append(bool(told) and told[-1] <= 1.0 + speech.size / RATE + 2.0)
+            single.append(len({t.identity for s in steps for t in s.tracks}) == 1)
+        shares = [float(np.mean(each)) for each in (begins, ends, single)]
+        row = (f"{t60:g} s", str(draws), *(f"{share:.3f}" for share in shares))
+        print(markdown_row(row), flush=True)
+        figures += [
+            Figure(f"begins within 0.5 s, T60 {t60:g} s", shares[0], ">=", 0.9),
+            Figure(f"ends within 2 s, T60 {t60:g} s", shares[1], ">=", 0.99),
+        ]
+    return figures
+
+
+def recordings_table(folder: Path) -> list[Figure]:
+    """Real recordings, alone and mixed."""
+    print()
+    print(
+        markdown_head(
+            ("recordings", "number", "recall", "false each", "all found, none false")
+        )
+    )
+    figures = []
+    for turns in ((0,), (0, 1), (0, 2), (0, 1, 2), (0, 1, 3)):
+        counts = tally(
+            mixtures(folder, turns, RECORDED_DEG), product(RECORDED_SQUARE_M, [])
+        )
+        title = " + ".join(f"{90 * turn} deg" for turn in turns)
+        row = (
+            title,
+            str(counts.recordings),
+            f"{counts.recall:.3f}",
+            f"{counts.false_each:.3f}",
+            f"{counts.exact / counts.recordings:.3f}",
+        )
+        print(markdown_row(row), flush=True)
+        figures += [
+            Figure(f"recorded, {title}: recall", counts.recall, ">=", 0.95),
+            Figure(f"recorded, {title}: false", counts.false_each, "<=", MOST_FALSE),
+        ]
+    return figures
+
+
+def peers_table(draws: int, seed: int, folder: Path | None) -> None:
+    """Ours and pyroomacoustics' on the same recordings."""
+    cells = {
+        f"{count} at {apart:g}, T60 {t60:g}": list(
+            talkers(SQUARE, count, apart, t60, draws, seed)
+        )
+        for count, apart, t60 in (
+            (1, 0.0, 0.6),
+            (2, 30.0, 0.3),
+            (2, 45.0, 0.6),
+            (3, 45.0, 0.6),
+        )
+    }
+    places = dict.fromkeys(cells, TALKER_ARRAYS[SQUARE])
+    if folder is not None:
+        for title, turns in (("2 recorded", (0, 1)), ("3 recorded", (0, 1, 2))):
+            cells[title] = list(mixtures(folder, turns, RECORDED_DEG))
+            places[title] = RECORDED_SQUARE_M
+    print()
+    print("recall / false sources a recording\n")
+    print(markdown_head(("method", *cells, "s a recording")))
+    methods: list[tuple[str, Callable[[NDArray[np.float64]], Namer]]] = [
+        ("ours, number unknown", lambda at: product(at, []))
+    ]
+    for peer in PEERS:
+        methods += [
+            (f"{peer}, file, number told", partial(by_file, peer)),
+            (f"{peer}, vote of blocks", partial(by_votes, peer)),
+        ]
+    methods += [
+        (f"{peer}, file, peaks", partial(by_file_unknown, peer)) for peer in OPEN_PEERS
+    ]
+    for title, method in methods:
+        begin, row = time.perf_counter(), [title]
+        for cell, recordings in cells.items():
+            counts = tally(recordings, method(places[cell]))
+            row.append(f"{counts.recall:.2f} / {counts.false_each:.2f}")
+        number = sum(len(recordings) for recordings in cells.values())
+        row.append(f"{(time.perf_counter() - begin) / number:.2f}")
+        print(markdown_row(row), flush=True)
+
+
+def main() -> int:
+    """Prints the tables and what is missed; exit status 1 if anything is."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--draws", type=int, default=100, help="recordings a row (100)")
+    parser.add_argument("--seed", type=int, default=1, help="of all that is drawn (1)")
+    parser.add_argument("--voices", type=Path, help="folder of mono WAV files")
+    parser.add_argument("--recordings", type=Path, help="folder of recordings")
+    parser.add_argument("--array", choices=TALKER_ARRAYS, help="talkers of one alone")
+    parser.add_argument(
+        "--only", choices=("talkers", "noises", "crossings", "recordings", "peers")
+    )
+    options = parser.parse_args()
+    draws, seed = options.draws, options.seed
+    if draws < 4:
+        parser.error("--draws must be at least 4")
+    part = options.only
+    figures: list[Figure] = []
+    if part in (None, "talkers"):
+        arrays = [options.array] if options.array else list(TALKER_ARRAYS)
+        figures += talkers_table(arrays, draws, seed, voices_of(options.voices))
+    if part in (None, "noises"):
+        figures += noises_table(draws // 4, seed)
+    if part in (None, "crossings"):
+        figures += crossings_table(draws // 4, seed)
+    if part in (None, "recordings") and options.recordings:
+        figures += recordings_table(options.recordings)
+    if part in (None, "peers"):
+        peers_table(max(4, draws // 8), seed, options.recordings)
+    print()
+    missed = [
+        figure
+        for figure in figures
+        if not (
+            figure.value >= figure.bound
+            if figure.sense == ">="
+            else figure.value <= figure.bound
+        )
+    ]
+    print(f"{len(figures) - len(missed)} of {len(figures)} figures reach their bounds")
+    for name, value, sense, bound in missed:
+        print(f"MISSED {name}: {value:.3f}, asked {sense} {bound:g}")
+    return int(bool(missed))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
