@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,12 +21,20 @@ from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
 from analysis.recordings.recording_faults import channels_without_faults
 from analysis.recordings.recording_search import RecordingSearch, Sighting
 from analysis.recordings.recording_spectra import RecordingSpectra
-from analysis.recordings.source_placement import place_source
+from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
 from systems.sound.sound_file import read_sound
 
-__all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
+__all__ = [
+    "ArrayGeometry",
+    "HeardRecording",
+    "LocateResult",
+    "SourceEstimate",
+    "hear",
+    "load_geometry",
+    "locate",
+]
 
 _RATES_HZ = (8_000, 192_000)
 
@@ -48,6 +57,18 @@ _SLACK = 4.0
 _EXPLAINS_LATENESS = ("size", "near")
 
 
+class HeardRecording(NamedTuple):
+    """What was heard in a recording, stretch by stretch."""
+
+    recording: RecordingSpectra
+    search: RecordingSearch
+    sightings: list[Sighting]
+    """Delays of the stretches in which one place stands out."""
+    estimates: list[SourceEstimate]
+    """Their places, where the delays belong to one."""
+    faults: list[ChannelFault]
+
+
 def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
     """Locates the source of a recording, stretch by stretch.
 
@@ -65,25 +86,9 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     """
     geometry = geometry or ROBOT_ARRAY
     samples, rate = read_sound(path, "recording")
-    where = repr(str(path))
-    complaint = _complaint(samples, rate, geometry)
-    if complaint:
-        raise InputError("recording", f"{where} {complaint}")
-    known = geometry.known
+    heard = hear(samples, rate, geometry, repr(str(path)))
+    known, recording, search = geometry.known, heard.recording, heard.search
     shape = known.shape
-    whole = geometry.columns == tuple(range(len(samples)))
-    channels = samples if whole else samples[list(geometry.columns)]
-    recording, faults = _recording(channels, rate, known, geometry.band, where)
-    if not recording.starts.size:
-        raise InputError(
-            "recording",
-            f"{where} has {samples.shape[1]} samples, less than one frame of "
-            f"{recording.window.size}; record longer",
-        )
-    search, sightings, estimates = _estimates(recording, known)
-    late = late_channel(sightings, known)
-    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
-        faults.append(late)
     array = {
         "microphones": [list(place) for place in geometry.microphones],
         "channels": list(geometry.columns),
@@ -107,8 +112,52 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         (recording.low_hz, recording.high_hz),
     )
     return LocateResult(
-        array, shape, estimates, len(search.stretches), faults, sources, tracks
+        array,
+        shape,
+        heard.estimates,
+        len(search.stretches),
+        heard.faults,
+        sources,
+        tracks,
+        known.largest_range_error,
     )
+
+
+def hear(
+    samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, name: str
+) -> HeardRecording:
+    """Locates the source of a recording in memory.
+
+    Args:
+        samples: (channels, samples).
+        rate: Of the samples, Hz.
+        geometry: The microphones.
+        name: Of the recording, for messages.
+
+    Returns:
+        Delays and places of its stretches.
+
+    Raises:
+        InputError: The recording cannot be used; says why, and the remedy.
+    """
+    complaint = _complaint(samples, rate, geometry)
+    if complaint:
+        raise InputError("recording", f"{name} {complaint}")
+    known = geometry.known
+    whole = geometry.columns == tuple(range(len(samples)))
+    channels = samples if whole else samples[list(geometry.columns)]
+    recording, faults = _recording(channels, rate, known, geometry.band, name)
+    if not recording.starts.size:
+        raise InputError(
+            "recording",
+            f"{name} has {samples.shape[1]} samples, less than one frame of "
+            f"{recording.window.size}; record longer",
+        )
+    search, sightings, estimates = _estimates(recording, known)
+    late = late_channel(sightings, known)
+    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        faults.append(late)
+    return HeardRecording(recording, search, sightings, estimates, faults)
 
 
 def _recording(
@@ -184,7 +233,7 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
         array.c,
         snapshots,
         slack_s=_SLACK * array.budget.position_std / array.c,
-        has_place=lambda delays: place_source(delays, array) is not None,
+        has_place=lambda delays: has_place(delays, array),
     )
     sightings = list(search.sightings())
     placed = ((s.t_s, place_source(s, array)) for s in sightings)

@@ -106,6 +106,8 @@ class LocateResult:
     """All that were heard over the recording, the one that is heard most first."""
     tracks: list[FollowedSource] = field(default_factory=list)
     """The same over time, in order of their begin."""
+    largest_range_error: float = 0.2
+    """Ranges are given up to this standard deviation over range."""
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.
@@ -124,6 +126,8 @@ class LocateResult:
         # A range that few frames give is no property of the recording.
         enough = 2 * len(ranges) >= len(main)
         range_m, range_std = _median(ranges if enough else [])
+        if (range_std or 0.0) > self.largest_range_error * (range_m or 0.0):
+            range_m = range_std = None
         told = {"bearing": bearing, "elevation": elevation, "range": range_m}
         return {
             "bearing_deg": bearing,
@@ -137,7 +141,7 @@ class LocateResult:
             "range_m": range_m,
             "range_std_m": range_std,
             "range_systematic_m": _usual(
-                [e.range_systematic_m for e in main] if enough else []
+                [] if range_m is None else [e.range_systematic_m for e in main]
             ),
             "observable": [name for name, value in told.items() if value is not None],
             "ambiguity": self.shape.ambiguity,
