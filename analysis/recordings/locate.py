@@ -50,6 +50,10 @@ _TOP_OF_RATE = 0.45
 _SNAPSHOTS = (8, 32, 128)
 _LEAST_ESTIMATES = 3
 
+# Where channels agree by less than this part of what they do in another window, it
+# holds more echoes than sound.
+_CLEAR = 0.5
+
 # Microphones may stand so many deviations farther apart than it is stated.
 _SLACK = 4.0
 
@@ -208,7 +212,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         for after_s in AFTER_S
     ]
     if sounds[0].are_most:
-        return min((_heard(s, array, snapshots=1) for s in sounds), key=_uncertainty)
+        return _clearest([_heard(s, array, snapshots=1) for s in sounds])
     best = None
     for snapshots in _SNAPSHOTS:
         heard = _heard(recording, array, snapshots)
@@ -220,10 +224,16 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     return best
 
 
-def _uncertainty(heard: _Heard) -> tuple[int, float]:
-    """What is worse the less is heard, and then the less well its delays are known."""
-    variances = [np.trace(sighting.covariance) for sighting in heard[1]]
-    return -len(variances), float(np.median(variances)) if variances else np.inf
+def _clearest(heard: list[_Heard]) -> _Heard:
+    """Of clear windows that hear most sounds, the one whose delays are known best."""
+    most = max(len(sightings) for _, sightings, _ in heard)
+    full = [each for each in heard if len(each[1]) == most]
+    if not most:
+        return full[0]
+    agreement = [np.median([s.agreement for s in each[1]]) for each in full]
+    variance = [np.median([np.trace(s.covariance) for s in each[1]]) for each in full]
+    clear = np.array(agreement) > _CLEAR * max(agreement)
+    return full[int(np.argmin(np.where(clear, variance, np.inf)))]
 
 
 def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _Heard:

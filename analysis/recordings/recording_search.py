@@ -275,6 +275,6 @@ def _earlier(one: AlignedDelays, other: AlignedDelays) -> bool:
     for common in later:
         off = later - common
         alike = np.abs(off) < _ALIKE_S
-        if 2 * alike.sum() >= off.size:
+        if 2 * alike.sum() > off.size:
             return bool(np.all(off[~alike] > _EARLIER_S) and not alike.all())
     return False
