@@ -17,7 +17,7 @@ from analysis.recordings.aligned_delays import AlignedDelays
 from analysis.recordings.array_geometry import KnownArray
 from systems.hearing.far_field import locate_far_source
 from systems.hearing.multilateration import angles_of, locate_source
-from systems.hearing.range_posterior import range_posterior
+from systems.hearing.range_posterior import FARTHEST_M, range_posterior
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
@@ -35,6 +35,9 @@ _CURVED = 1.0
 
 # Ranges with errors beyond so many times the largest are not looked at more closely.
 _HOPELESS = 2.0
+
+# Sources may be beyond the farthest range, unless nearer by so many deviations.
+_CERTAINLY = 2.0
 
 # What the budget makes of delays depends on the place, and hardly so.
 _ROUNDS = 2
@@ -102,7 +105,11 @@ def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
         and near.chi_square < far.chi_square - _CURVED
     ):
         ranged = _marginal(near, tau, own, array)
-        told = ranged.range_std <= array.largest_range_error * ranged.range
+        farthest = ranged.range + _CERTAINLY * ranged.range_std
+        told = (
+            ranged.range_std <= array.largest_range_error * ranged.range
+            and farthest < FARTHEST_M
+        )
         near = ranged if told else near
         systematic = _of_budget(near, own + allowed, allowed, shape, c)
         if not told:
