@@ -215,9 +215,8 @@ def _strangers(
     measured: PairCorrelations, use: NDArray[np.int64]
 ) -> list[ChannelFault]:
     """Channels that share nothing with the others, which share a sound."""
-    height = np.maximum(measured.pooled_highest, -measured.pooled_lowest)
     table = np.zeros((use.size, use.size))
-    table[tuple(measured.pairs.T)] = height / measured.noise
+    table[tuple(measured.pairs.T)] = measured.shared
     best = (table + table.T).max(axis=0)
     if use.size < 3 or best.max() < _COHERENT:
         return []

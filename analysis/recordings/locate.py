@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,12 +23,20 @@ from analysis.recordings.onset_spectra import AFTER_S, OnsetSpectra
 from analysis.recordings.recording_faults import channels_without_faults
 from analysis.recordings.recording_search import RecordingSearch, Sighting
 from analysis.recordings.recording_spectra import RecordingSpectra
-from analysis.recordings.source_placement import place_source
+from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
 from systems.sound.sound_file import read_sound
 
-__all__ = ["ArrayGeometry", "LocateResult", "SourceEstimate", "load_geometry", "locate"]
+__all__ = [
+    "ArrayGeometry",
+    "HeardRecording",
+    "LocateResult",
+    "SourceEstimate",
+    "hear",
+    "load_geometry",
+    "locate",
+]
 
 # Where a geometry names no band.
 _BAND_HZ = (300.0, 15_000.0)
@@ -41,11 +50,27 @@ _TOP_OF_RATE = 0.45
 _SNAPSHOTS = (8, 32, 128)
 _LEAST_ESTIMATES = 3
 
+# Where channels agree by less than this part of what they do in another window, it
+# holds more echoes than sound.
+_CLEAR = 0.5
+
 # Microphones may stand so many deviations farther apart than it is stated.
 _SLACK = 4.0
 
 # Faults that make channels seem late.
 _EXPLAINS_LATENESS = ("size", "near")
+
+
+class HeardRecording(NamedTuple):
+    """What was heard in a recording, stretch by stretch."""
+
+    recording: RecordingSpectra
+    search: RecordingSearch
+    sightings: list[Sighting]
+    """Delays of the stretches in which one place stands out."""
+    estimates: list[SourceEstimate]
+    """Their places, where the delays belong to one."""
+    faults: list[ChannelFault]
 
 
 def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
@@ -65,25 +90,9 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     """
     geometry = geometry or ROBOT_ARRAY
     samples, rate = read_sound(path, "recording")
-    where = repr(str(path))
-    complaint = array_mismatch(geometry, len(samples), rate)
-    if complaint:
-        raise InputError("recording", f"{where} {complaint}")
-    known = geometry.known
+    heard = hear(samples, rate, geometry, repr(str(path)))
+    known, recording, search = geometry.known, heard.recording, heard.search
     shape = known.shape
-    whole = geometry.columns == tuple(range(len(samples)))
-    channels = samples if whole else samples[list(geometry.columns)]
-    recording, faults = _recording(channels, rate, known, geometry.band, where)
-    if not recording.starts.size:
-        raise InputError(
-            "recording",
-            f"{where} has {samples.shape[1]} samples, less than one frame of "
-            f"{recording.window.size}; record longer",
-        )
-    search, sightings, estimates = _estimates(recording, known)
-    late = late_channel(sightings, known)
-    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
-        faults.append(late)
     array = {
         "microphones": [list(place) for place in geometry.microphones],
         "channels": list(geometry.columns),
@@ -99,14 +108,59 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
-    heard = heard_sources(
+    sources = heard_sources(
         recording.channels,
         shape,
         known.c,
         float(rate),
         (recording.low_hz, recording.high_hz),
     )
-    return LocateResult(array, shape, estimates, len(search.stretches), faults, heard)
+    return LocateResult(
+        array,
+        shape,
+        heard.estimates,
+        len(search.stretches),
+        heard.faults,
+        sources,
+        known.largest_range_error,
+    )
+
+
+def hear(
+    samples: NDArray[np.float64], rate: int, geometry: ArrayGeometry, name: str
+) -> HeardRecording:
+    """Locates the source of a recording in memory.
+
+    Args:
+        samples: (channels, samples).
+        rate: Of the samples, Hz.
+        geometry: The microphones.
+        name: Of the recording, for messages.
+
+    Returns:
+        Delays and places of its stretches.
+
+    Raises:
+        InputError: The recording cannot be used; says why, and the remedy.
+    """
+    complaint = array_mismatch(geometry, len(samples), rate)
+    if complaint:
+        raise InputError("recording", f"{name} {complaint}")
+    known = geometry.known
+    whole = geometry.columns == tuple(range(len(samples)))
+    channels = samples if whole else samples[list(geometry.columns)]
+    recording, faults = _recording(channels, rate, known, geometry.band, name)
+    if not recording.starts.size:
+        raise InputError(
+            "recording",
+            f"{name} has {samples.shape[1]} samples, less than one frame of "
+            f"{recording.window.size}; record longer",
+        )
+    search, sightings, estimates = _estimates(recording, known)
+    late = late_channel(sightings, known)
+    if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
+        faults.append(late)
+    return HeardRecording(recording, search, sightings, estimates, faults)
 
 
 def _recording(
@@ -163,7 +217,7 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
         for after_s in AFTER_S
     ]
     if sounds[0].are_most:
-        return min((_heard(s, array, snapshots=1) for s in sounds), key=_uncertainty)
+        return _clearest([_heard(s, array, snapshots=1) for s in sounds])
     best = None
     for snapshots in _SNAPSHOTS:
         heard = _heard(recording, array, snapshots)
@@ -175,10 +229,16 @@ def _estimates(recording: RecordingSpectra, array: KnownArray) -> _Heard:
     return best
 
 
-def _uncertainty(heard: _Heard) -> tuple[int, float]:
-    """What is worse the less is heard, and then the less well its delays are known."""
-    variances = [np.trace(sighting.covariance) for sighting in heard[1]]
-    return -len(variances), float(np.median(variances)) if variances else np.inf
+def _clearest(heard: list[_Heard]) -> _Heard:
+    """Of clear windows that hear most sounds, the one whose delays are known best."""
+    most = max(len(sightings) for _, sightings, _ in heard)
+    full = [each for each in heard if len(each[1]) == most]
+    if not most:
+        return full[0]
+    agreement = [np.median([s.agreement for s in each[1]]) for each in full]
+    variance = [np.median([np.trace(s.covariance) for s in each[1]]) for each in full]
+    clear = np.array(agreement) > _CLEAR * max(agreement)
+    return full[int(np.argmin(np.where(clear, variance, np.inf)))]
 
 
 def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _Heard:
@@ -188,7 +248,7 @@ def _heard(recording: RecordingSpectra, array: KnownArray, snapshots: int) -> _H
         array.c,
         snapshots,
         slack_s=_SLACK * array.budget.position_std / array.c,
-        has_place=lambda delays: place_source(delays, array) is not None,
+        has_place=lambda delays: has_place(delays, array),
     )
     sightings = list(search.sightings())
     placed = ((s.t_s, place_source(s, array)) for s in sightings)

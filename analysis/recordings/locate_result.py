@@ -104,6 +104,8 @@ class LocateResult:
     """Channels that are not as they should be."""
     heard: HeardSources = field(default_factory=HeardSources)
     """All sources over the recording, and their tracks."""
+    largest_range_error: float = 0.2
+    """Ranges are given up to this standard deviation over range."""
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.
@@ -123,6 +125,8 @@ class LocateResult:
         # A range that few frames give is no property of the recording.
         enough = 2 * len(ranges) >= len(main)
         range_m, range_std = _median(ranges if enough else [])
+        if (range_std or 0.0) > self.largest_range_error * (range_m or 0.0):
+            range_m = range_std = None
         told = {"bearing": bearing, "elevation": elevation, "range": range_m}
         return {
             "bearing_deg": bearing,
@@ -136,7 +140,7 @@ class LocateResult:
             "range_m": range_m,
             "range_std_m": range_std,
             "range_systematic_m": _usual(
-                [e.range_systematic_m for e in main] if enough else []
+                [] if range_m is None else [e.range_systematic_m for e in main]
             ),
             "number_of_sources": self.number_of_sources,
             "observable": [name for name, value in told.items() if value is not None],

@@ -40,7 +40,8 @@ def _direction(result: LocateResult) -> list[str]:
     if summary["bearing_deg"] is not None:
         parts.append(
             f"bearing {summary['bearing_deg']:.2f} deg "
-            f"(std {summary['bearing_std_deg']:.2f})"
+            f"(std {summary['bearing_std_deg']:.2f}, of which "
+            f"{summary['bearing_systematic_deg']:.2f} by errors of array and air)"
         )
     if summary["elevation_deg"] is not None:
         parts.append(
@@ -64,7 +65,10 @@ def _range(result: LocateResult) -> str:
     if summary["range_m"] is None:
         size = 100.0 * result.shape.aperture_m
         return f"range not observable (microphones within {size:.1f} cm)"
-    return f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f})"
+    return (
+        f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f}, of which "
+        f"{summary['range_systematic_m']:.3f} by errors of array and air, alike in all)"
+    )
 
 
 def _sources(result: LocateResult) -> list[str]:

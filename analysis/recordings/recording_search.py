@@ -35,11 +35,13 @@ _LEAST_DIRECT = 0.1
 # To choose among the peaks of a stretch its neighbours help: how many on either
 # side, and by which share.
 _NEIGHBOURS, _HELP = 4, 0.5
-# Places that are looked at more closely for a sound that stands alone. Sound that has
-# come straight is the earlier, though it may agree a little less: delays are alike
-# within the one time, and earlier beyond the other, s.
-_CANDIDATES = 8
-_DIRECT, _ALIKE_S, _EARLIER_S = 0.75, 1e-4, 4e-4
+# Sets of lags that are looked at more closely for a sound that stands alone, or where
+# microphones may be off by more than this share of the shortest period. Those that
+# agree less than the best one by this factor are side lobes, or of echoes alone.
+_CANDIDATES, _MISPLACED, _LEAST_AGREEMENT = 8, 0.5, 0.75
+# Sound that has come straight is the earlier, though it may agree a little less: delays
+# are alike within the one time, and earlier beyond the other, s.
+_ALIKE_S, _EARLIER_S = 1e-4, 4e-4
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,7 @@ class RecordingSearch:
     slack_s: float = 0.0
     """By how much delays may be longer than the stated places allow, s."""
     has_place: Callable[[AlignedDelays], bool] = field(default=lambda _: True)
-    """Whether delays belong to some place; asked where there is a choice."""
+    """Whether delays are of some place; asked where there is a choice."""
 
     @cached_property
     def stretches(self) -> list[slice]:
@@ -187,12 +189,13 @@ class RecordingSearch:
     ) -> Sighting | None:
         if weight < _LEAST_WEIGHT:
             return None
-        if self.snapshots == 1:
-            fit = self._consistent(response, stretch)
-        else:
-            best = int(np.argmax(response + _HELP * near))
-            heard = response[best] >= self._threshold(best, stretch)
-            fit = self._delays(best, stretch) if heard else None
+        single = self.snapshots == 1
+        best = int(np.argmax(response if single else response + _HELP * near))
+        if response[best] < self._threshold(best, stretch):
+            return None
+        misplaced = self.slack_s * self.recording.high_hz > _MISPLACED
+        look = self._consistent if single or misplaced else self._delays
+        fit = look(best, stretch)
         if fit is None:
             return None
         recording = self.recording
@@ -200,18 +203,14 @@ class RecordingSearch:
         ends = float(first + last + recording.window.size)
         return Sighting(**vars(fit), t_s=ends / (2.0 * recording.sample_rate_hz))
 
-    def _consistent(
-        self, response: NDArray[np.float32], stretch: slice
-    ) -> AlignedDelays | None:
-        """The delays on which all channels agree best, of a sound that stands out.
+    def _consistent(self, place: int, stretch: slice) -> AlignedDelays | None:
+        """The delays on which all channels agree best, of those that have a place.
 
         In a short window an echo at one microphone may pass for the sound: a wrong
-        place then has the greatest response of a coarse grid, though most pairs
-        alone agree on it.
+        place of the grid then has the greatest response, though most pairs alone agree
+        on it. Where microphones stand elsewhere than stated, no place of the grid may
+        be near enough to find the peak and not its side lobe.
         """
-        best = int(np.argmax(response))
-        if response[best] < self._threshold(best, stretch):
-            return None
         weight = float(self.recording.weights[stretch].sum())
         rate = self._length / self._window_s
         slack = math.ceil(self.slack_s * rate)
@@ -222,16 +221,20 @@ class RecordingSearch:
             reach + slack,
             _CANDIDATES,
         )
-        found = [self._delays_at(lags / rate, stretch) for lags in sets]
-        found.append(self._delays(best, stretch))
-        heard = [fit for fit in found if fit is not None and self.has_place(fit)]
-        heard.sort(key=lambda fit: -fit.agreement)
-        best_fit = heard[0] if heard else None
-        for fit in heard[1:]:
-            assert best_fit is not None
-            if fit.agreement > _DIRECT * heard[0].agreement and _earlier(fit, best_fit):
-                best_fit = fit
-        return best_fit
+        tried = [self._delays_at(lags / rate, stretch) for lags in sets]
+        tried.append(self._delays(place, stretch))
+        found = sorted((fit for fit in tried if fit), key=lambda fit: -fit.agreement)
+        heard = [
+            fit
+            for fit in found
+            if fit.agreement > _LEAST_AGREEMENT * found[0].agreement
+            and self.has_place(fit)
+        ]
+        best = heard[0] if heard else None
+        for fit in heard[1:] if self.snapshots == 1 else ():
+            if best is not None and _earlier(fit, best):
+                best = fit
+        return best
 
     def _threshold(self, place: int, stretch: slice) -> float:
         # Windows that overlap by half, with the shape used, are worth half as
@@ -272,6 +275,6 @@ def _earlier(one: AlignedDelays, other: AlignedDelays) -> bool:
     for common in later:
         off = later - common
         alike = np.abs(off) < _ALIKE_S
-        if 2 * alike.sum() >= off.size:
+        if 2 * alike.sum() > off.size:
             return bool(np.all(off[~alike] > _EARLIER_S) and not alike.all())
     return False

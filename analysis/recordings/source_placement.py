@@ -17,12 +17,12 @@ from analysis.recordings.aligned_delays import AlignedDelays
 from analysis.recordings.array_geometry import KnownArray
 from systems.hearing.far_field import locate_far_source
 from systems.hearing.multilateration import angles_of, locate_source
-from systems.hearing.range_posterior import range_posterior
+from systems.hearing.range_posterior import FARTHEST_M, range_posterior
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["PlacedSource", "inverse_range_std", "place_source", "tolerance"]
+__all__ = ["PlacedSource", "has_place", "place_source", "tolerance"]
 
 # Reflections move each channel by its own, for each part that is not coherent by
 # this share of what sound takes along the array, or of the time within which an
@@ -35,6 +35,9 @@ _CURVED = 1.0
 
 # Ranges with errors beyond so many times the largest are not looked at more closely.
 _HOPELESS = 2.0
+
+# Sources may be beyond the farthest range, unless nearer by so many deviations.
+_CERTAINLY = 2.0
 
 # What the budget makes of delays depends on the place, and hardly so.
 _ROUNDS = 2
@@ -73,9 +76,22 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
         of it that the array names. None where no place fits the delays, or where
         the budget supports no bearing.
     """
+    placed = _placed(delays, array)
+    # An upright row has no bearing at all, and tells the elevation.
+    if placed and _LARGEST_STD_RAD < placed.fix.bearing_std < math.inf:
+        return None
+    return placed
+
+
+def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
+    """Whether some place fits the delays, be its bearing ever so uncertain."""
+    return _placed(delays, array) is not None
+
+
+def _placed(delays: AlignedDelays, array: KnownArray) -> PlacedSource | None:
     tau, shape, c = delays.tau, array.shape, array.c
     own = delays.covariance + _reflections(delays, array)
-    bent = inverse_range_std(shape)
+    bent = _inverse_range_std(shape)
     lying = shape.dimension == 2 and shape.kind == "plane"
     u = _direction(tau, own, array)
     far = locate_far_source(
@@ -89,12 +105,16 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
         and near.chi_square < far.chi_square - _CURVED
     ):
         ranged = _marginal(near, tau, own, array)
-        told = ranged.range_std <= array.largest_range_error * ranged.range
+        farthest = ranged.range + _CERTAINLY * ranged.range_std
+        told = (
+            ranged.range_std <= array.largest_range_error * ranged.range
+            and farthest < FARTHEST_M
+        )
         near = ranged if told else near
         systematic = _of_budget(near, own + allowed, allowed, shape, c)
         if not told:
             near, systematic = near.without_range(), systematic.without_range()
-        return _told(near, systematic)
+        return PlacedSource(near, systematic)
     allowed = _budget(u, 0.0, array)
     if lying:
         # A source above the plane has shorter delays than any within it.
@@ -104,14 +124,8 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
     if lying:
         far, systematic = _level(far), _level(systematic)
     freedom = shape.freedom + (0 if lying else 1)
-    return _told(far, systematic) if far.chi_square < _limit(freedom) else None
-
-
-def _told(fix: SourceFix, systematic: SourceFix) -> PlacedSource | None:
-    # An upright row has no bearing at all, and tells the elevation.
-    if _LARGEST_STD_RAD < fix.bearing_std < math.inf:
-        return None
-    return PlacedSource(fix, systematic)
+    fits = far.chi_square < _limit(freedom)
+    return PlacedSource(far, systematic) if fits else None
 
 
 def _direction(
@@ -230,7 +244,7 @@ def tolerance(delays: AlignedDelays, array: KnownArray) -> NDArray[np.float64]:
     return reflected + _budget(u, 0.0, array)
 
 
-def inverse_range_std(shape: ArrayShape) -> float:
+def _inverse_range_std(shape: ArrayShape) -> float:
     """Of a source that was not heard yet, 1/m."""
     return min(_INVERSE_RANGE, _APERTURES / shape.aperture_m)
 

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.recording_search import Sighting
-from analysis.recordings.source_placement import inverse_range_std, tolerance
-from systems.hearing.far_field import locate_far_source
-from systems.hearing.multilateration import whitening_matrix
+from analysis.recordings.source_placement import tolerance
+from systems.hearing.multilateration import locate_source, whitening_matrix
+from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
 __all__ = ["Lateness", "channel_lateness", "late_channel"]
@@ -37,6 +37,9 @@ _TO_STANDARD = 1.4826
 _LEAST_INFORMATION = 1.0
 
 _STEPS = 6
+
+# Of the inverse range before anything is heard, 1/m: large arrays hear near sources.
+_INVERSE_RANGE = 1.0
 
 # A lateness counts beyond so many deviations of what the tolerances of one stretch
 # allow: those are alike in all of them, and do not average out.
@@ -131,14 +134,14 @@ def _of_stretch(
         (n,) latenesses, s; (n,) their information, 1/s^2; (n,) the part of their
         variances that is alike in all stretches, s^2; and the whole misfit.
     """
-    bent = inverse_range_std(shape)
     c = array.c
     allowed = tolerance(sighting, array)
-    far = locate_far_source(
-        sighting.tau, sighting.covariance, shape, c, allowed, inverse_range_std=bent
-    )
-    root = whitening_matrix(sighting.covariance + allowed)
-    residual, slopes = _fit(sighting.tau, root, far.p_AS, bent, shape, c)
+    whole = sighting.covariance + allowed
+    start = locate_source(sighting.tau, whole, shape, c)
+    w = 1.0 / start.range if start.range_valid else 0.0
+    u = start.p_AS / np.linalg.norm(start.p_AS)
+    root = whitening_matrix(whole)
+    residual, slopes = _fit(sighting.tau, root, u, w, shape, c)
     # What a place may explain is taken out of the misfit and of each lateness.
     late = np.vstack((-np.ones(shape.count - 1), np.eye(shape.count - 1))).T
     sides = np.vstack((root @ late, np.zeros((1, shape.count))))
@@ -160,29 +163,28 @@ def _fit(
     tau: NDArray[np.float64],
     root: NDArray[np.float64],
     u: NDArray[np.float64],
-    bent: float,
+    w: float,
     shape: ArrayShape,
     c: float,
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Whitened residual of the best place and its slopes, with a row for the range."""
-    w = 0.0
     for k in range(_STEPS + 1):
         delays, along_u, along_w = _wave_front(u, w, shape.p_AM, c)
         basis = np.linalg.svd(u[np.newaxis])[2][1:].T
         slopes = np.vstack(
             (
                 np.column_stack((root @ along_u @ basis, root @ along_w)),
-                [0.0] * basis.shape[1] + [1.0 / bent],
+                [0.0] * basis.shape[1] + [1.0 / _INVERSE_RANGE],
             )
         )
-        residual = np.append(root @ (tau - delays), -w / bent)
+        residual = np.append(root @ (tau - delays), -w / _INVERSE_RANGE)
         if k == _STEPS:
             break
         step = np.linalg.lstsq(slopes, residual, rcond=1e-9)[0]
         step *= min(1.0, 0.5 / max(float(np.abs(step[:-1]).max()), 1e-12))
         u = u + basis @ step[:-1]
         u /= np.linalg.norm(u)
-        w = min(max(w + float(step[-1]), 0.0), 1.0 / shape.aperture_m)
+        w = min(max(w + float(step[-1]), 0.0), 1.0 / NEAREST_M)
     return residual, slopes
 
 

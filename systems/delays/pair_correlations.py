@@ -16,6 +16,9 @@ __all__ = ["PairCorrelations", "correlate_pairs"]
 # Loudest frames that are looked at; they lie anywhere in the recording.
 _FRAMES = 64
 
+# Where sounds are short, these hold them and the others little but their echoes.
+_LOUDEST = 16
+
 # A frame lasts at least this, and many times what sound needs to cross the array.
 _FRAME_S = 0.05
 _CROSSINGS = 12
@@ -41,6 +44,9 @@ class PairCorrelations:
     """(p,) largest value of the correlation's mean over the frames."""
     pooled_lowest: NDArray[np.float64]
     """(p,) its smallest value."""
+    shared: NDArray[np.float64]
+    """(p,) largest size of the mean over all frames, or over the loudest of them,
+    against what independent noise has."""
     levels: NDArray[np.float64]
     """(f, n) RMS of the channels within the band."""
     level: NDArray[np.float64]
@@ -81,9 +87,10 @@ def correlate_pairs(
     mean = energy.mean(axis=1, keepdims=True)
     loudness = np.mean(energy / np.maximum(mean, 1e-300), axis=0)
     chosen = np.sort(np.argsort(-loudness)[:_FRAMES])
+    loudest = np.argsort(-loudness[chosen])[:_LOUDEST]
     window = np.hanning(length)
-    loudest = np.array([channel[chosen] for channel in cut])
-    spectra = fft.rfft(loudest * window, 2 * length)
+    frames_of = np.array([channel[chosen] for channel in cut])
+    spectra = fft.rfft(frames_of * window, 2 * length)
     f = fft.rfftfreq(2 * length, 1.0 / sample_rate_hz)
     outside = (f < band_hz[0]) | (f > band_hz[1])
     spectra[:, :, outside] = 0.0
@@ -95,15 +102,24 @@ def correlate_pairs(
     values = [_correlation(spectra[i], spectra[j], gate) for i, j in pairs]
     extremes = [_extremes(v, gate) for v in values]
     at_highest, at_lowest = np.stack(extremes, axis=2)
+    one = math.sqrt(math.log(2.0 * gate + 1.0) / bins)
+    shared = [
+        max(
+            np.abs(v[k].mean(axis=0)).max() * math.sqrt(len(v[k])) / one
+            for k in (slice(None), loudest)
+        )
+        for v in values
+    ]
     return PairCorrelations(
         pairs=pairs,
         lag_of_highest=at_highest,
         lag_of_lowest=at_lowest,
         pooled_highest=np.array([v.mean(axis=0).max() for v in values]),
         pooled_lowest=np.array([v.mean(axis=0).min() for v in values]),
+        shared=np.array(shared),
         levels=np.sqrt(power / length).T,
         level=np.sqrt(power.mean(axis=1) / length),
-        noise=math.sqrt(math.log(2.0 * gate + 1.0) / bins / chosen.size),
+        noise=one / math.sqrt(chosen.size),
     )
 
 

@@ -19,11 +19,13 @@ from numpy.typing import NDArray
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["RangePosterior", "range_posterior"]
+__all__ = ["FARTHEST_M", "RangePosterior", "range_posterior"]
 
-# Ranges beyond the farthest are told by no array, m; so many of them, evenly by their
-# logarithm, and about the likeliest place, by deviations of the inverse range.
-_FARTHEST_M = 30.0
+#: Ranges beyond are told by no array, m.
+FARTHEST_M = 30.0
+
+# So many ranges, evenly by their logarithm, and about the likeliest place, by
+# deviations of the inverse range.
 _RANGES = 48
 _ABOUT = np.linspace(-5.0, 5.0, 31)
 
@@ -102,8 +104,8 @@ def range_posterior(
         budget.delay_std,
         c,
     )
-    ranges = np.geomspace(_FARTHEST_M, nearest_m, _RANGES)
-    close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / _FARTHEST_M, 1.0 / nearest_m)
+    ranges = np.geomspace(FARTHEST_M, nearest_m, _RANGES)
+    close = 1.0 / np.clip(w + w_std * _ABOUT, 1.0 / FARTHEST_M, 1.0 / nearest_m)
     ranges = np.unique(np.concatenate((ranges, close)))[::-1].copy()
     likelihood = _log_likelihood(kernel, frame.T @ u, ranges)
     density = np.exp(likelihood - likelihood.max())

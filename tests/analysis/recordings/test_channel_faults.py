@@ -67,6 +67,20 @@ def test_nothing_is_wrong_with_a_sound_recording(shape, distance, snr_db):
         assert faults(samples, shape) == []
 
 
+def test_short_sounds_between_long_echoes_are_shared():
+    """Between six of 5 ms channels have nothing in common, and one is fainter."""
+    rng = np.random.default_rng(1)
+    count, length = round(SECONDS * FS), round(0.005 * FS)
+    samples = 0.01 * rng.standard_normal((4, count))
+    samples[3] *= 2.0
+    for begin in np.arange(0.2, 3.0, 0.5):
+        k = round(begin * FS)
+        samples[:, k : k + length] += rng.standard_normal(length)
+    assert faults(samples, SQUARE) == []
+    samples[2] = 0.01 * rng.standard_normal(count)
+    assert ("dead", (2,)) in faults(samples, SQUARE)
+
+
 def test_silence_noise_and_tones_are_no_faults():
     generator = np.random.default_rng(1)
     noise = 1e-3 * generator.standard_normal((5, 2 * FS))

@@ -108,6 +108,24 @@ def test_range_of_few_estimates_is_none():
     assert result(ROW, most).summary()["observable"] == ["bearing", "range"]
 
 
+def test_range_that_scatters_by_more_than_is_allowed_is_none():
+    """Each is stated to 0.1 m, but they are off by 0.7 m from their median."""
+    ranges = [1.3, 2.0, 2.7, 1.3, 2.0, 2.7, 1.3, 2.7]
+    far = [estimate(k, 10.0, range_m=r) for k, r in enumerate(ranges)]
+    found = result(ROW, far).summary()
+    assert (found["range_m"], found["range_std_m"], found["range_systematic_m"]) == (
+        None,
+        None,
+        None,
+    )
+    assert found["observable"] == ["bearing"]
+    near = [estimate(k, 10.0, range_m=2.0 + 0.1 * r) for k, r in enumerate(ranges)]
+    assert result(ROW, near).summary()["range_systematic_m"] == 0.05
+    assert "(std 0.104, of which 0.050 by errors of array and air" in locate_text(
+        result(ROW, near)
+    )
+
+
 def test_nothing_heard():
     silent = result(SQUARE, [])
     assert silent.summary()["bearing_deg"] is None

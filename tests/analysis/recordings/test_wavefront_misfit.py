@@ -117,6 +117,24 @@ def test_scatter_of_the_stretches_is_no_lateness():
         assert late_channel(stretches, array) is None
 
 
+def test_nothing_is_late_where_the_source_is_nearer_than_the_array_is_long():
+    """Whose waves are nowhere near flat: 0.6 m from the middle of 1.6 m."""
+    places = 8.0 * CIRCLE
+    array = known(places)
+    source = np.array([0.45, 0.4, 0.0])
+    arrivals = np.linalg.norm(np.pad(places, ((0, 0), (0, 1))) - source, axis=1) / C
+    stretches = [
+        Sighting(
+            t_s=float(k),
+            tau=arrivals[1:] - arrivals[0],
+            covariance=NOISE_S**2 * (np.eye(len(places) - 1) + 1.0),
+            coherence=0.9,
+        )
+        for k in range(5)
+    ]
+    assert late_channel(stretches, array) is None
+
+
 def test_too_few_stretches_say_nothing():
     stretches = sightings(CIRCLE, 60.0, 2)
     assert channel_lateness(stretches[:2], known(CIRCLE)) is None
