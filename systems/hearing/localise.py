@@ -165,6 +165,8 @@ class Candidate(NamedTuple):
     """(n - 1,) its delays t_k - t_0, s."""
     covariance: NDArray[np.float64]
     """(n - 1, n - 1) of them, s^2."""
+    correlation: float
+    """Least correlation coefficient of the pairs, 0 to 1."""
     alone: bool = False
     """Whether it outweighs whatever else sounds."""
 
@@ -525,4 +527,4 @@ class Localiser:
             return None
         if fix.range_std > parameters.maximum_relative_range_std * fix.range:
             fix = fix.without_range()
-        return Candidate(fix, delays.tau, covariance)
+        return Candidate(fix, delays.tau, covariance, delays.correlation)

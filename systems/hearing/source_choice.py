@@ -32,6 +32,14 @@ _FORGOTTEN_S = 6.0
 # expected place: it is forgotten after so long, when the source has missed a burst.
 _DOUBTED_S = 3.0
 
+# What correlates less than this may be chance, which does not come twice: another
+# source counts when it was heard so many times, at most so long after one another; and
+# the followed one, after a silence, when it is heard a second time, s.
+_SURE = 0.25
+_TIMES = 3
+_GAP_S = 0.06
+_SILENCE_S = 0.2
+
 # A delay of the source is farther off than the gate in one frame of so many.
 _GATE = 3e-4
 
@@ -91,8 +99,9 @@ class ChoiceMemory(NamedTuple):
     line: NDArray[np.float64]
     """(4,) point and normal of the row as the followed source was last heard."""
     others: NDArray[np.float64]
-    """(k, 12) other sources: time since each was heard, s; 1 where it was heard
-    together with the followed one; place; covariance; point and normal of the row."""
+    """(k, 13) other sources: time since each was heard, s, how often it was, 1 where
+    that was together with the followed one; place; covariance; point and normal of the
+    row."""
 
     @classmethod
     def unpack(cls, values: NDArray[np.float64]) -> ChoiceMemory:
@@ -133,7 +142,7 @@ class SourceChoice:
 
     def blank(self) -> ChoiceMemory:
         """Nothing heard yet."""
-        others = np.zeros((_OTHERS, 12))
+        others = np.zeros((_OTHERS, 13))
         others[:, 0] = NEVER_HEARD_S
         return ChoiceMemory(np.zeros(4), others)
 
@@ -156,11 +165,7 @@ class SourceChoice:
         Returns:
             Its place among them, None where it is not heard; and the new memory.
         """
-        others = memory.others.copy()
-        others[:, 0] += self._frame_s
-        doubted = belief.age > _DOUBTED_S
-        gone = (others[:, 0] > _FORGOTTEN_S) | (doubted & (others[:, 1] < 0.5))
-        others[gone, 0] = NEVER_HEARD_S
+        others = _aged(memory.others, self._frame_s, doubted=belief.age > _DOUBTED_S)
         if not candidates:
             return None, memory._replace(others=others)
         centre, turn, line = self._array(belief.pose)
@@ -175,14 +180,20 @@ class SourceChoice:
             own = np.array([self._cost(c, followed, microphones) for c in candidates])
         elif may_sound and len(candidates) == 1 and candidates[0].alone:
             own[0] = 0.0
-        own[own > costs.min(axis=1)] = math.inf
+        counts = others[:, 1] >= _TIMES
+        own[own > costs.min(axis=1, initial=math.inf, where=counts)] = math.inf
+        if belief.age > _SILENCE_S:
+            again = np.isfinite(costs[:, ~counts]).any(axis=1)
+            sure = np.array([c.correlation >= _SURE for c in candidates])
+            own[~again & ~sure] = math.inf
         chosen = int(own.argmin()) if np.isfinite(own.min()) else None
         for k, candidate in enumerate(candidates):
             if k != chosen:
                 self._remember(others, costs[k], candidate, (centre, turn, line))
         if chosen is None:
             return None, memory._replace(others=others)
-        others[others[:, 0] == 0.0, 1] = 1.0
+        others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
+        others[(others[:, 0] == 0.0) & (others[:, 1] > 1.0), 2] = 1.0
         return chosen, ChoiceMemory(np.concatenate(line), others)
 
     def _array(
@@ -256,14 +267,22 @@ class SourceChoice:
             p = p + centre
         else:
             p, covariance = _placed(centre, p, covariance)
-        heard_together = others[row, 1] if known else 0.0
-        others[row] = (
-            0.0,
-            heard_together,
-            *p,
-            *covariance.ravel(),
-            *np.concatenate(line),
-        )
+        times, together = others[row, 1:3] if known else (0.0, 0.0)
+        place = *p, *covariance.ravel(), *np.concatenate(line)
+        others[row] = 0.0, times + 1.0, together, *place
+
+
+def _aged(
+    others: NDArray[np.float64], seconds: float, *, doubted: bool
+) -> NDArray[np.float64]:
+    """Other sources so much later, without those that are forgotten."""
+    others = others.copy()
+    others[:, 0] += seconds
+    gone = others[:, 0] > _FORGOTTEN_S
+    gone |= (others[:, 1] < _TIMES) & (others[:, 0] > _GAP_S)
+    gone |= doubted & (others[:, 2] < 0.5) & (others[:, 1] >= _TIMES)
+    others[gone, 0] = NEVER_HEARD_S
+    return others
 
 
 def _placed(
@@ -280,8 +299,8 @@ def _grown(row: NDArray[np.float64]) -> _Place | None:
     """Where another source may be by now; None: there is none."""
     if row[0] >= NEVER_HEARD_S:
         return None
-    covariance = row[4:8].reshape(2, 2) + (_SPEED_M_S * row[0]) ** 2 * np.eye(2)
-    return _Place(row[2:4], covariance, _Line(row[8:10], row[10:12]))
+    covariance = row[5:9].reshape(2, 2) + (_SPEED_M_S * row[0]) ** 2 * np.eye(2)
+    return _Place(row[3:5], covariance, _Line(row[9:11], row[11:13]))
 
 
 def _expected_delays(
