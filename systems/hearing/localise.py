@@ -297,11 +297,14 @@ class Localiser:
             return [], after
         first, after = self._first(sound, memory, after)
         found = [] if first is None else [first._replace(alone=True)]
+        # In a part of a frame chance correlates more.
+        least = _SET_CORRELATION / energy_spread(sound.heard)
         for delays in estimate_delay_sets(
             sound.heard, self.plan, self.parameters.method, sound.seen, _SETS
         ):
             far = [np.abs(delays.tau - other.tau).max() for other in found]
-            if min(far, default=math.inf) > _ONE_SOUND_S:
+            apart = min(far, default=math.inf) > _ONE_SOUND_S
+            if apart and delays.correlation > least:
                 further = self._one_of_several(delays)
                 found += [] if further is None else [further]
         return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
@@ -311,8 +314,6 @@ class Localiser:
 
         To each sound the others are noise: its pairs may disagree by what that does.
         """
-        if delays.correlation < _SET_CORRELATION:
-            return None
         scatter = math.sqrt(float(np.diag(delays.covariance).max()))
         closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
         return self._fix(delays._replace(closure=closure, ambiguity=0.0))

@@ -3,9 +3,9 @@
 Every source has a place in W with a covariance: the followed one that of the tracker,
 the others the one where they were last heard. Places are compared with what is heard by
 the delays that they would have (third-degree cubature, Arasaratnam and Haykin 2009): a
-row's two sides have the same, and a range that is not known is a large covariance. A
-sound belongs to the source that makes it likeliest, of those that can have made it; one
-that belongs to none is another source.
+row's two sides have the same, and a range that is not known is a large covariance. Each
+sound belongs to one source, so that all of them together are likeliest (global nearest
+neighbours); one that belongs to none is another source.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from systems.hearing.localise import Candidate
@@ -181,15 +182,21 @@ class SourceChoice:
         elif may_sound and len(candidates) == 1 and candidates[0].alone:
             own[0] = 0.0
         counts = others[:, 1] >= _TIMES
-        own[own > costs.min(axis=1, initial=math.inf, where=counts)] = math.inf
+        # Beside a sound that goes on there are its side peaks.
+        beside = counts & (others[:, 0] <= _GAP_S)
+        own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
         if belief.age > _SILENCE_S:
             again = np.isfinite(costs[:, ~counts]).any(axis=1)
             sure = np.array([c.correlation >= _SURE for c in candidates])
             own[~again & ~sure] = math.inf
-        chosen = int(own.argmin()) if np.isfinite(own.min()) else None
-        for k, candidate in enumerate(candidates):
-            if k != chosen:
-                self._remember(others, costs[k], candidate, (centre, turn, line))
+        # After a silence what was heard once is the followed source, not another one.
+        shared = costs.copy()
+        shared[np.ix_(np.isfinite(own), ~counts)] = math.inf
+        belongs = _assigned(np.column_stack((own, shared)))
+        chosen = belongs.index(0) if 0 in belongs else None
+        for candidate, place in zip(candidates, belongs, strict=True):
+            if place != 0:
+                self._remember(others, place, candidate, (centre, turn, line))
         if chosen is None:
             return None, memory._replace(others=others)
         others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
@@ -253,23 +260,36 @@ class SourceChoice:
     def _remember(
         self,
         others: NDArray[np.float64],
-        costs: NDArray[np.float64],
+        place: int | None,
         candidate: Candidate,
         array: tuple[NDArray[np.float64], NDArray[np.float64], _Line],
     ) -> None:
-        """Another source was heard: the one that it can be, or a new one."""
+        """Another source was heard: one of a place (from 1), or a new one."""
         centre, turn, line = array
-        known = bool(np.isfinite(costs.min()))
-        row = int(costs.argmin() if known else others[:, 0].argmax())
+        row = int(others[:, 0].argmax()) if place is None else place - 1
         fix = candidate.fix
         p, covariance = turn @ fix.p_AS, turn @ fix.covariance @ turn.T
         if fix.range_valid:
             p = p + centre
         else:
             p, covariance = _placed(centre, p, covariance)
-        times, together = others[row, 1:3] if known else (0.0, 0.0)
-        place = *p, *covariance.ravel(), *np.concatenate(line)
-        others[row] = 0.0, times + 1.0, together, *place
+        times, together = (0.0, 0.0) if place is None else others[row, 1:3]
+        where = *p, *covariance.ravel(), *np.concatenate(line)
+        others[row] = 0.0, times + 1.0, together, *where
+
+
+def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
+    """Place that each sound belongs to, no two the same; None: none.
+
+    Args:
+        costs: (sounds, places), infinite where one is not the other's.
+    """
+    sounds, places = costs.shape
+    # As many as can be have a place; among these ways the cheapest one.
+    finite = np.where(np.isfinite(costs), costs, 1e9)
+    nowhere = np.full((sounds, sounds), 1e6)
+    columns = linear_sum_assignment(np.hstack((finite, nowhere)))[1]
+    return [int(k) if k < places else None for k in columns]
 
 
 def _aged(
