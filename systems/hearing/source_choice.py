@@ -44,6 +44,14 @@ _SILENCE_S = 0.2
 # A delay of the source is farther off than the gate in one frame of so many.
 _GATE = 3e-4
 
+# Cost of a sound of no known source: one in ten frames has one, with delays of any size
+# up to a metre.
+_NOWHERE = 1.0
+
+# A second sound where the followed one is expected is as likely to be it when it
+# correlates more than this share of the first.
+_SECOND = 0.6
+
 # Standard deviations: of what delays leave out, above all the robot's turning within a
 # frame; of what the tracker's covariance does; and of a source's velocity, m and m/s.
 _DELAY_FLOOR_M = 0.015
@@ -54,7 +62,7 @@ _SPEED_M_S = 0.35
 _RANGE_M = 2.5
 
 # What is meant by a first bearing, standard deviation, rad.
-_BEARING = math.radians(7.0)
+_BEARING = math.radians(4.0)
 
 
 class Belief(NamedTuple):
@@ -197,7 +205,7 @@ class SourceChoice:
         for candidate, place in zip(candidates, belongs, strict=True):
             if place != 0:
                 self._remember(others, place, candidate, (centre, turn, line))
-        if chosen is None:
+        if chosen is None or _is_ambiguous(chosen, own, belongs, candidates):
             return None, memory._replace(others=others)
         others[~counts & np.isfinite(costs[chosen]), 0] = NEVER_HEARD_S
         others[(others[:, 0] == 0.0) & (others[:, 1] > 1.0), 2] = 1.0
@@ -285,11 +293,24 @@ def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
         costs: (sounds, places), infinite where one is not the other's.
     """
     sounds, places = costs.shape
-    # As many as can be have a place; among these ways the cheapest one.
     finite = np.where(np.isfinite(costs), costs, 1e9)
-    nowhere = np.full((sounds, sounds), 1e6)
+    nowhere = np.full((sounds, sounds), _NOWHERE)
     columns = linear_sum_assignment(np.hstack((finite, nowhere)))[1]
     return [int(k) if k < places else None for k in columns]
+
+
+def _is_ambiguous(
+    chosen: int,
+    own: NDArray[np.float64],
+    belongs: Sequence[int | None],
+    candidates: Sequence[Candidate],
+) -> bool:
+    """Whether another sound that is no known source's may be the followed one's."""
+    most = _SECOND * candidates[chosen].correlation
+    return any(
+        k != chosen and np.isfinite(own[k]) and not belongs[k] and c.correlation > most
+        for k, c in enumerate(candidates)
+    )
 
 
 def _aged(
