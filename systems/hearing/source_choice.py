@@ -46,7 +46,7 @@ _GATE = 3e-4
 
 # Cost of a sound of no known source: one in ten frames has one, with delays of any size
 # up to a metre.
-_NOWHERE = 1.0
+_NOWHERE = -1.0
 
 # A second sound where the followed one is expected is as likely to be it when it
 # correlates more than this share of the first.
@@ -55,7 +55,7 @@ _SECOND = 0.6
 # Standard deviations: of what delays leave out, above all the robot's turning within a
 # frame; of what the tracker's covariance does; and of a source's velocity, m and m/s.
 _DELAY_FLOOR_M = 0.015
-_PLACE_FLOOR_M = 0.1
+_PLACE_FLOOR_M = 0.05
 _SPEED_M_S = 0.35
 
 # Where only the direction is known the range is about this, and half of it off, m.
