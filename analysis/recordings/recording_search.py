@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
-from analysis.recordings.consistent_lags import consistent_lags
+from systems.delays.consistent_lags import consistent_lags
 from analysis.recordings.recording_spectra import RecordingSpectra
 from systems.hearing.steered_response import (
     LAG_DENSITY,

@@ -20,7 +20,7 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-__all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look"]
+__all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look", "settled_delays"]
 
 # The channels are cut again when a delay has moved by more than this, samples.
 _SETTLED = 0.75
@@ -120,10 +120,28 @@ def estimate_delays(
         The estimate, however poor, or None where a channel is silent or the
         correlation has no peak within the gate.
     """
-    chosen = METHODS[method]
     seen = seen or look(frame, plan, method, find_band=find_band)
-    if seen is None:
-        return None
+    return None if seen is None else settled_delays(frame, plan, method, seen)
+
+
+def settled_delays(
+    frame: NDArray[np.float32],
+    plan: DelayPlan,
+    method: str,
+    seen: tuple[DelaySearch, slice],
+) -> DelayEstimate | None:
+    """Delays of a frame near those of a search.
+
+    Args:
+        frame: (n, frame_samples), any unit.
+        plan: Rates, band and array.
+        method: A key of METHODS.
+        seen: What ``look`` returned, or other arrivals to start from.
+
+    Returns:
+        As ``estimate_delays``.
+    """
+    chosen = METHODS[method]
     search, band = seen
     arrivals = search.arrivals
     for _ in range(_CUTS):

@@ -12,6 +12,7 @@ from pydantic import Field, model_validator
 from systems.delays.copied_channels import frame_repeats
 from systems.delays.delay_plan import DelayPlan
 from systems.delays.delay_search import DelaySearch, weakest_sound
+from systems.delays.delay_sets import estimate_delay_sets
 from systems.delays.delays import DelayEstimate, estimate_delays, look
 from systems.delays.echo_errors import echo_errors, energy_spread
 from systems.delays.frame_energy import frame_energy
@@ -19,6 +20,7 @@ from systems.delays.half_band import PASSED, halve_rate
 from systems.delays.precedence import EchoMemory, keep_first_wave_front
 from systems.framework.input_error import InputError
 from systems.framework.parameters import (
+    Angle,
     Duration,
     Fraction,
     Frequency,
@@ -33,7 +35,7 @@ from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["HearingMemory", "Localiser", "TDOAParameters"]
+__all__ = ["Candidate", "HearingMemory", "Localiser", "TDOAParameters"]
 
 # From this correlation on, a frame holds hardly anything but the direct sound; and
 # where the noise was not heard alone yet, so that it may be the rest.
@@ -63,6 +65,18 @@ _SHARED_CHANCE = 1e-3
 # Of the frames that hold the weakest sound that can be heard so many are quieter
 # than expected by this many standard deviations: 1 %.
 _QUIET = 2.33
+
+# Sets of delays that are followed up where sounds overlap, and the least correlation
+# of one: of what remains beside two sounds a twentieth is higher
+# (docs/localization.md).
+_SETS = 4
+_SET_CORRELATION = 0.1
+
+# The delays of its pairs may disagree by so many standard deviations more.
+_SET_CLOSURE = 2.0
+
+# Sets with all delays this near to each other are one sound, s.
+_ONE_SOUND_S = 1e-4
 
 # Microphones whose distances from the centroid differ by less are an even pair, m.
 _ALIKE_M = 1e-3
@@ -105,12 +119,25 @@ class TDOAParameters(Parameters):
     schedule_known: bool = False
     """Hear nothing in frames that cannot hold the source's sound by its schedule:
     sources that take turns are told apart so, and a robot's own loudspeaker."""
+    choose: Literal["loudest", "followed"] = "loudest"
+    """Of sounds that overlap, hear the one that outweighs the others, or the one that
+    has been followed until now."""
+    first_bearing_deg: Angle | None = None
+    """Of the source to be followed, from the microphones' centroid as the robot stands
+    before it has heard it, deg CCW; unset: the first one heard alone. For ``choose:
+    followed``."""
 
     @model_validator(mode="after")
     def _check(self) -> TDOAParameters:
         if self.low_hz >= self.high_hz:
             raise InputError(
                 "low_hz", f"{self.low_hz:g} must be below high_hz = {self.high_hz:g}"
+            )
+        if self.first_bearing_deg is not None and self.choose == "loudest":
+            raise InputError(
+                "first_bearing_deg",
+                "is of no use to choose: loudest; set choose to followed, or leave "
+                "the bearing out",
             )
         return self
 
@@ -127,6 +154,30 @@ class HearingMemory(NamedTuple):
     """(n, bins) see ``systems.delays.precedence``; None where the noise is louder."""
     heard: bool = False
     """Whether it held a sound."""
+
+
+class Candidate(NamedTuple):
+    """One of the sounds of a frame."""
+
+    fix: SourceFix
+    """Where it comes from."""
+    tau: NDArray[np.float64]
+    """(n - 1,) its delays t_k - t_0, s."""
+    covariance: NDArray[np.float64]
+    """(n - 1, n - 1) of them, s^2."""
+    correlation: float
+    """Least correlation coefficient of the pairs, 0 to 1."""
+    alone: bool = False
+    """Whether it outweighs whatever else sounds."""
+
+
+class _Sound(NamedTuple):
+    """A frame that holds a sound."""
+
+    heard: NDArray[np.float32]
+    """(n, samples) at the plan's rate."""
+    seen: tuple[DelaySearch, slice]
+    """What ``look`` returned."""
 
 
 def _averaged(known: float, new: float) -> float:
@@ -217,21 +268,63 @@ class Localiser:
         Raises:
             InputError: The frame is no frame of this array, or not finite.
         """
+        sound, after = self._sound(frame, memory)
+        if sound is None:
+            return None, after
+        first, after = self._first(sound, memory, after)
+        if first is None or self._is_copied(frame, first.fix, memory):
+            return None, after
+        return first.fix, after
+
+    def candidates(
+        self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
+    ) -> tuple[list[Candidate], HearingMemory]:
+        """Where each of the sounds of a frame comes from.
+
+        Args:
+            frame: As of ``localise``.
+            memory: What the last frame left.
+
+        Returns:
+            What ``localise`` finds, if anything, then further sounds, those with the
+            greatest correlations first; and the new memory.
+
+        Raises:
+            InputError: As ``localise``.
+        """
+        sound, after = self._sound(frame, memory)
+        if sound is None:
+            return [], after
+        first, after = self._first(sound, memory, after)
+        found = [] if first is None else [first._replace(alone=True)]
+        # In a part of a frame chance correlates more.
+        least = _SET_CORRELATION / energy_spread(sound.heard)
+        for delays in estimate_delay_sets(
+            sound.heard, self.plan, self.parameters.method, sound.seen, _SETS
+        ):
+            far = [np.abs(delays.tau - other.tau).max() for other in found]
+            apart = min(far, default=math.inf) > _ONE_SOUND_S
+            if apart and delays.correlation > least:
+                further = self._one_of_several(delays)
+                found += [] if further is None else [further]
+        return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
+
+    def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:
+        """The place behind a set of delays, where it is believed.
+
+        To each sound the others are noise: its pairs may disagree by what that does.
+        """
+        scatter = math.sqrt(float(np.diag(delays.covariance).max()))
+        closure = max(0.0, delays.closure - _SET_CLOSURE * scatter)
+        return self._fix(delays._replace(closure=closure, ambiguity=0.0))
+
+    def _sound(
+        self, frame: NDArray[np.float32 | np.int16], memory: HearingMemory
+    ) -> tuple[_Sound | None, HearingMemory]:
+        """What a frame holds beside noise, None if nothing, and the new memory."""
         energy = self._checked_energy(frame)
         if energy <= self._quietest(memory):
             return None, self._after_noise(memory, energy)
-        fix, after = self._heard(frame, memory, energy)
-        if fix is not None and self._is_copied(frame, fix, memory):
-            return None, after
-        return fix, after
-
-    def _heard(
-        self,
-        frame: NDArray[np.float32 | np.int16],
-        memory: HearingMemory,
-        energy: float,
-    ) -> tuple[SourceFix | None, HearingMemory]:
-        """As ``localise``, for a frame that may hold a sound."""
         heard: NDArray[np.float32] = (
             halve_rate(frame) if self._halved else frame.astype(np.float32, copy=False)
         )
@@ -249,10 +342,17 @@ class Localiser:
         after = memory._replace(heard=True)
         if not memory.heard and search.weakest > _SHARED_CHANCE:
             return None, after
+        return _Sound(heard, seen), after
+
+    def _first(
+        self, sound: _Sound, before: HearingMemory, memory: HearingMemory
+    ) -> tuple[Candidate | None, HearingMemory]:
+        """The sound that outweighs the others of a frame, if one does."""
+        heard, seen = sound
         if not self.parameters.suppress_echoes:
-            return self._fix(heard, self._delays(heard, seen)), after
-        begins = not memory.heard and energy_spread(heard) < _WHOLE_FRAME
-        return self._locate(heard, seen, after, begins=begins)
+            return self._fix(self._delays(heard, seen), heard), memory
+        begins = not before.heard and energy_spread(heard) < _WHOLE_FRAME
+        return self._locate(heard, seen, memory, begins=begins)
 
     def _quietest(self, memory: HearingMemory) -> float:
         """Energy that 99 of 100 frames reach that hold a sound above the noise."""
@@ -268,7 +368,7 @@ class Localiser:
         memory: HearingMemory,
         *,
         begins: bool,
-    ) -> tuple[SourceFix | None, HearingMemory]:
+    ) -> tuple[Candidate | None, HearingMemory]:
         """Where the sound comes from that ``look`` has seen in a frame.
 
         A sound that begins within the frame may have met the floor, which shows in
@@ -277,7 +377,7 @@ class Localiser:
         delays = self._delays(frame, seen)
         direct = delays is not None and self._is_direct(delays, memory)
         if direct and not begins:
-            return self._fix(frame, delays), memory
+            return self._fix(delays, frame), memory
         dry, echoes, news = keep_first_wave_front(
             frame, memory.echoes, self._sizes, self._noise_density(memory)
         )
@@ -294,7 +394,7 @@ class Localiser:
             return None, memory
         plan = self.plan
         errors = echo_errors(plan.shape, plan.c, news, delays.angular_frequency)
-        return self._fix(frame, delays, errors), memory
+        return self._fix(delays, echoes=errors), memory
 
     def _checked_energy(self, frame: NDArray[np.float32 | np.int16]) -> float:
         if frame.shape != self._frame_shape:
@@ -386,11 +486,17 @@ class Localiser:
 
     def _fix(
         self,
-        frame: NDArray[np.float32],
         delays: DelayEstimate | None,
+        frame: NDArray[np.float32] | None = None,
         echoes: NDArray[np.float64] | None = None,
-    ) -> SourceFix | None:
-        """The place behind the delays of a frame, where they are believed."""
+    ) -> Candidate | None:
+        """The place behind the delays of a frame, where they are believed.
+
+        Args:
+            delays: Of the sound.
+            frame: Where it is to be refined by the method ``ml``, if that is set.
+            echoes: Further covariance, of delays whose echoes were suppressed.
+        """
         parameters, plan = self.parameters, self.plan
         if (
             delays is None
@@ -404,7 +510,7 @@ class Localiser:
         fix = locate_source(delays.tau, covariance, plan.shape, plan.c)
         if not self._is_place(fix, delays.tau):
             return None
-        if parameters.method == "ml" and echoes is None:
+        if parameters.method == "ml" and frame is not None:
             bins = delays.band
             hertz = plan.sample_rate_hz / plan.length
             fix = (
@@ -421,5 +527,5 @@ class Localiser:
         if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
             return None
         if fix.range_std > parameters.maximum_relative_range_std * fix.range:
-            return fix.without_range()
-        return fix
+            fix = fix.without_range()
+        return Candidate(fix, delays.tau, covariance, delays.correlation)

@@ -12,11 +12,17 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts, Step
 from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
-from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.hearing.localise import (
+    HearingMemory,
+    Localiser,
+    TDOAParameters,
+)
+from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import MicArrayParameters
@@ -60,6 +66,33 @@ def robot_localiser(
         frame_samples=microphones.frame_samples,
     )
     return localiser, np.mean(robot.microphones_m, axis=0)
+
+
+def robot_choice(
+    localiser: Localiser,
+    robot: RobotParameters,
+    p_PA_B: NDArray[np.float64],
+    frame_s: float,
+) -> SourceChoice:
+    """What chooses among the sounds that a robot's localiser finds.
+
+    Args:
+        localiser: Of ``robot_localiser``.
+        robot: Place of P.
+        p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+        frame_s: Period of the frames, s.
+
+    Returns:
+        It, with the first bearing of the localiser's parameters.
+    """
+    degrees = localiser.parameters.first_bearing_deg
+    return SourceChoice(
+        localiser.plan.shape,
+        localiser.plan.c,
+        p_PA_B + np.array([robot.control_point_m, 0.0]),
+        frame_s,
+        None if degrees is None else math.radians(degrees),
+    )
 
 
 def may_sound(
@@ -109,7 +142,14 @@ class TDOAEstimator(LeafSystem):
     (row major, of p_PS_B) counts noise and echoes, not errors of the
     microphones' places or of the speed of sound.
 
-    State: the outputs, one group a port, and what ``HearingMemory`` holds.
+    With ``choose: followed`` it hears each of the sounds of a frame and chooses the one
+    that comes from where the source is expected (``systems.hearing.source_choice``). It
+    then has four further input ports, which ``SourceTracker`` and ``WheelOdometry``
+    publish: p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m,
+    m, rad]. They act on the state alone: no algebraic loop.
+
+    State: the outputs, one group a port, what ``HearingMemory`` holds, and with
+    ``choose: followed`` what ``ChoiceMemory`` does.
     Rate and latency: updated every ``frame_s`` of the microphones, 25 ms, from the
     frame that ends then, and visible after it: one tick, the time that a processor
     takes.
@@ -148,25 +188,34 @@ class TDOAEstimator(LeafSystem):
     ) -> None:
         super().__init__()
         self._microphones = microphones or MicArrayParameters()
+        parameters, robot = parameters or TDOAParameters(), robot or RobotParameters()
         acoustics = acoustics or AcousticParameters()
         self._schedule = None
-        if parameters is not None and parameters.schedule_known:
+        if parameters.schedule_known:
             self._schedule = sound or SoundParameters()
         self._longest_way_s = MAXIMUM_RANGE_M / acoustics.c
         self._localiser, self._p_PA_B = robot_localiser(
-            parameters or TDOAParameters(),
-            robot or RobotParameters(),
-            acoustics,
-            self._microphones,
+            parameters, robot, acoustics, self._microphones
         )
         self.set_name("tdoa_estimator")
         self._audio = self.DeclareAbstractInputPort(
             name="audio", model_value=Value(object())
         )
+        self._choice, self._belief = None, []
+        if parameters.choose == "followed":
+            self._choice = robot_choice(
+                self._localiser, robot, self._p_PA_B, self._microphones.frame_s
+            )
+            self._belief = [
+                self.DeclareVectorInputPort(name=name, size=size)
+                for name, size in _BELIEF
+            ]
         for name, size in _PORTS:
             self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
         self.DeclareDiscreteState(5)
         self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
+        if self._choice is not None:
+            self.DeclareDiscreteState(self._choice.blank().pack().tolist())
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=self._microphones.frame_s, offset_sec=0.0, update=self._listen
         )
@@ -174,59 +223,76 @@ class TDOAEstimator(LeafSystem):
     def _listen(self, context: Any, discrete_state: Any) -> None:
         audio = read_audio(context, self._audio, "TDOAEstimator")
         before, located = self._remembered(context)
-        fix, after = self.hear(audio, before)
+        choice = None
+        if self._choice is not None:
+            state = context.get_discrete_state(_CHOICE).value()
+            belief = _belief(np.concatenate(read_arrays(context, self._belief)))
+            choice = ChoiceMemory.unpack(state), belief
+        fix, after, chosen = self.hear(audio, before, choice)
         flags = after.echoes is not None, after.heard, fix is not None
         discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
         if after.echoes is not None and after.echoes is not before.echoes:
             discrete_state.set_value(_ECHOES, after.echoes.ravel())
+        if chosen is not None:
+            discrete_state.set_value(_CHOICE, chosen.pack())
         if fix is None and not located:
             return  # silence goes on, and the outputs are zero already
         for group, values in enumerate(port_values(fix, self._p_PA_B)):
             discrete_state.set_value(group, values)
 
     def hear(
-        self, audio: AudioFrame, memory: HearingMemory
-    ) -> tuple[SourceFix | None, HearingMemory]:
+        self,
+        audio: AudioFrame,
+        memory: HearingMemory,
+        choice: tuple[ChoiceMemory, Belief] | None = None,
+    ) -> tuple[SourceFix | None, HearingMemory, ChoiceMemory | None]:
         """Where the sound of a frame comes from, whatever context the block is in.
 
         Args:
             audio: The frame.
             memory: What the last frame left.
+            choice: What it left for ``choose: followed``, and what is believed now.
 
         Returns:
-            The source, or None where nothing is heard, and the new memory.
+            The source, or None where nothing is heard, and the new memories.
 
         Raises:
             InputError: The frame has another rate, or is none of this array.
         """
         check_rate(audio, self._microphones.sample_rate_hz, "TDOAEstimator")
-        fix, after = self._localiser.localise(audio.counts, memory)
-        if self._schedule and not may_sound(
+        sounds = self._schedule is None or may_sound(
             self._schedule,
             audio.time,
             self._longest_way_s,
             self._microphones.frame_s,
-        ):
-            fix = None
-        return fix, after
+        )
+        if self._choice is None or choice is None:
+            fix, after = self._localiser.localise(audio.counts, memory)
+            return fix if sounds else None, after, None
+        found, after = self._localiser.candidates(audio.counts, memory)
+        best, chosen = self._choice.choose(found, *choice, may_sound=sounds)
+        return None if best is None else found[best].fix, after, chosen
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each frame of a compiled loop, ``Step``."""
         audio = audio_of_run(run)
         memory, located = self._localiser.blank(), False
+        chosen = None if self._choice is None else self._choice.blank()
 
-        def listen(tick: int, _: Any, outputs: Any) -> None:
-            nonlocal memory, located
-            fix, memory = self.hear(audio(tick), memory)
+        def listen(tick: int, inputs: Any, outputs: Any) -> None:
+            nonlocal memory, located, chosen
+            choice = None if chosen is None else (chosen, _belief(inputs))
+            fix, memory, chosen = self.hear(audio(tick), memory, choice)
             if fix is not None:
                 outputs[:] = np.concatenate(port_values(fix, self._p_PA_B))
             elif located:
                 outputs[:] = 0.0
             located = fix is not None
 
+        inputs = sum(port.size() for port in self._belief)
         size = sum(size for _, size in _PORTS)
         period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, 0, size, period)
+        return host_step(listen, inputs, size, period)
 
     def _remembered(self, context: Any) -> tuple[HearingMemory, bool]:
         """What the last frame left, and whether it held a place."""
@@ -249,8 +315,27 @@ _PORTS = (
     ("range_valid", 1),
 )
 
+#: Input ports for ``choose: followed``, and their sizes.
+_BELIEF = (
+    ("p_WS_estimated", 2),
+    ("covariance_W", 4),
+    ("age", 1),
+    ("pose_WB_estimated", 3),
+)
+
 # Groups of the discrete state after those of the ports.
-_MEMORY, _ECHOES = len(_PORTS), len(_PORTS) + 1
+_MEMORY, _ECHOES, _CHOICE = range(len(_PORTS), len(_PORTS) + 3)
+
+
+def _belief(values: NDArray[np.float64]) -> Belief:
+    """From what the ports of ``_BELIEF`` carry, one after the other."""
+    return Belief(
+        values[:2].copy(),
+        values[2:6].reshape(2, 2).copy(),
+        float(values[6]),
+        values[7:].copy(),
+    )
+
 
 #: Values of the output ports where nothing is heard.
 _NOTHING = tuple(np.zeros(size) for _, size in _PORTS)

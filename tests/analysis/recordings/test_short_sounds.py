@@ -9,7 +9,7 @@ import pyroomacoustics
 import pytest
 import soundfile
 
-from analysis.recordings.consistent_lags import consistent_lags
+from systems.delays.consistent_lags import consistent_lags
 from analysis.recordings.locate import ArrayGeometry, locate
 from analysis.recordings.onset_spectra import OnsetSpectra
 from systems.sound.array_shape import ArrayShape
