@@ -83,8 +83,10 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     summary = result.summary()
     centre, std = summary[name], summary[std_name]
     if name == "bearing_deg" and centre is not None:
-        # A bearing near 180 deg must not jump from top to bottom.
+        # A bearing near 180 deg must not jump from top to bottom; its labels are
+        # those of the table.
         values = centre + (values - centre + 180.0) % 360.0 - 180.0
+        axes.yaxis.set_major_formatter(lambda value, _: f"{_wrapped_deg(value):g}")
     axes.errorbar(
         times,
         values,
@@ -99,6 +101,11 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
         ends = centre - std, centre + std
         axes.axhspan(*ends, color=COLOURS["source"], alpha=0.15, linewidth=0)
     draw_grid(axes)
+
+
+def _wrapped_deg(angle: float) -> float:
+    """In (-180, 180]."""
+    return 180.0 - (180.0 - round(angle, 6)) % 360.0
 
 
 def _plan(axes: Axes, result: LocateResult) -> None:
