@@ -88,7 +88,7 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
         within = _with_reserve(scenario, requirements)
         repulsion = search_gains(within, requirements)
         within = within.model_copy(update={"repulsion": repulsion})
-        if all(check_law(within, x, requirements).met for x in _FOLLOWING_LAWS):
+        if all(check_law(within, x, requirements).acceptable for x in _FOLLOWING_LAWS):
             return scenario.model_copy(update={"repulsion": repulsion})
         follow += _STEP_M
 

@@ -59,6 +59,8 @@ def _alternative_lines(alternative: Alternative) -> list[str]:
 def _check_text(check: Check) -> str:
     sign = ">=" if check.at_least else "<="
     told = "" if check.met else "   not met"
+    if check.acceptable and not check.met:
+        told = "   just missed, by the rounding of the gains"
     unit = "" if check.unit == "1" else f" {check.unit}"
     value = 0.0 if math.isclose(check.value, 0.0, abs_tol=5e-4) else check.value
     return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"

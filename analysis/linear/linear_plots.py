@@ -13,7 +13,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from analysis.linear.gang_of_four import GangOfFour
-from analysis.linear.loop_margins import LoopMargins
+from analysis.linear.loop_margins import FrequencyResponse, LoopMargins
 from analysis.linear.robustness import PoleCloud, PoleSensitivity
 from analysis.linear.step_response import StepCheck
 from analysis.models.equilibria import EquilibriumSearch
@@ -92,7 +92,7 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
 
 
 def plot_step(check: StepCheck) -> Figure:
-    """Distance from the source after a small step, in both builds."""
+    """Distance from the source after a small step: predicted, and in both builds."""
     figure = Figure(figsize=(7.5, 3.8), layout="constrained")
     axes = figure.subplots()
     if check.full_m is not None:
@@ -100,9 +100,18 @@ def plot_step(check: StepCheck) -> Figure:
             check.time_s,
             check.full_m,
             color=COLOURS["echo"],
-            label="the scenario's build",
+            label="the scenario's sensors",
         )
-    axes.plot(check.time_s, check.ideal_m, color=COLOURS["robot"], label="all ideal")
+    axes.plot(
+        check.time_s, check.ideal_m, color=COLOURS["robot"], label="exact sensors"
+    )
+    axes.plot(
+        check.time_s,
+        check.predicted_m,
+        "--",
+        color=COLOURS["source"],
+        label="linear model",
+    )
     axes.set_xlabel("time (s)")
     axes.set_ylabel("distance of P from the source (m)")
     axes.set_title(
@@ -118,6 +127,8 @@ def plot_step(check: StepCheck) -> Figure:
 _CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 #: Part of the plane about -1 that is shown.
 _NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
+#: Phases below this are beyond all that a Bode diagram is read for, deg.
+_LOWEST_PHASE_DEG = -720.0
 #: Closed-loop gains whose contours a Nichols chart shows, dB.
 _CONTOURS_DB = (-12.0, -6.0, -3.0, 0.0, 1.0, 3.0, 6.0, 12.0)
 
@@ -126,23 +137,27 @@ def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
     """Size and phase of each loop; crossovers with their phase margins."""
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
+    lowest = -360.0
     for loop, colour in zip(loops, _cycle(loops), strict=True):
         omega, L = loop.response.omega, loop.response.L
-        upper.loglog(omega, np.abs(L), color=colour, label=loop.name)
-        phase = _phase_deg(L)
+        upper.semilogx(omega, _size_db(L), color=colour, label=loop.name)
+        phase = _phase_deg(loop.response)
+        lowest = min(lowest, float(phase.min()))
         lower.semilogx(omega, phase, color=colour)
         if math.isfinite(loop.phase_margin_deg):
             at = loop.crossover_rad_s
             reached = float(np.interp(at, omega, phase))
-            upper.plot(at, 1.0, "o", color=colour, markersize=5)
+            upper.plot(at, 0.0, "o", color=colour, markersize=5)
             lower.plot([at, at], [-180.0, reached], color=colour, linewidth=2.5)
-    upper.axhline(1.0, color=COLOURS["empty"], linewidth=0.8)
+    upper.axhline(0.0, color=COLOURS["empty"], linewidth=0.8)
     lower.axhline(-180.0, color=COLOURS["empty"], linewidth=0.8)
-    upper.set_ylabel("|L|")
-    upper.set_ylim(1e-4, 1e4)
+    upper.set_ylabel("|L| (dB)")
+    upper.set_ylim(-80.0, 80.0)
+    upper.set_yticks(np.arange(-80.0, 81.0, 20.0))
     lower.set_ylabel("phase (deg)")
-    lower.set_ylim(-370.0, 10.0)
-    lower.set_yticks(np.arange(-360.0, 1.0, 90.0))
+    bottom = 90.0 * math.floor(max(lowest, _LOWEST_PHASE_DEG) / 90.0)
+    lower.set_ylim(bottom - 10.0, 10.0)
+    lower.set_yticks(np.arange(bottom, 1.0, 90.0))
     lower.set_xlabel("frequency (rad/s)")
     upper.legend(fontsize=8)
     for axes in (upper, lower):
@@ -202,10 +217,16 @@ def panels(
     return figure, cells[:count]
 
 
-def _phase_deg(L: NDArray[np.complex128]) -> NDArray[np.float64]:
+def _size_db(L: NDArray[np.complex128]) -> NDArray[np.float64]:
+    return 20.0 * np.log10(np.maximum(np.abs(L), 1e-12))
+
+
+def _phase_deg(response: FrequencyResponse) -> NDArray[np.float64]:
     """(n,) continuous, in the turn in which a loop's crossover is looked for."""
-    phase: NDArray[np.float64] = np.degrees(np.unwrap(np.angle(L)))
-    return phase - 360.0 * round((phase[len(phase) // 2] + 150.0) / 360.0)
+    omega = response.omega
+    phase: NDArray[np.float64] = np.degrees(np.unwrap(np.angle(response.L)))
+    middle = np.interp(math.sqrt(omega[0] * omega[-1]), omega, phase)
+    return phase - 360.0 * round((float(middle) + 150.0) / 360.0)
 
 
 def _disk_ends(alpha: float) -> tuple[float, float]:
@@ -221,9 +242,8 @@ def plot_nichols(loops: Sequence[LoopMargins]) -> Figure:
     _contours(axes)
     for loop, colour in zip(loops, _cycle(loops), strict=True):
         L = loop.response.L
-        phase = _phase_deg(L)
-        size = 20.0 * np.log10(np.maximum(np.abs(L), 1e-12))
-        axes.plot(phase, size, color=colour, label=loop.name)
+        phase = _phase_deg(loop.response)
+        axes.plot(phase, _size_db(L), color=colour, label=loop.name)
     axes.plot(-180.0, 0.0, "+", color=COLOURS["source"], markersize=11)
     axes.set_xlim(-360.0, 0.0)
     axes.set_ylim(-40.0, 40.0)
@@ -265,11 +285,14 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
         axes.loglog(gang.omega, np.maximum(size, 1e-9), color=_CYCLE[0])
         peak = int(size.argmax())
         axes.plot(gang.omega[peak], size[peak], "o", color=COLOURS["source"])
+        # To the left of a peak at the right border.
+        at_border = gang.omega[peak] > 0.3 * gang.omega[-1]
         axes.annotate(
             f"{size[peak]:.2f}",
             (gang.omega[peak], size[peak]),
             textcoords="offset points",
-            xytext=(8, -3),
+            xytext=(-8 if at_border else 8, -3),
+            ha="right" if at_border else "left",
             fontsize=8,
         )
         axes.set_title(title, fontsize=9)

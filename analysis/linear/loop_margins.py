@@ -44,6 +44,8 @@ __all__ = [
 SKEWS = (-1.0, 0.0, 1.0)
 #: Points of a frequency grid.
 _POINTS = 1500
+#: Further ones near the Nyquist frequency of a sampled loop.
+_CLOSE = 300
 #: Lowest and highest frequency, rad/s; a sampled loop ends at its Nyquist frequency.
 _LOWEST, _HIGHEST = 1e-3, 1e3
 #: A frequency that counts as none, rad/s.
@@ -190,6 +192,10 @@ def frequency_response(model: LinearModel) -> FrequencyResponse:
     """Response of a loop over all frequencies that count."""
     highest = math.pi / model.period_s if model.period_s else _HIGHEST
     omega = np.geomspace(_LOWEST, highest, _POINTS)
+    if model.period_s:
+        # Zeros near z = -1 turn the phase within the last thousandths.
+        close = highest * (1.0 - np.geomspace(1e-2, 1e-7, _CLOSE))
+        omega = np.sort(np.concatenate((omega, close)))
     return FrequencyResponse(omega, model.response(omega)[0, 0])
 
 
@@ -300,7 +306,7 @@ def _gain_margins(
             gain = -1.0 / value.real
             if gain >= 1.0:
                 upper = min(upper, gain)
-            else:
+            elif gain > _NO_LOOP:
                 lower = max(lower, gain)
     return upper, lower
 

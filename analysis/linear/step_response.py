@@ -45,8 +45,10 @@ class StepCheck:
     """Size of the step, m."""
     time_s: NDArray[np.float64] = field(repr=False)
     """(n,) s."""
+    predicted_m: NDArray[np.float64] = field(repr=False)
+    """(n,) distance of P from the source by the linear model, m."""
     ideal_m: NDArray[np.float64] = field(repr=False)
-    """(n,) distance of P from the source, m."""
+    """The same in the all-ideal build, m."""
     full_m: NDArray[np.float64] | None = field(repr=False)
     """The same in the full build, m."""
 
@@ -95,6 +97,7 @@ def check_step(
         full=fitted_step(*own, along.frequency_rad_s) if own else None,
         step_m=step_m,
         time_s=ideal[0],
+        predicted_m=_predicted(point, step_m, ideal[0]),
         ideal_m=ideal[1],
         full_m=own[1] if own else None,
     )
@@ -110,6 +113,25 @@ def _along(point: OperatingPoint, modes: list[Any]) -> Any:
             "damping_n_s_m",
         )
     return max(modes, key=lambda mode: mode.frequency_rad_s)
+
+
+def _predicted(
+    point: OperatingPoint, step_m: float, time_s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """(n,) distance of P from the source by the one-period matrix, m."""
+    loop = point.loop
+    A = loop.period_derivatives(point.state, point.time_s).A
+    ahead = point.axes[0]
+    x, y = (loop.state_names.index(f"plant.{name}") for name in "xy")
+    deviation = np.zeros(len(A))
+    deviation[[x, y]] = step_m * ahead
+    ticks = np.arange(math.ceil(time_s[-1] / loop.tick_s - 1e-9) + 1)
+    distance = np.empty(len(ticks))
+    for k in ticks:
+        # Turning moves P across the line, not along it.
+        distance[k] = point.source_distance_m - ahead @ deviation[[x, y]]
+        deviation = A @ deviation
+    return np.interp(time_s, loop.tick_s * ticks, distance)
 
 
 def _run(

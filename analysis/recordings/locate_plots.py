@@ -90,10 +90,12 @@ def _over_time(axes: Axes, result: LocateResult, name: str) -> None:
     summary = result.summary()
     centre, std = summary[name], summary[std_name]
     if name == "bearing_deg" and centre is not None:
-        # A bearing near 180 deg must not jump from top to bottom.
+        # A bearing near 180 deg must not jump from top to bottom; its labels are
+        # those of the table.
         middle = _middle_deg(result, centre)
         values = middle + (values - middle + 180.0) % 360.0 - 180.0
         centre = middle + (centre - middle + 180.0) % 360.0 - 180.0
+        axes.yaxis.set_major_formatter(lambda value, _: f"{_wrapped_deg(value):g}")
         _tracks(axes, result, middle)
     axes.errorbar(
         times,
@@ -149,6 +151,11 @@ def _tracks(axes: Axes, result: LocateResult, middle: float) -> None:
     axes.legend(
         fontsize=8, frameon=False, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=8
     )
+
+
+def _wrapped_deg(angle: float) -> float:
+    """In (-180, 180]."""
+    return 180.0 - (180.0 - round(angle, 6)) % 360.0
 
 
 def _plan(axes: Axes, result: LocateResult) -> None:

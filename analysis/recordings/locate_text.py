@@ -22,13 +22,12 @@ _COLUMNS = (
 
 
 def locate_text(result: LocateResult) -> str:
-    """A summary, and a row for each estimate."""
+    """A summary, and a row for each estimate; faults are not in it."""
     heard = f"heard a source in {len(result.estimates)} of {result.frames} frames"
-    faults = [fault.message for fault in result.faults]
     if not result.estimates:
-        return "\n".join([f"{heard}: nothing to locate{_WHY_NOTHING}", *faults])
+        return f"{heard}: nothing to locate{_WHY_NOTHING}"
     lines = [heard, *_direction(result), _range(result), *_sources(result)]
-    lines += [*faults, ""]
+    lines.append("")
     lines.append("    t/s" + "".join(f"  {name:>{w}}" for _, name, w, _ in _COLUMNS))
     lines += [_row(estimate) for estimate in result.estimates]
     return "\n".join(lines)

@@ -43,9 +43,9 @@ _CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
 
 
 class Judged(NamedTuple):
-    """A number above the verdict on it, in one cell."""
+    """A number, or a word, above the verdict on it, in one cell."""
 
-    value: complex | None
+    value: complex | str | None
     verdict: str
 
 
@@ -150,7 +150,9 @@ def _row(cells: Sequence[Cell], columns: int) -> str:
 def _cell(value: Cell) -> str:
     if isinstance(value, Judged):
         colour = _VERDICT_CLASSES.get(value.verdict.lower(), "")
-        text = f"{number(value.value)}<br>{_inline(value.verdict)}"
+        shown = value.value
+        above = _inline(shown) if isinstance(shown, str) else number(shown)
+        text = f"{above}<br>{_inline(value.verdict)}"
         return f'<td class="number {colour}">{text}</td>'
     if not isinstance(value, str):
         return f'<td class="number">{number(value)}</td>'

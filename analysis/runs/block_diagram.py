@@ -111,7 +111,8 @@ def block_svg(diagram: Diagram, *, flat: bool = True) -> str:
     layout = _arrange(blocks(diagram, flat=flat), connections)
     width, height = f"{layout.width:.0f}", f"{layout.height:.0f}"
     head = (
-        f'<svg xmlns="http://www.w3.org/2000/svg" width="{width}" height="{height}" '
+        # Without a width of its own it fills the window or page that shows it.
+        '<svg xmlns="http://www.w3.org/2000/svg" '
         f'viewBox="0 0 {width} {height}" font-family="Helvetica, Arial, sans-serif">'
     )
     parts = [head, '<rect width="100%" height="100%" fill="white"/>']

@@ -29,13 +29,13 @@ __all__ = [
 
 _LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
 #: The mark of the scenario's own design.
-_TODAY: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
+_CURRENT: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
 #: Exponents beyond these look alike in a chart, 1/s.
 _SLOWEST, _FASTEST = -0.5, 0.5
 
 
 def plot_chart(chart: StabilityChart) -> Figure:
-    """Exponent of the slowest mode over two parameters, today's design marked."""
+    """Exponent of the slowest mode over two parameters, the current design marked."""
     figure = Figure(figsize=(6.4, 4.8), layout="constrained")
     axes = figure.subplots()
     shown = np.clip(chart.growth_per_s, _SLOWEST, _FASTEST)
@@ -50,8 +50,8 @@ def plot_chart(chart: StabilityChart) -> Figure:
     )
     if chart.growth_per_s.min() < 0.0 < chart.growth_per_s.max():
         axes.contour(chart.x, chart.y, chart.growth_per_s, levels=[0.0], colors="black")
-    axes.plot(*chart.today, "*", markersize=14, **_TODAY)
-    axes.annotate("today", chart.today, textcoords="offset points", xytext=(9, 6))
+    axes.plot(*chart.today, "*", markersize=14, **_CURRENT)
+    axes.annotate("current", chart.today, textcoords="offset points", xytext=(9, 6))
     if chart.x.min() > 0.0:
         axes.set_xscale("log")
     axes.set_yscale("log")
@@ -82,7 +82,9 @@ def plot_poles_against_period(found: PolesAgainstPeriod) -> Figure:
     figure.colorbar(dots, ax=left, label="sample period (s)")
     right.semilogx(found.periods_s, found.growth_per_s, color=_LINES[0])
     right.axhline(0.0, color="black", linewidth=0.8)
-    right.axvline(found.today_s, color=COLOURS["source"], linestyle="--", label="today")
+    right.axvline(
+        found.today_s, color=COLOURS["source"], linestyle="--", label="current"
+    )
     right.set_ylim(-0.35, 0.5)
     right.set_xlabel("sample period (s)")
     right.set_ylabel("growth (1/s)")
@@ -104,7 +106,7 @@ def plot_gap_chart(chart: GapChart) -> Figure:
     if chart.today[1] in chart.holds:
         row = chart.multiplier[chart.holds.index(chart.today[1])]
         at = float(np.interp(chart.today[0], chart.gaps_s, row))
-        axes.plot(chart.today[0], at, "*", markersize=14, label="today", **_TODAY)
+        axes.plot(chart.today[0], at, "*", markersize=14, label="current", **_CURRENT)
     axes.set_xlabel(f"silence after {chart.on_s:g} s of sound (s)")
     axes.set_ylabel("largest multiplier of a cycle")
     axes.grid(visible=True, which="both", linewidth=0.3)
@@ -133,9 +135,12 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
                 color=_LINES[k % len(_LINES)],
                 label=f"{ticks * limits.tick_s * 1e3:.0f} ms",
             )
-        axes.plot(limits.today[0], today, "*", markersize=14, **_TODAY)
+        axes.plot(limits.today[0], today, "*", markersize=14, **_CURRENT)
         axes.annotate(
-            "today", (limits.today[0], today), textcoords="offset points", xytext=(8, 4)
+            "current",
+            (limits.today[0], today),
+            textcoords="offset points",
+            xytext=(8, 4),
         )
         axes.set_xlabel("motor lag (s)")
         axes.set_ylabel(f"largest stable {name}")
@@ -145,7 +150,7 @@ def plot_contact_limits(limits: ContactLimits) -> Figure:
 
 
 def plot_root_loci(loci: Sequence[RootLocus]) -> Figure:
-    """Poles in the s plane, from a twentieth to twenty times today's gain."""
+    """Poles in the s plane, from a twentieth to twenty times the current gain."""
     figure, cells = panels(len(loci), columns=2, size=(4.8, 3.8))
     for axes, locus in zip(cells, loci, strict=True):
         _root_locus(figure, axes, locus)
@@ -156,8 +161,8 @@ def _root_locus(figure: Figure, axes: Axes, locus: RootLocus) -> None:
     poles = locus.poles
     values = np.repeat(locus.values[:, None], poles.shape[1], axis=1)
     dots = axes.scatter(poles.real, poles.imag, c=values, s=7, norm="log")
-    today, label = locus.poles_today, f"today: {locus.today:g}"
-    axes.plot(today.real, today.imag, "*", markersize=11, label=label, **_TODAY)
+    today, label = locus.poles_today, f"current: {locus.today:g}"
+    axes.plot(today.real, today.imag, "*", markersize=11, label=label, **_CURRENT)
     slow = np.abs(locus.poles_today)[np.isfinite(locus.poles_today)]
     reach = 4.0 * max(float(slow[slow < 10.0].max(initial=0.5)), 0.5)
     axes.axvline(0.0, color="black", linewidth=0.8)

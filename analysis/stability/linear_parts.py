@@ -340,11 +340,16 @@ def _render_step(data: StepCheck, name: str) -> list[str]:
     return [
         paragraph(
             f"P starts {data.step_m:g} m off the operating point, along the line to "
-            f"the source. Exact sensors: {100.0 * data.frequency_error:.2f} % off in "
-            f"frequency and {100.0 * data.damping_error:.2f} % in damping. The "
+            f"the source. Exact sensors: {100.0 * data.frequency_error:z.2f} % off in "
+            f"frequency and {100.0 * data.damping_error:z.2f} % in damping. The "
             "scenario's own sensors (in a full report) differ more: echoes of cones "
             "are not nearest points, and hearing has its noise and its silences."
         ),
         table(["", "rad/s", "damping ratio"], rows),
-        figure_html(plot_step(data), name, "A small step, predicted and simulated."),
+        figure_html(
+            plot_step(data),
+            name,
+            "A small step: the linear model, released at rest, and simulation. Where "
+            "the law's velocity term acts from afar it pushes once as a run begins.",
+        ),
     ]

@@ -29,7 +29,7 @@ from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import BreakPoint
-from diagrams import Scenario
+from diagrams import Scenario, library_scenarios
 from systems.framework.input_error import InputError
 
 __all__ = [
@@ -126,15 +126,30 @@ class WholeLoop:
 
 @dataclass(frozen=True)
 class RecommendedGains:
-    """Today's gains, and the least damping for each of several springs."""
+    """The current gains, and the least damping for each of several springs."""
 
     thresholds: GainThresholds
+    scenario: str
+    """Name in the library, or the file that a report writes beside itself."""
+    law: str
     today: GainFigures
     choices: tuple[GainChoice, ...]
     recommended: GainFigures | None
-    """With today's spring, or else the one with the least lag; none: nothing."""
+    """With the current spring, or else the one with the least lag; none: nothing."""
     whole_loop: WholeLoop | None
     """With the recommended gains; none: nothing is recommended."""
+
+    @property
+    def command(self) -> str:
+        """Simulates with the recommended gains; empty where there are none."""
+        if self.recommended is None:
+            return ""
+        gains = self.recommended
+        return (
+            f"phonotaxis simulate {self.scenario} --law {self.law} "
+            f"--set attraction.stiffness_n_m={gains.stiffness_n_m:g} "
+            f"--set attraction.damping_n_s_m={gains.damping_n_s_m:g}"
+        )
 
     @property
     def advice(self) -> str:
@@ -147,13 +162,9 @@ class RecommendedGains:
             )
         same_spring = best.stiffness_n_m == today.stiffness_n_m
         if same_spring and best.damping_n_s_m <= today.damping_n_s_m:
-            return "Today's gains meet everything asked of the attraction here."
-        settings = (
-            f"attraction.stiffness_n_m={best.stiffness_n_m:g} "
-            f"attraction.damping_n_s_m={best.damping_n_s_m:g}"
-        )
+            return "The current gains meet everything asked of the attraction here."
         return (
-            f"Recommended: `{settings}`. It costs distance: P stays "
+            f"Recommended: `{self.command}`. It costs distance: P stays "
             f"{best.following_lag_m:.2f} m instead of {today.following_lag_m:.2f} m "
             "behind the follow point of the moving source, which a shorter follow "
             "distance can take back, for it overshoots less. It gains: 2 % is reached "
@@ -246,15 +257,15 @@ def recommend_gains(
     """Finds the least D_r for each of several K_r.
 
     Args:
-        scenario: Today's gains, law, robot and plant.
+        scenario: Current gains, law, robot and plant.
         thresholds: What is to be met.
-        springs: K_r that are tried, as multiples of today's.
+        springs: K_r that are tried, as multiples of the current one.
 
     Returns:
-        Today's gains, each choice with its figures, and the one recommended.
+        The current gains, each choice with its figures, and the one recommended.
 
     Raises:
-        InputError: There is no spring today.
+        InputError: There is no spring.
     """
     thresholds = thresholds or GainThresholds()
     today = scenario.attraction.stiffness_n_m
@@ -266,8 +277,11 @@ def recommend_gains(
         )
     choices = tuple(_choice(scenario, share * today, thresholds) for share in springs)
     best = _best(choices, today)
+    known = scenario.name in library_scenarios()
     return RecommendedGains(
         thresholds,
+        scenario.name if known else "scenario.yaml",
+        scenario.law,
         gain_figures(scenario, thresholds),
         choices,
         best,

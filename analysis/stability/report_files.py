@@ -13,7 +13,7 @@ from analysis.reporting.plain_values import plain
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.report_page import stability_page
-from analysis.stability.verdicts import compare_verdicts
+from analysis.stability.verdicts import compare_verdicts, shown_value
 from diagrams import dump_scenario
 
 __all__ = ["stability_document", "stability_text", "write_stability"]
@@ -88,7 +88,7 @@ def stability_text(document: dict[str, Any]) -> str:
     lines = [f"{'':<34}{'threshold':>14}{heads}"]
     for row in rows:
         cells = "".join(
-            f"{_value(row['values'][law]):>{width - 10}}"
+            f"{_value(row['values'][law], row['unit']):>{width - 10}}"
             f"{_mark(row['verdicts'][law]):>10}"
             for law in laws
         )
@@ -104,8 +104,11 @@ def _as_comparison(row: dict[str, Any], law: str) -> dict[str, Any]:
     }
 
 
-def _value(value: float | None) -> str:
-    return "-" if value is None else f"{value:.4g}"
+def _value(value: float | None, unit: str) -> str:
+    shown = shown_value(value, unit)
+    if shown is None:
+        return "-"
+    return shown if isinstance(shown, str) else f"{shown:.4g}"
 
 
 def _mark(verdict: str) -> str:
@@ -124,9 +127,8 @@ def write_stability(
         document: From ``stability_document``.
         directory: Exists.
     """
-    several = len(analyses) > 1
     models = [
-        replace(model, name=f"{analysis.law} {model.name}") if several else model
+        replace(model, name=f"{analysis.law} {model.name}")
         for analysis in analyses
         for model in analysis.models
     ]

@@ -23,7 +23,7 @@ from analysis.reporting.html_page import (
 from analysis.run_error import failure_text
 from analysis.stability.law_analysis import Finding, LawAnalysis
 from analysis.stability.model_sheet import ModelSheet, ParameterRow
-from analysis.stability.verdicts import VerdictRow, compare_verdicts
+from analysis.stability.verdicts import VerdictRow, compare_verdicts, shown_value
 from systems.laws.catalogue import law_title
 from systems.laws.law import Equation
 
@@ -74,7 +74,10 @@ def _verdict_table(rows: Sequence[VerdictRow], laws: Sequence[str]) -> str:
         [
             row.name,
             row.threshold,
-            *(Judged(row.values[law], row.verdicts[law]) for law in laws),
+            *(
+                Judged(shown_value(row.values[law], row.unit), row.verdicts[law])
+                for law in laws
+            ),
             row.text,
         ]
         for row in rows

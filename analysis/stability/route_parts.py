@@ -208,7 +208,7 @@ def _render_bounds(data: GainBounds, name: str) -> list[str]:
     contacts = "any number of" if math.isinf(data.contacts) else f"{data.contacts:g}"
     return [
         paragraph(
-            f"With D = {number(damping)} N s/m (K = {number(stiffness)} N/m today), a "
+            f"With D = {number(damping)} N s/m (K = {number(stiffness)} N/m as set), a "
             f"motor lag of {number(data.mass.motor_lag_s)} s and ticks of "
             f"{number(data.mass.tick_s * 1e3)} ms. By bisection on the one-period "
             "matrix of the blocks, and by the closed form that warns before a run."
@@ -288,7 +288,7 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             f"Rate: gamma = {number(data.rate)}. Without a cure K and D run away from "
             f"{number(data.critical.rate)} on where the target swings by "
             f"{number(data.critical.amplitude_m)} m, the lag at which it pulls P "
-            f"through a contact: {number(data.margin)} times today's. gamma_crit "
+            f"through a contact: {number(data.margin)} times the current. gamma_crit "
             "a\u00b2 is "
             + ", ".join(
                 f"{number(each.product)} at {number(each.amplitude_m)} m"

@@ -151,7 +151,7 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "rounding",
     ): _adaptation(_rise),
     Criterion(
-        "critical rate, of today's", "", "above", 1.0,
+        "critical rate, of the current", "", "above", 1.0,
         "K and D do not run away where the target leads by the largest lag",
         "K and D run away where the target leads by the largest lag",
         "simulated, without contacts and cures",

@@ -249,7 +249,7 @@ def _slowest(multipliers: NDArray[np.complex128]) -> Sequence[complex]:
 def _render_bursts(data: BurstCycles, name: str) -> list[str]:
     rows: list[list[Cell]] = [
         [
-            cycle.hold + (" (today)" if cycle.hold == data.today else ""),
+            cycle.hold + (" (current)" if cycle.hold == data.today else ""),
             ", ".join(f"{abs(m):.4f}" for m in _slowest(cycle.multipliers)),
             run.factor,
             "yes" if cycle.stable else "no",
@@ -278,7 +278,7 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
 
 @dataclass(frozen=True)
 class SamplingCharts:
-    """How sampling, gains and delay decide, with today's design marked."""
+    """How sampling, gains and delay decide, with the current design marked."""
 
     conditions: tuple[ConditionCheck, ...]
     """Closed forms of the sampled double integrator."""
@@ -316,8 +316,10 @@ def _render_loci(data: Sequence[RootLocus], name: str) -> list[str]:
             "Poles as one gain varies, ln(z)/T of the sampled loop: of the loop to the "
             "target, and of the contact mode where the law is stiffest."
         ),
-        table(["gain", "loop", "today", "stability ends at"], rows),
-        figure_html(plot_root_loci(data), name, "Root loci; today's poles are marked."),
+        table(["gain", "loop", "current", "stability ends at"], rows),
+        figure_html(
+            plot_root_loci(data), name, "Root loci; the current poles are marked."
+        ),
     ]
 
 
@@ -334,7 +336,7 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
         ),
         paragraph(
             f"The loop to the target stays stable up to a sample period of "
-            f"{data.period.longest_stable_s:.3g} s; today {data.period.today_s:g} s."
+            f"{data.period.longest_stable_s:.3g} s; it is {data.period.today_s:g} s."
         ),
         figure_html(
             plot_poles_against_period(data.period),
@@ -357,9 +359,9 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
         for lag, row in zip(data.motor_lags_s, data.stiffness_n_m, strict=True)
     ]
     caption = (
-        "Largest slope -df/dc of a law, N/m: K_0 of the conventional law (today "
+        "Largest slope -df/dc of a law, N/m: K_0 of the conventional law (now "
         f"{number(data.stiffness_today_n_m)}), k_ref/e\u00b2 of the active law of 2019 "
-        f"(today {number(data.reference_stiffness_today_n_m / math.e**2)})"
+        f"(now {number(data.reference_stiffness_today_n_m / math.e**2)})"
     )
     lag, ticks = data.today
     return [
@@ -392,7 +394,11 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
         "K_r", "D_r", "damping ratio", "phase (deg)", "gain (dB)", "M_s", "disk",
         "delay (s)", "lag (m)", "to 2 % (s)", "stiffest law (N/m)",
     ]  # fmt: skip
-    rows: list[list[Cell]] = [["Today"], _figures(today), ["Least D_r that meets all"]]
+    rows: list[list[Cell]] = [
+        ["Current gains"],
+        _figures(today),
+        ["Least D_r that meets all"],
+    ]
     rows += [
         _figures(choice.figures)
         if choice.figures

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from analysis.reporting.html_page import Cell, table
 from analysis.stability.law_analysis import Part, Study
 from analysis.stability.verdict_readings import CRITERIA, Reading
-from analysis.stability.verdicts import Criterion, Verdict, judge
+from analysis.stability.verdicts import Criterion, Verdict, judge, shown_value
 
 __all__ = ["verdict_parts"]
 
@@ -52,7 +52,8 @@ def _verdicts(
 
 def _render(data: tuple[Verdict, ...], name: str) -> list[str]:
     rows: list[list[Cell]] = [
-        [v.name, v.value, v.threshold, v.verdict, v.text, v.source] for v in data
+        [v.name, shown_value(v.value, v.unit), v.threshold, v.verdict, v.text, v.source]
+        for v in data
     ]
     headings = [
         "criterion",

@@ -13,7 +13,7 @@ from analysis.linear.contact_mode import contact_spectral_radius
 from analysis.linear.loop_uncertainty import law_stiffness
 from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
-from analysis.stability.verdicts import Criterion
+from analysis.stability.verdicts import YES_OR_NO, Criterion
 
 __all__ = [
     "CRITERIA",
@@ -96,7 +96,7 @@ read_delay = _of(
     "delay margins were not computed",
     lambda data: min((m.delay_s for m in data.margins), default=None),
 )
-#: Largest multiplier of the burst cycle with today's hold.
+#: Largest multiplier of the burst cycle with the current hold.
 read_cycle = _of(
     "burst_cycle",
     "the burst cycle was not computed",
@@ -275,7 +275,7 @@ CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         _OURS,
     ): read_offset,
     Criterion(
-        "start certified, 1 for yes", "", "at least", 1.0,
+        "start certified", YES_OR_NO, "at least", 1.0,
         "from this scenario's start P touches nothing, in the certificate's model",
         "energy alone does not exclude a contact from this start",
         "energy certificate",

@@ -6,7 +6,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = ["Criterion", "Verdict", "VerdictRow", "compare_verdicts", "judge"]
+__all__ = [
+    "YES_OR_NO",
+    "Criterion",
+    "Verdict",
+    "VerdictRow",
+    "compare_verdicts",
+    "judge",
+    "shown_value",
+]
+
+#: Unit of what is true or not: 1 or 0.
+YES_OR_NO = "yes or no"
 
 Judgement = Literal["pass", "fail", "not applicable"]
 
@@ -29,6 +40,8 @@ class Criterion:
     @property
     def threshold(self) -> str:
         """In signs, with the unit."""
+        if self.unit == YES_OR_NO:
+            return "yes"
         sign = {"at least": "\u2265", "above": ">", "at most": "\u2264", "below": "<"}
         return f"{sign[self.sense]} {self.limit:.4g} {self.unit}".rstrip()
 
@@ -69,6 +82,21 @@ class VerdictRow:
     verdicts: dict[str, Judgement]
     text: str
     """In plain words, laws of the same verdict together."""
+
+
+def shown_value(value: float | None, unit: str) -> float | str | None:
+    """What a table shows of a number: yes or no, where it stands for that.
+
+    Args:
+        value: Of a verdict.
+        unit: Its unit.
+
+    Returns:
+        The number, a word, or None where there is none.
+    """
+    if value is None or unit != YES_OR_NO:
+        return value
+    return "yes" if value else "no"
 
 
 def judge(criterion: Criterion, value: float | None, reason: str = "") -> Verdict:

@@ -96,7 +96,7 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
             markeredgecolor="black",
             markersize=14 if k == 0 else 9,
             linestyle="none",
-            label=f"today, {name}",
+            label=f"current, {name}",
         )
     if bounds.box is not None:
         (low_k, high_k), (low_d, high_d) = bounds.box
@@ -183,7 +183,7 @@ def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
             chain.dampings, chain.peaks_by_damping[:, k], color=_LINES[k], label=name
         )
     right.axvline(
-        chain.damping_n_s_m, color=COLOURS["empty"], linestyle="--", label="today"
+        chain.damping_n_s_m, color=COLOURS["empty"], linestyle="--", label="current"
     )
     right.set_ylim(0.8, _HIGHEST)
     right.set_xlabel(f"D (N s/m) at K = {chain.stiffness_n_m:g} N/m")

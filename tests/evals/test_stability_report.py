@@ -106,13 +106,15 @@ def test_page_holds_everything_and_loads_nothing(report):
 
 def test_exported_models_have_the_poles_of_the_document(report, document):
     models = loadmat(report / "models.mat", simplify_cells=True)
-    A = models["closed_loop_continuous"]["A"]
+    A = models["conventional_closed_loop_continuous"]["A"]
     expected = document["linear_models"]["continuous"]["poles"]
     found = np.linalg.eigvals(A)
     for re_part, im_part in expected:
         assert np.abs(found - complex(re_part, im_part)).min() < 1e-9
-    assert models["closed_loop"]["Ts"] == 0.025
-    assert len(models["closed_loop"]["StateName"]) == len(models["closed_loop"]["A"])
+    assert models["conventional_closed_loop"]["Ts"] == 0.025
+    assert len(models["conventional_closed_loop"]["StateName"]) == len(
+        models["conventional_closed_loop"]["A"]
+    )
 
 
 def test_effective_scenario_can_be_analysed_again(report):

@@ -38,7 +38,7 @@ def designed(scenario: Scenario, law: str) -> LawDesign:
 
 
 def unmet(design: LawDesign) -> set[str]:
-    return {check.name for check in design.checks if not check.met}
+    return {check.name for check in design.checks if not check.acceptable}
 
 
 def test_defaults_are_what_the_requirements_give():
@@ -110,7 +110,7 @@ def test_laws_have_the_same_barrier():
 
 
 def test_active_law_meets_every_requirement():
-    assert check_law(SCENARIO, "active", REQUIREMENTS).met
+    assert check_law(SCENARIO, "active", REQUIREMENTS).acceptable
 
 
 def test_conventional_law_cannot_have_both_barrier_and_contact():
@@ -122,7 +122,7 @@ def test_conventional_law_cannot_have_both_barrier_and_contact():
 
 
 def test_a_little_more_damping_resolves_it():
-    assert designed(with_attraction(damping_n_s_m=1.1), "conventional").met
+    assert designed(with_attraction(damping_n_s_m=1.1), "conventional").acceptable
 
 
 @pytest.mark.parametrize("law", ["conventional2017", "active2017"])
@@ -169,4 +169,4 @@ def test_document_quotes_the_figures():
             found = design.check(check.name)
             number = float(re.findall(r"\d[\d.]*", cell)[0])
             assert number == pytest.approx(found.value, rel=1e-3, abs=6e-4)
-            assert ("**" in cell) == (not found.met)
+            assert ("**" in cell) == (not found.acceptable)

@@ -23,6 +23,14 @@ def test_prediction_is_within_2_percent_of_the_all_ideal_build(law):
     assert check.full is None
 
 
+@pytest.mark.parametrize("law", ["none", "conventional"])
+def test_the_predicted_curve_of_a_small_step_is_that_of_the_run(law):
+    """The active law's velocity term gives a run one more push as it begins."""
+    check = check_step(Scenario(law=law), step_m=0.002)
+    off = np.abs(check.predicted_m - check.ideal_m).max()
+    assert off < 0.02 * check.step_m
+
+
 def test_the_corner_of_a_strong_velocity_term_costs_damping():
     """|dC/dt| has no slope at rest: with D_0 as large as D_r, 3 % of damping.
 

@@ -54,6 +54,11 @@ def _boxes(picture):
     return boxes
 
 
+def test_it_scales_with_what_shows_it(picture):
+    assert picture.get("width") is None
+    assert len(picture.get("viewBox").split()) == 4
+
+
 def test_every_input_port_has_one_wire_from_a_port_of_its_name(follower):
     found = wires(follower.diagram)
     blocks = follower.blocks.values()
@@ -124,7 +129,7 @@ def test_each_wire_ends_on_the_edges_of_its_blocks(follower, picture):
 
 def test_no_two_blocks_overlap_and_all_are_on_the_page(picture):
     boxes = list(_boxes(picture).values())
-    page = float(picture.get("width")), float(picture.get("height"))
+    page = [float(size) for size in picture.get("viewBox").split()[2:]]
     for k, (x, y, width, height) in enumerate(boxes):
         assert min(x, y) > 0
         assert x + width < page[0]

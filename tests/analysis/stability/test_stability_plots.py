@@ -70,7 +70,7 @@ def test_charts_mark_todays_design(scenario):
         scenario, stiffnesses_n_m=[1.0, 2.0, 30.0], dampings_n_s_m=[0.5, 1.0, 2.0]
     )
     texts = drawn(chart_plots.plot_chart(chart)).axes[0].texts
-    assert [text.get_text() for text in texts] == ["today"]
+    assert [text.get_text() for text in texts] == ["current"]
     limits = drawn(chart_plots.plot_contact_limits(contact_limits(scenario)))
     assert len(limits.axes) == 2
     periods = poles_against_period(scenario, periods_s=[0.01, 0.025, 0.5])
@@ -87,7 +87,7 @@ def test_gap_chart_has_a_line_for_each_hold():
     )
     figure = drawn(chart_plots.plot_gap_chart(chart))
     labels = figure.axes[0].get_legend_handles_labels()[1]
-    assert labels == ["hold: world", "hold: robot", "today"]
+    assert labels == ["hold: world", "hold: robot", "current"]
 
 
 def test_root_loci_have_a_panel_each(scenario):
@@ -111,6 +111,7 @@ def test_equilibria_are_all_in_the_picture(scenario):
         assert tuple(found.p_WP) in places
 
 
-def test_step_shows_the_ideal_run(scenario):
+def test_step_shows_the_ideal_run_and_the_prediction(scenario):
     figure = drawn(linear_plots.plot_step(check_step(scenario)))
-    assert figure.axes[0].get_legend_handles_labels()[1] == ["all ideal"]
+    labels = figure.axes[0].get_legend_handles_labels()[1]
+    assert labels == ["exact sensors", "linear model"]
