@@ -101,9 +101,8 @@ def _write(writer: Any, run: RecordedRun) -> None:
 def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
     """What is said at each tick."""
     scenario = run.scenario
-    paths = {name: source.path() for name, source in scenario.all_sources.items()}
-    paths |= {each.name: each.path() for each in scenario.obstacles}
-    placed = {name: path.poses(run.time) for name, path in paths.items()}
+    bodies = scenario.all_sources | {each.name: each for each in scenario.obstacles}
+    placed = {name: body.path().poses(run.time) for name, body in bodies.items()}
     once = {each.name for each in scenario.obstacles if not each.path().moves}
     names = _ros_names([*run.robots, *placed])
     for tick, time in enumerate(run.time.tolist()):
