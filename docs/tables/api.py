@@ -16,14 +16,15 @@ __all__ = ["api_page"]
 
 _TOP = """# Names to import
 
-What stands in `phonotaxis` is public: it changes as [CONTRIBUTING.md](../CONTRIBUTING.md)
-says. Below it, each room exports what is meant for others; modules below a room may
-move. Blocks are in `systems` itself, too. `python -m docs.tables.api` prints this page.
+What stands in `phonotaxis` is public: it changes as
+[CONTRIBUTING.md](../CONTRIBUTING.md) says. Below it, each room exports what is meant
+for others; modules below a room may move. Blocks are in `systems` itself, too.
+`python -m docs.tables.api` prints this page.
 
 ## phonotaxis
 
-Loaded name by name, when first used: `import phonotaxis` itself takes no time. All of it
-is typed.
+Loaded name by name, when first used: `import phonotaxis` itself takes no time. All of
+it is typed.
 
 | name | what it is |
 |---|---|
@@ -49,7 +50,7 @@ def public_names() -> str:
     rows = []
     for name in phonotaxis.__all__:
         value = getattr(phonotaxis, name)
-        text = "of the package" if isinstance(value, str) else inspect.getdoc(value)
+        text = "Of the package." if isinstance(value, str) else inspect.getdoc(value)
         rows.append(f"| `{name}` | {(text or '').partition(chr(10))[0]} |\n")
     return "".join(rows)
 
