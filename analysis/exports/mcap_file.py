@@ -129,12 +129,16 @@ def _ros_names(names: Iterable[str]) -> dict[str, str]:
     """Names that topics and frames may bear: letters, digits, underscores."""
     found: dict[str, str] = {}
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
-        plain = plain if plain[:1].isalpha() else f"_{plain}"
+        plain = _plain(name)
         while plain in found.values():
             plain += "_"
         found[name] = plain
     return found
+
+
+def _plain(name: str) -> str:
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return plain if plain[:1].isalpha() else f"_{plain}"
 
 
 def _robot_frames(
@@ -191,7 +195,7 @@ def _robot_entries(
     for key, values in own.items():
         value = float(values[tick])
         if key not in told and math.isfinite(value):
-            yield f"/{name}/{key}", "std_msgs/Float64", {"data": value}
+            yield f"/{name}/{_plain(key)}", "std_msgs/Float64", {"data": value}
 
 
 def _range(
