@@ -120,6 +120,8 @@ def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path
 def test_pictures_are_asked_for_by_name(run: phonotaxis.RunResult):
     assert len(run.plot().axes) == 1
     assert len(run.plot("time_series").axes) > 3
+    picture = run.plot()._repr_png_()  # type: ignore[attr-defined]  # a notebook's
+    assert picture.startswith(b"\x89PNG")
     with pytest.raises(phonotaxis.InputError, match="use 'trajectory'"):
         run.plot("speed")  # type: ignore[arg-type]  # what mypy is there to tell
     several = phonotaxis.simulate(
