@@ -13,7 +13,7 @@ FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-fast browser-test lint typecheck bench attack mutate clean
+.PHONY: help demo test test-fast browser-test lint typecheck package bench attack mutate clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
@@ -36,6 +36,9 @@ lint: .venv/.installed-dev ## check style and format
 
 typecheck: .venv/.installed-dev ## check types
 	@$(PY) -m mypy
+
+package: .venv/.installed-dev ## build the package, and use it where the sources are not
+	@.ci/check_package
 
 bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks

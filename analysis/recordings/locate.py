@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.recordings.array_geometry import (
-    ROBOT_ARRAY,
     ArrayGeometry,
     KnownArray,
     load_geometry,
+    make_geometry,
 )
 from analysis.recordings.array_match import array_mismatch
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
@@ -73,12 +75,20 @@ class HeardRecording(NamedTuple):
     faults: list[ChannelFault]
 
 
-def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
+def locate(
+    recording: str | Path | ArrayLike,
+    geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
+    *,
+    sample_rate_hz: float | None = None,
+) -> LocateResult:
     """Locates the source of a recording, stretch by stretch.
 
     Args:
-        path: WAV or FLAC with one channel a microphone, 8-192 kHz.
-        geometry: The microphones; the robot's own array by default.
+        recording: WAV or FLAC with one channel a microphone, 8-192 kHz; or samples,
+            (n, samples), one row a microphone.
+        geometry: The microphones, as an object, a file, or their places (x, y) or
+            (x, y, z) in m; none: the robot's own array.
+        sample_rate_hz: Of samples, Hz; a file has its own.
 
     Returns:
         ``LocateResult``. Standard deviations count what the geometry says of its
@@ -88,10 +98,10 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     Raises:
         InputError: The recording cannot be used; says why, and the remedy.
     """
-    geometry = geometry or ROBOT_ARRAY
-    samples, rate = read_sound(path, "recording")
-    heard = hear(samples, rate, geometry, repr(str(path)))
-    known, recording, search = geometry.known, heard.recording, heard.search
+    geometry = make_geometry(geometry)
+    samples, rate, where = _samples(recording, sample_rate_hz)
+    heard = hear(samples, rate, geometry, where)
+    known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
     array = {
         "microphones": [list(place) for place in geometry.microphones],
@@ -104,16 +114,16 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
         "position_std_m": known.budget.position_std,
         "delay_std_s": known.budget.delay_std,
         "largest_range_error": known.largest_range_error,
-        "band_hz": [recording.low_hz, recording.high_hz],
+        "band_hz": [spectra.low_hz, spectra.high_hz],
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
     sources = heard_sources(
-        recording.channels,
+        spectra.channels,
         shape,
         known.c,
         float(rate),
-        (recording.low_hz, recording.high_hz),
+        (spectra.low_hz, spectra.high_hz),
     )
     return LocateResult(
         array,
@@ -161,6 +171,43 @@ def hear(
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
+
+
+def _samples(
+    recording: str | Path | ArrayLike, sample_rate_hz: float | None
+) -> tuple[NDArray[np.float64], int, str]:
+    """Samples, (n, samples), their rate, Hz, and what to call them."""
+    if isinstance(recording, str | Path):
+        if sample_rate_hz is not None:
+            raise InputError(
+                "sample_rate_hz", "is that of samples; leave it out, a file has its own"
+            )
+        samples, rate = read_sound(recording, "recording")
+        return samples, rate, repr(str(recording))
+    if sample_rate_hz is None:
+        raise InputError("sample_rate_hz", "is not said; give that of the samples, Hz")
+    if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
+        raise InputError(
+            "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
+        )
+    given = np.asarray(recording)
+    where = f"array of shape {given.shape}"
+    if given.dtype.kind not in "iuf":
+        raise InputError("recording", f"{where} holds no numbers; give samples")
+    if given.ndim != 2 or len(given) > given.shape[1]:
+        raise InputError(
+            "recording",
+            f"{where}; give (microphones, samples), one row a microphone: transpose "
+            "what soundfile.read returns",
+        )
+    samples = given.astype(np.float64)
+    if given.dtype.kind in "iu":
+        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
+    if not np.isfinite(samples).all() or not samples.any():
+        raise InputError(
+            "recording", f"{where} is silent or not finite; give what was recorded"
+        )
+    return samples, round(sample_rate_hz), where
 
 
 def _recording(

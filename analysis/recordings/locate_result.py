@@ -88,7 +88,7 @@ class SourceEstimate:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LocateResult:
     """Estimates of the stretches in which a source was heard."""
 
@@ -106,6 +106,10 @@ class LocateResult:
     """All sources over the recording, and their tracks."""
     largest_range_error: float = 0.2
     """Ranges are given up to this standard deviation over range."""
+
+    def __repr__(self) -> str:
+        heard = f"{len(self.estimates)} of {self.frames} stretches heard"
+        return f"<LocateResult {self.shape.count} microphones, {heard}>"
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.

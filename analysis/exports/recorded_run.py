@@ -1,0 +1,108 @@
+"""What a run's directory keeps: its scenario, and what each robot did."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import RunResult, Scenario, load_scenario
+from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["SCENARIO_FILE", "TABLE_FILE", "RecordedRun"]
+
+SCENARIO_FILE, TABLE_FILE = "scenario.yaml", "trajectory.parquet"
+#: Without these there is nothing to see.
+_NEEDED = (
+    *("t", "p_WB_x", "p_WB_y", "theta_WB"),
+    *("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
+    *("p_WS_x", "p_WS_y", "theta_WS", "v_WB_x", "v_WB_y", "omega_WB"),
+)
+
+
+@dataclass(frozen=True)
+class RecordedRun:
+    """A run as another program gets it."""
+
+    scenario: Scenario
+    """The whole one."""
+    table: pd.DataFrame
+    """``RunResult.trajectory``."""
+
+    @classmethod
+    def of(cls, result: RunResult) -> RecordedRun:
+        """From a run that has just ended."""
+        return cls(result.full_scenario, result.trajectory)
+
+    @classmethod
+    def load(cls, directory: str | Path) -> RecordedRun:
+        """From the result directory of ``phonotaxis simulate``.
+
+        Raises:
+            InputError: It is none, or its files do not belong together.
+        """
+        folder = Path(directory)
+        for name in (SCENARIO_FILE, TABLE_FILE):
+            if not (folder / name).is_file():
+                raise InputError(
+                    "result",
+                    f"{str(folder)!r} has no {name}; give the result directory of a "
+                    "run, as phonotaxis simulate makes it",
+                )
+        scenario = load_scenario(folder / SCENARIO_FILE)
+        run = cls(scenario, _read(folder / TABLE_FILE))
+        for name, own in run.robots.items():
+            if missing := [key for key in _NEEDED if key not in own]:
+                raise InputError(
+                    "result",
+                    f"{str(folder / TABLE_FILE)!r} has no {missing[0]} of {name}, as "
+                    f"{SCENARIO_FILE} beside it would have; run again",
+                )
+        return run
+
+    @cached_property
+    def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
+        """(n,) columns by name, as if each robot were alone, by the robot's name."""
+        names = list(self.scenario.all_robots)
+        columns = {
+            str(name): self.table[name].to_numpy(dtype=float) for name in self.table
+        }
+        if len(names) == 1:
+            return {names[0]: columns}
+        return {name: _own(columns, f"{name}.") for name in names}
+
+    @property
+    def time(self) -> NDArray[np.float64]:
+        """(n,) of the ticks, s."""
+        return next(iter(self.robots.values()))["t"]
+
+
+def _read(path: Path) -> pd.DataFrame:
+    import pandas as pd
+    from pyarrow import ArrowException
+
+    try:
+        return pd.read_parquet(path)
+    except (OSError, ArrowException, ValueError) as error:
+        raise InputError(
+            "result", f"{str(path)!r} cannot be read ({error}); run again"
+        ) from None
+
+
+def _own(
+    columns: Mapping[str, NDArray[np.float64]], prefix: str
+) -> Mapping[str, NDArray[np.float64]]:
+    own = {
+        key.removeprefix(prefix): values
+        for key, values in columns.items()
+        if key.startswith(prefix)
+    }
+    return {"t": columns["t"], **own} if "t" in columns else own
