@@ -1,0 +1,52 @@
+"""How Sphinx makes the site: ``make docs``.
+
+The pages are README.md, CHANGELOG.md and docs/*.md as they are. Made beside them are
+only the pages of the reference, one for each heading of docs/api.md.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from importlib.metadata import version as installed_version
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+project = "phonotaxis"
+author = "phonotaxis developers"
+copyright = f"2026, {author}"  # noqa: A001  # Sphinx calls it so
+version = release = installed_version("phonotaxis")
+
+root_doc = "docs/index"
+include_patterns = ["README.md", "CHANGELOG.md", "docs/**"]
+exclude_patterns = [".*", "build", "site", "results", "docs/results", "docs/tables"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "docs.building.markdown_links",
+    "docs.building.mathematics",
+    "docs.building.wiring",
+    "docs.building.port_tables",
+    "docs.building.reference",
+]
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+myst_fence_as_directive = ["math", "mermaid"]
+
+nb_execution_mode = "force"
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+
+html_theme = "furo"
+html_title = f"phonotaxis {version}"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
