@@ -13,7 +13,7 @@ from systems.framework.input_error import LONGEST_MESSAGE, shortened
 __all__ = ["RunError", "failure_text", "no_exit"]
 
 _ROOT = Path(__file__).resolve().parents[1]
-_OURS = ("systems", "diagrams", "analysis", "phonotaxis.py")
+_OURS = ("systems", "diagrams", "analysis", "phonotaxis")
 
 
 class RunError(Exception):

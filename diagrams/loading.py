@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -34,14 +35,16 @@ def library_scenarios() -> dict[str, Path]:
 
 
 def load_scenario(
-    source: str | Path = "default", overrides: Iterable[str] = ()
+    source: str | Path = "default",
+    overrides: Iterable[str] | Mapping[str, Any] = (),
 ) -> Scenario:
     """Loads a scenario.
 
     Args:
         source: A name of the library (``phonotaxis scenarios``) or a path.
         overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``
-            or ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML.
+            or ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML. Or a mapping of
+            dotted keys to values, as ``{"source.speed_m_s": 0.2}``.
 
     Returns:
         ``Scenario``.
@@ -55,9 +58,21 @@ def load_scenario(
     data = read_mapping(path)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
-    set_fields(data, map(parse_setting, overrides))
+    set_fields(data, _settings(overrides))
     resolve_sound(data, Path.cwd())
     return scenario_from_mapping(data)
+
+
+def _settings(
+    overrides: Iterable[str] | Mapping[str, Any],
+) -> Iterable[tuple[str, Any]]:
+    if isinstance(overrides, Mapping):
+        return copy.deepcopy(dict(overrides)).items()
+    if isinstance(overrides, str):
+        raise InputError(
+            "overrides", f"is the text {overrides!r}; give a list of key=value"
+        )
+    return map(parse_setting, overrides)
 
 
 def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:

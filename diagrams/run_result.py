@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,7 +49,7 @@ class RunResult:
     """Of the robot."""
     engine: Engine = "drake"
     """What carried the run out."""
-    several: dict[str, RunResult] = field(default_factory=dict)
+    several: dict[str, Self] = field(default_factory=dict)
     """What each robot did, where there are several."""
     others: Surroundings | None = None
     """What this robot had about it, other robots on their ways included."""
@@ -66,7 +66,7 @@ class RunResult:
         return self.whole or self.scenario
 
     @property
-    def robots(self) -> dict[str, RunResult]:
+    def robots(self) -> dict[str, Self]:
         """What each robot did, by name."""
         return self.several or {self.name: self}
 

@@ -45,7 +45,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         stability_text,
         write_stability,
     )
-    from analysis.stability.report_parts import parts
+    from analysis.stability.report_parts import parts_of
     from diagrams import load_scenario
 
     place = take(options.out)
@@ -54,12 +54,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
     scenarios = chosen_laws(scenario, options.law or [])
-    work = parts(
-        full=options.full,
-        guarded=any(each.own_guard is not None for each in scenarios),
-        routed=scenario.route is not None,
-        searching=scenario.searches is not None,
-    )
+    work = parts_of(scenarios, full=options.full)
 
     def run(progress: Progress) -> list[LawAnalysis]:
         analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]

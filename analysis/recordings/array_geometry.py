@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Literal
@@ -17,7 +18,13 @@ from systems.sound.acoustics import AcousticParameters, sound_speed
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["ROBOT_ARRAY", "ArrayGeometry", "KnownArray", "load_geometry"]
+__all__ = [
+    "ROBOT_ARRAY",
+    "ArrayGeometry",
+    "KnownArray",
+    "load_geometry",
+    "make_geometry",
+]
 
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
@@ -236,6 +243,36 @@ def _check_covariance(given: tuple[tuple[float, ...], ...], shape: ArrayShape) -
             "position_covariance_m2",
             "has a negative variance in some direction; give a covariance, m^2",
         )
+
+
+def make_geometry(
+    geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None,
+) -> ArrayGeometry:
+    """A geometry from whatever says where microphones are.
+
+    Args:
+        geometry: It, its file, places (x, y) or (x, y, z) in m, or none: the
+            robot's own array.
+
+    Returns:
+        The geometry.
+
+    Raises:
+        InputError: It makes no sense; says why, and the remedy.
+    """
+    if geometry is None:
+        return ROBOT_ARRAY
+    if isinstance(geometry, ArrayGeometry):
+        return geometry
+    if isinstance(geometry, str | Path):
+        return load_geometry(geometry)
+    try:
+        places = tuple(tuple(float(x) for x in place) for place in geometry)
+        return ArrayGeometry.model_validate({"microphones": places})
+    except (TypeError, ValueError) as error:
+        wrong = isinstance(error, ValidationError)
+        what = _first_error(error) if wrong else "is no list of places [x, y] in m"
+        raise InputError("geometry", what) from None
 
 
 def load_geometry(path: str | Path) -> ArrayGeometry:

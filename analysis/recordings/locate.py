@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.recordings.array_geometry import (
     ROBOT_ARRAY,
     ArrayGeometry,
     KnownArray,
     load_geometry,
+    make_geometry,
 )
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.heard_sources import heard_sources
@@ -48,12 +51,20 @@ _SLACK = 4.0
 _EXPLAINS_LATENESS = ("size", "near")
 
 
-def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateResult:
+def locate(
+    recording: str | Path | ArrayLike,
+    geometry: ArrayGeometry | str | Path | Sequence[Sequence[float]] | None = None,
+    *,
+    sample_rate_hz: float | None = None,
+) -> LocateResult:
     """Locates the source of a recording, stretch by stretch.
 
     Args:
-        path: WAV or FLAC with one channel a microphone, 8-192 kHz.
-        geometry: The microphones; the robot's own array by default.
+        recording: WAV or FLAC with one channel a microphone, 8-192 kHz; or samples,
+            (n, samples), one row a microphone.
+        geometry: The microphones, as an object, a file, or their places (x, y) or
+            (x, y, z) in m; none: the robot's own array.
+        sample_rate_hz: Of samples, Hz; a file has its own.
 
     Returns:
         ``LocateResult``. Standard deviations count what the geometry says of its
@@ -63,9 +74,8 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     Raises:
         InputError: The recording cannot be used; says why, and the remedy.
     """
-    geometry = geometry or ROBOT_ARRAY
-    samples, rate = read_sound(path, "recording")
-    where = repr(str(path))
+    geometry = make_geometry(geometry)
+    samples, rate, where = _samples(recording, sample_rate_hz)
     complaint = _complaint(samples, rate, geometry)
     if complaint:
         raise InputError("recording", f"{where} {complaint}")
@@ -109,6 +119,43 @@ def locate(path: str | Path, geometry: ArrayGeometry | None = None) -> LocateRes
     return LocateResult(
         array, shape, estimates, len(search.stretches), faults, sources, tracks
     )
+
+
+def _samples(
+    recording: str | Path | ArrayLike, sample_rate_hz: float | None
+) -> tuple[NDArray[np.float64], int, str]:
+    """Samples, (n, samples), their rate, Hz, and what to call them."""
+    if isinstance(recording, str | Path):
+        if sample_rate_hz is not None:
+            raise InputError(
+                "sample_rate_hz", "is that of samples; leave it out, a file has its own"
+            )
+        samples, rate = read_sound(recording, "recording")
+        return samples, rate, repr(str(recording))
+    if sample_rate_hz is None:
+        raise InputError("sample_rate_hz", "is not said; give that of the samples, Hz")
+    if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
+        raise InputError(
+            "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
+        )
+    given = np.asarray(recording)
+    where = f"array of shape {given.shape}"
+    if given.dtype.kind not in "iuf":
+        raise InputError("recording", f"{where} holds no numbers; give samples")
+    if given.ndim != 2 or len(given) > given.shape[1]:
+        raise InputError(
+            "recording",
+            f"{where}; give (microphones, samples), one row a microphone: transpose "
+            "what soundfile.read returns",
+        )
+    samples = given.astype(np.float64)
+    if given.dtype.kind in "iu":
+        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
+    if not np.isfinite(samples).all() or not samples.any():
+        raise InputError(
+            "recording", f"{where} is silent or not finite; give what was recorded"
+        )
+    return samples, round(sample_rate_hz), where
 
 
 def _recording(

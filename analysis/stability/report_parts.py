@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from analysis.stability.law_analysis import Part
 from analysis.stability.linear_parts import linear_parts
 from analysis.stability.margin_parts import margin_parts
@@ -13,8 +15,9 @@ from analysis.stability.safety_parts import safety_parts
 from analysis.stability.sampling_parts import gain_parts, sampling_parts
 from analysis.stability.search_parts import SEARCH_CRITERIA, search_parts
 from analysis.stability.verdict_parts import verdict_parts
+from diagrams import Scenario
 
-__all__ = ["parts"]
+__all__ = ["parts", "parts_of"]
 
 
 def parts(
@@ -42,6 +45,24 @@ def parts(
     if routed:
         return (*route_parts(left_out), *guard, *verdict_parts(ROUTE_CRITERIA))
     return (*_sound_parts(full=full), *guard, *verdict_parts())
+
+
+def parts_of(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
+    """The parts of a report about a robot.
+
+    Args:
+        scenarios: The robot's, one a law.
+        full: Also those that take minutes.
+
+    Returns:
+        In the report's order.
+    """
+    return parts(
+        full=full,
+        guarded=any(each.own_guard is not None for each in scenarios),
+        routed=scenarios[0].route is not None,
+        searching=scenarios[0].searches is not None,
+    )
 
 
 def _sound_parts(*, full: bool) -> tuple[Part, ...]:

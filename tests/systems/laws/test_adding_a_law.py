@@ -80,7 +80,7 @@ def page_code() -> str:
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
     (tree / "systems").mkdir(parents=True)
-    for name in ("analysis", "diagrams", "phonotaxis.py"):
+    for name in ("analysis", "diagrams", "phonotaxis"):
         (tree / name).symlink_to(ROOT / name)
     for part in (ROOT / "systems").iterdir():
         if part.name not in {"laws", "__pycache__"}:

@@ -1,0 +1,263 @@
+"""What each column of a run's table means, and its unit.
+
+Blocks name their columns in ``FACTS``; units are those of their port tables, and
+``tests/analysis/exports/test_columns.py`` holds both against this list.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, NamedTuple
+
+from diagrams import RunResult
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["COLUMNS", "Column", "column_of", "columns"]
+
+
+class Column(NamedTuple):
+    """A column, or several that differ in a number k alone."""
+
+    name: str
+    """With ``{k}`` where a number from 1 on stands."""
+    unit: str
+    """``1``: none; ``0 or 1``: a truth value; ``number``: a code or a count."""
+    meaning: str
+    """One sentence."""
+
+
+def _of(unit: str, **meanings: str) -> list[Column]:
+    """Columns of one unit."""
+    return [
+        Column(name.replace("_K", "_{k}"), unit, text)
+        for name, text in meanings.items()
+    ]
+
+
+def _xy(unit: str, name: str, meaning: str) -> list[Column]:
+    """Columns ``name_x`` and ``name_y``, of a vector in W unless the text says else."""
+    return [Column(f"{name}_{axis}", unit, f"{axis} of {meaning}") for axis in "xy"]
+
+
+_MOTION = [
+    *_of("s", t="time of the tick, from the begin of the run"),
+    *_xy("m", "p_WB", "the middle of the axle, B, in W"),
+    *_of("rad", theta_WB="heading of the robot in W, counter-clockwise, not wrapped"),
+    *_xy("m/s", "v_WB", "the velocity of B in W"),
+    *_of("rad/s", omega_WB="yaw rate of the robot, counter-clockwise"),
+    *_xy("m", "p_WP", "the control point, P, in W"),
+    *_xy("m/s", "v_WP", "the commanded velocity of P in W"),
+    *_of(
+        "rad/s",
+        wheel_speed_left="commanded speed of the left wheel",
+        wheel_speed_right="commanded speed of the right wheel",
+    ),
+    *_of(
+        "m/s",
+        slip_left="speed of the left rim less that of the ground below it",
+        slip_right="speed of the right rim less that of the ground below it",
+        slip_sideways="speed of the wheels to the left over the ground",
+    ),
+    *_xy("m", "p_WB_estimated", "B in W, by odometry"),
+    *_of("rad", theta_WB_estimated="heading in W, by odometry"),
+]
+_HEARING = [
+    *_xy("m", "p_WS", "what is followed, S (source, robot or goal), in W"),
+    *_of("rad", theta_WS="heading of what is followed in W"),
+    *_of("m", source_range_true="distance from P to S"),
+    *_of("rad", source_bearing_true="direction from P to S, from the robot's x axis"),
+    *_of(
+        "m",
+        p_PS_B_x="forward part of the heard place of S from P; 0 where nothing is "
+        "heard, of a unit vector where no range is",
+        p_PS_B_y="leftward part of the same",
+    ),
+    *_of("m", source_range="heard distance from P to S; empty where there is none"),
+    *_of(
+        "rad",
+        source_bearing="heard direction from P to S, from the robot's x axis; empty "
+        "where nothing is heard",
+    ),
+    *_of(
+        "0 or 1",
+        detected="whether the source was heard in the last frame",
+        range_valid="whether its range was heard, too",
+        target_valid="whether there is a target to go by",
+        ambiguous="whether another direction fits the sound as well",
+    ),
+    *_xy("m", "p_WS_estimated", "where the robot takes S to be, in W"),
+    *_of("number", lost_microphone="the first microphone that hears nothing; 0: none"),
+]
+_OBSTACLES = [
+    *_of("m", range_K="range of sensor k, its last one"),
+    *_of("0 or 1", echo_K="whether sensor k had an echo"),
+    *_of(
+        "m",
+        collision_K_B_x="forward part of collision vector k, from P to an obstacle",
+        collision_K_B_y="leftward part of collision vector k",
+    ),
+    *_of(
+        "number",
+        feature_K="which sensors vector k is of, a code that is the same as long as "
+        "they are; 0: no vector",
+    ),
+    *_of("m/s", obstacle_speed_K="speed of obstacle k as the law counts it"),
+]
+_CONTROL = [
+    *_xy("N", "attraction", "the force towards the target, in W"),
+    *_xy("N", "repulsion", "the force away from obstacles, in W"),
+    *_of("m/s", wanted_speed="forward speed that the law commands"),
+    *_of("rad/s", wanted_turn="yaw rate that the law commands"),
+    *_of(
+        "number",
+        plan_mode="0 no target, 1 driving, 2 looking, 3 backing off, 4 no way found",
+    ),
+    *_xy("m", "carrot", "the point that the law heads for, in W"),
+    *_of("m", way_left="way to go to the target"),
+    *_of(
+        "number",
+        guard_action="what the guard did: 0 passed, 1 slowed, 2 turned, 3 braked, "
+        "4 halted for a fault of the sensing",
+    ),
+    *_of(
+        "m",
+        guard_distance="how much farther the robot is from what is not free than it "
+        "has to be",
+        guard_stopping_distance="way in which the robot can stop",
+        guard_view_distance="guard_distance, of what is in view",
+    ),
+    *_of(
+        "number",
+        sensing_fault="what is wrong with the sensing: 0 nothing, 1 odometry jumped, "
+        "2 a sensor is silent, 3 frozen, 4 noisy",
+        faulty_sensor="which range sensor that is; 0: none",
+    ),
+]
+_ROUTES = [
+    *_of("number", replans="routes that were planned anew"),
+    *_xy("m", "target", "the target on the route, in W"),
+    *_of(
+        "m/s",
+        target_vx="x of the velocity of the target, in W",
+        target_vy="y of the velocity of the target, in W",
+    ),
+    *_of(
+        "m",
+        target_along="way of the target along the route",
+        robot_along="way of P along the route",
+    ),
+    *_xy("m", "reference", "the reference model's place, in W"),
+    *_of(
+        "m/s",
+        reference_vx="x of the reference model's velocity, in W",
+        reference_vy="y of the reference model's velocity, in W",
+    ),
+    *_of(
+        "N/m",
+        stiffness="stiffness between robot and target, K",
+        contact_stiffness="stiffness between robot and obstacles, K_e",
+    ),
+    *_of("N s/m", damping="damping of the robot towards the target, D"),
+    *_of("0 or 1", adaptation_active="whether gains are being adapted"),
+    *_of("m/s", filter_slack="how much faster what moves is let come nearer"),
+    *_of("0 or 1", filter_active="whether the filter of velocities changed anything"),
+]
+_SEARCHES = [
+    *_of(
+        "deg",
+        heading_deg="heading by the compass, clockwise from north",
+        expected_heading_deg="heading that the search wants, clockwise from north",
+    ),
+    *_of(
+        "1",
+        duty_left="duty of the left motor, -1 to 1",
+        duty_right="duty of the right motor, -1 to 1",
+        gas_right="reading of the right gas sensor, Rs/R0: 1 in clean air",
+        gas_rear="reading of the rear gas sensor",
+        gas_left="reading of the left gas sensor",
+        concentration_right="true concentration at the right gas sensor, shares of C1",
+        concentration_rear="true concentration at the rear gas sensor",
+        concentration_left="true concentration at the left gas sensor",
+        airflow_left="reading of the airflow sensor that looks to the left",
+        airflow_right="reading of the airflow sensor that looks to the right",
+    ),
+    *_of(
+        "0 or 1",
+        contact_left="whether the left contact switch is closed",
+        contact_right="whether the right contact switch is closed",
+        move="whether the search lets the robot move",
+        calling="whether the robot calls",
+    ),
+    *_of("dBm", rssi_dbm="level of the caller's radio"),
+    *_of(
+        "number",
+        touched="the body that the switches touch; -1: none",
+        listening="what is listened to: 0 nothing, 1 noise, 2 sound",
+        search_ended="how the search ended: 0 it goes on, 1 found, else why it was "
+        "given up (systems/search/search_ending.py)",
+        search_phase="what the search is at, a number of its rules",
+        search_steps="steps begun",
+        search_fault="what was found to be broken, a bit each "
+        "(systems/search/search_ending.py)",
+    ),
+]
+#: All of them, in the order of the signal.
+COLUMNS: tuple[Column, ...] = (
+    *_MOTION,
+    *_HEARING,
+    *_OBSTACLES,
+    *_CONTROL,
+    *_ROUTES,
+    *_SEARCHES,
+)
+_BY_NAME = {column.name: column for column in COLUMNS}
+
+
+def column_of(name: str) -> Column | None:
+    """What a column of a table is.
+
+    Args:
+        name: As in the table; of several robots, the robot's name and a dot precede.
+
+    Returns:
+        With that name and its number in the text; None of a user's own block.
+    """
+    own = name.rpartition(".")[2]
+    number = re.search(r"(?<=_)\d+", own)
+    pattern = re.sub(r"(?<=_)\d+", "{k}", own, count=1)
+    found = _BY_NAME.get(own) or _BY_NAME.get(pattern)
+    if found is None:
+        return None
+    k = number[0] if number else ""
+    return Column(name, found.unit, re.sub(r"\bk\b", k, found.meaning))
+
+
+def columns(of: RunResult | Iterable[str] | None = None) -> pd.DataFrame:
+    """The data dictionary: unit and meaning of the columns of a run's table.
+
+    Args:
+        of: A run, or names of columns; none: every column that there is, with
+            ``{k}`` in the place of numbers.
+
+    Returns:
+        A row a column, by its name, with ``unit`` and ``meaning``; of a user's own
+        block both are empty.
+
+    Raises:
+        InputError: A scenario is no run.
+    """
+    import pandas as pd
+
+    if isinstance(of, Scenario | str):
+        raise InputError("of", "give a run, as simulate returns it, or its columns")
+    if of is None:
+        rows = list(COLUMNS)
+    else:
+        names = of.columns if isinstance(of, RunResult) else of
+        rows = [column_of(name) or Column(name, "", "") for name in names]
+    return pd.DataFrame(rows, columns=list(Column._fields)).set_index("name")

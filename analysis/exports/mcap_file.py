@@ -1,0 +1,212 @@
+"""A run as an MCAP file of ROS 2 messages, which Foxglove and PlotJuggler open."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from importlib.util import find_spec
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.exports.markers import body_markers
+from analysis.exports.recorded_run import SCENARIO_FILE, RecordedRun
+from analysis.exports.ros2_messages import message_definition
+from analysis.exports.ros2_values import (
+    WORLD_FRAME,
+    Message,
+    stamped,
+    stamped_pose,
+    transform,
+    vector,
+)
+from diagrams import dump_scenario
+from diagrams.participants import FollowerParameters
+from systems.framework.input_error import InputError
+
+__all__ = ["require_mcap", "write_mcap"]
+
+_PACKAGES = ("mcap", "mcap_ros2")
+#: Columns that are told by messages of their own kind.
+_POSES = {
+    "pose": ("p_WB_x", "p_WB_y", "theta_WB"),
+    "pose_estimated": ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
+    "followed": ("p_WS_x", "p_WS_y", "theta_WS"),
+}
+_VELOCITY = ("v_WB_x", "v_WB_y", "omega_WB")
+_ESTIMATE = ("p_WS_estimated_x", "p_WS_estimated_y", "target_valid")
+#: Topic, message, and what it says.
+_Entry = tuple[str, str, Message]
+
+
+def require_mcap() -> None:
+    """Asks whether MCAP files can be written here.
+
+    Raises:
+        InputError: A package is not installed; says how to install it.
+    """
+    missing = [name for name in _PACKAGES if find_spec(name) is None]
+    if missing:
+        raise InputError(
+            "mcap",
+            "needs the packages mcap and mcap-ros2-support; install them by "
+            "pip install 'phonotaxis[export]'",
+        )
+
+
+def write_mcap(run: RecordedRun, path: Path) -> None:
+    """Writes an MCAP file; docs/exports.md lists its topics.
+
+    Times are those of the run, from 0. The same run gives the same bytes.
+
+    Args:
+        run: What happened.
+        path: The file.
+
+    Raises:
+        InputError: A package is not installed.
+        OSError: The file cannot be written.
+    """
+    require_mcap()
+    from mcap_ros2.writer import Writer
+
+    content = BytesIO()
+    with Writer(content) as writer:
+        _write(writer, run)
+    path.write_bytes(content.getvalue())
+
+
+def _write(writer: Any, run: RecordedRun) -> None:
+    schemas: dict[str, Any] = {}
+    scenario = run.scenario
+    about = {"scenario": scenario.name, "law": scenario.law, "seed": str(scenario.seed)}
+    writer.add_metadata("phonotaxis", about)
+    text = dump_scenario(scenario).encode()
+    writer.add_attachment(0, 0, SCENARIO_FILE, "application/yaml", text)
+    for tick, entries in enumerate(_ticks(run)):
+        time_ns = round(1e9 * float(run.time[tick]))
+        for topic, kind, message in entries:
+            if kind not in schemas:
+                package, name = kind.split("/")
+                schemas[kind] = writer.register_msgdef(
+                    f"{package}/msg/{name}", message_definition(kind)
+                )
+            writer.write_message(topic, schemas[kind], message, time_ns, sequence=tick)
+
+
+def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
+    """What is said at each tick."""
+    scenario = run.scenario
+    paths = {name: source.path() for name, source in scenario.all_sources.items()}
+    paths |= {each.name: each.path() for each in scenario.obstacles}
+    placed = {name: path.poses(run.time) for name, path in paths.items()}
+    once = {each.name for each in scenario.obstacles if not each.path().moves}
+    names = _ros_names([*run.robots, *placed])
+    for tick, time in enumerate(run.time.tolist()):
+        entries: list[_Entry] = []
+        frames: list[Message] = []
+        if tick == 0:
+            markers = {"markers": body_markers(scenario, names)}
+            entries.append(("/markers", "visualization_msgs/MarkerArray", markers))
+        for name, own in run.robots.items():
+            robot = scenario.all_robots[name]
+            frames += _robot_frames(names[name], own, robot, tick, time)
+            entries += _robot_entries(names[name], own, robot, tick, time)
+        for name, poses in placed.items():
+            at = poses[tick].tolist()
+            frames.append(transform(time, WORLD_FRAME, names[name], at))
+            if tick == 0 or name not in once:
+                topic, message = f"/{names[name]}/pose", stamped_pose(time, at)
+                entries.append((topic, "geometry_msgs/PoseStamped", message))
+        entries.append(("/tf", "tf2_msgs/TFMessage", {"transforms": frames}))
+        yield entries
+
+
+def _ros_names(names: Iterable[str]) -> dict[str, str]:
+    """Names that topics and frames may bear: letters, digits, underscores."""
+    found: dict[str, str] = {}
+    for name in names:
+        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+        plain = plain if plain[:1].isalpha() else f"_{plain}"
+        while plain in found.values():
+            plain += "_"
+        found[name] = plain
+    return found
+
+
+def _robot_frames(
+    name: str,
+    own: Mapping[str, NDArray[np.float64]],
+    robot: FollowerParameters,
+    tick: int,
+    time: float,
+) -> Iterator[Message]:
+    """B, P, and the range sensors, which look along x of their frames."""
+    base, ahead = f"{name}/base_link", robot.robot.control_point_m
+    at = [float(own[key][tick]) for key in _POSES["pose"]]
+    yield transform(time, WORLD_FRAME, base, at)
+    yield transform(time, base, f"{name}/control_point", [ahead, 0.0, 0.0])
+    sensors = robot.ultrasonic
+    for k in range(1, sensors.count + 1):
+        if f"range_{k}" in own:
+            (x, y), axis = sensors.places[k - 1], sensors.axes_deg[k - 1]
+            pose_BU = [ahead + x, y, math.radians(axis)]
+            yield transform(time, base, f"{name}/sensor_{k}", pose_BU)
+
+
+def _robot_entries(
+    name: str,
+    own: Mapping[str, NDArray[np.float64]],
+    robot: FollowerParameters,
+    tick: int,
+    time: float,
+) -> Iterator[_Entry]:
+    """All that one robot's columns say at a tick."""
+    told = {"t"}
+    for topic, keys in _POSES.items():
+        told.update(keys)
+        at = [float(own[key][tick]) for key in keys]
+        yield f"/{name}/{topic}", "geometry_msgs/PoseStamped", stamped_pose(time, at)
+    told.update(_VELOCITY)
+    vx, vy, omega = (float(own[key][tick]) for key in _VELOCITY)
+    twist = {"linear": vector(vx, vy), "angular": vector(z=omega)}
+    message = stamped(time, WORLD_FRAME, twist=twist)
+    yield f"/{name}/velocity", "geometry_msgs/TwistStamped", message
+    if all(key in own for key in _ESTIMATE):
+        told.update(_ESTIMATE[:2])
+        x, y, valid = (float(own[key][tick]) for key in _ESTIMATE)
+        if valid > 0.5:
+            message = stamped(time, WORLD_FRAME, point=vector(x, y))
+            yield f"/{name}/source_estimate", "geometry_msgs/PointStamped", message
+    for k in range(1, robot.ultrasonic.count + 1):
+        if f"range_{k}" in own:
+            told.update((f"range_{k}", f"echo_{k}"))
+            echo = own[f"echo_{k}"][tick] > 0.5
+            distance = float(own[f"range_{k}"][tick]) if echo else math.inf
+            message = _range(name, k, robot, time, distance)
+            yield f"/{name}/range_{k}", "sensor_msgs/Range", message
+    for key, values in own.items():
+        value = float(values[tick])
+        if key not in told and math.isfinite(value):
+            yield f"/{name}/{key}", "std_msgs/Float64", {"data": value}
+
+
+def _range(
+    name: str, k: int, robot: FollowerParameters, time: float, distance: float
+) -> Message:
+    """A reading; infinite where there is no echo, as ROS has it."""
+    sensors = robot.ultrasonic
+    return stamped(
+        time,
+        f"{name}/sensor_{k}",
+        radiation_type=0,
+        field_of_view=2.0 * math.radians(sensors.beam_half_angle_deg),
+        min_range=sensors.minimum_range_m,
+        max_range=sensors.maximum_range_m,
+        range=distance,
+        variance=sensors.noise_m**2,
+    )

@@ -1,0 +1,115 @@
+"""A robot that follows a sound past obstacles: what scripts and notebooks import.
+
+Nothing is loaded until it is used, so that ``import phonotaxis`` takes no time.
+What stands in ``__all__`` is public; CONTRIBUTING.md says what that promises.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from analysis.exports.columns import columns
+    from analysis.recordings.array_geometry import ArrayGeometry
+    from analysis.recordings.locate import locate
+    from analysis.recordings.locate_result import LocateResult, SourceEstimate
+    from analysis.sweeps.plan import SweepPlan
+    from diagrams.loading import library_scenarios, load_scenario
+    from diagrams.scenario import Scenario
+    from phonotaxis.runs import RunResult, simulate
+    from phonotaxis.studies import (
+        ComparisonResult,
+        StabilityResult,
+        SweepResult,
+        compare,
+        stability,
+        sweep,
+    )
+    from systems.framework.input_error import InputError
+
+__all__ = [
+    "ArrayGeometry",
+    "ComparisonResult",
+    "InputError",
+    "LocateResult",
+    "RunResult",
+    "Scenario",
+    "SourceEstimate",
+    "StabilityResult",
+    "SweepPlan",
+    "SweepResult",
+    "__version__",
+    "columns",
+    "compare",
+    "library_scenarios",
+    "load_scenario",
+    "locate",
+    "main",
+    "simulate",
+    "stability",
+    "sweep",
+]
+
+__version__ = "0.2.0"
+
+#: The module that each public name is in; the imports above tell type checkers.
+_HOMES = {
+    "ArrayGeometry": "analysis.recordings.array_geometry",
+    "ComparisonResult": "phonotaxis.studies",
+    "InputError": "systems.framework.input_error",
+    "LocateResult": "analysis.recordings.locate_result",
+    "RunResult": "phonotaxis.runs",
+    "Scenario": "diagrams.scenario",
+    "SourceEstimate": "analysis.recordings.locate_result",
+    "StabilityResult": "phonotaxis.studies",
+    "SweepPlan": "analysis.sweeps.plan",
+    "SweepResult": "phonotaxis.studies",
+    "columns": "analysis.exports.columns",
+    "compare": "phonotaxis.studies",
+    "library_scenarios": "diagrams.loading",
+    "load_scenario": "diagrams.loading",
+    "locate": "analysis.recordings.locate",
+    "simulate": "phonotaxis.runs",
+    "stability": "phonotaxis.studies",
+    "sweep": "phonotaxis.studies",
+}
+
+
+def __getattr__(name: str) -> Any:
+    """Loads a public name when it is first asked for."""
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name]), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs a command.
+
+    Args:
+        arguments: Words after the program's name; none: those of the process,
+            which has nothing to do afterwards.
+
+    Returns:
+        Exit status: 0 done, 2 bad input, 1 anything else.
+    """
+    try:
+        # What loads, loads in here: an interrupt may strike meanwhile.
+        from analysis.commands.interrupts import Interrupts
+
+        with Interrupts(last=arguments is None) as interrupts:
+            from analysis.commands.command_line import run_words
+
+            words = sys.argv[1:] if arguments is None else arguments
+            return run_words(list(words), interrupts)
+    except KeyboardInterrupt:
+        print("phonotaxis: interrupted; nothing was written", file=sys.stderr)
+        return 1
