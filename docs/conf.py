@@ -6,25 +6,29 @@ only the pages of the reference, one for each heading of docs/api.md.
 
 from __future__ import annotations
 
-import re
+import logging
 import sys
-from importlib.metadata import version as installed_version
 from pathlib import Path
+
+from jupyter_client import KernelManager
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
 
+from phonotaxis import __version__  # noqa: E402  # needs the path
+
 project = "phonotaxis"
 author = "phonotaxis developers"
 copyright = f"2026, {author}"  # noqa: A001  # Sphinx calls it so
-version = release = installed_version("phonotaxis")
+version = release = __version__
 
 root_doc = "docs/index"
 include_patterns = ["README.md", "CHANGELOG.md", "docs/**"]
-exclude_patterns = [".*", "build", "site", "results", "docs/results", "docs/tables"]
+exclude_patterns = [".*", "build", "results", "docs/results", "docs/tables"]
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
+    "docs.building.navigation",
     "docs.building.markdown_links",
     "docs.building.mathematics",
     "docs.building.wiring",
@@ -40,13 +44,19 @@ nb_execution_mode = "force"
 nb_execution_timeout = 120
 nb_execution_raise_on_error = True
 nb_merge_streams = True
+# Kernels talk to nobody else, and say no more than what fails.
+KernelManager.transport_encryption.default_value = "auto"
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_default_options = {"exclude-members": "model_config"}
 
 html_theme = "furo"
 html_title = f"phonotaxis {version}"
 html_static_path = ["_static"]
+html_extra_path = ["building/root"]
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False

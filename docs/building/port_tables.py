@@ -23,7 +23,10 @@ class PortTable(SphinxDirective):
         lines = [".. list-table::", "   :header-rows: 1", "   :class: ports", ""]
         lines += ["   * - input ports", "     - output ports"]
         for mark, side in (("*", "input_ports"), (" ", "output_ports")):
-            ports = [str(next(iter(port))) if isinstance(port, dict) else str(port) for port in told.get(side) or []]
+            ports = [
+                str(next(iter(port))) if isinstance(port, dict) else str(port)
+                for port in told.get(side) or []
+            ]
             lines.append(f"   {mark} - " + ("" if ports else "none"))
             lines += [f"       | {port}" for port in ports]
         box = nodes.container()

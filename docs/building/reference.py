@@ -5,8 +5,10 @@ In the site each name of that page leads to its docstring.
 
 from __future__ import annotations
 
+import inspect
 import re
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,8 +26,11 @@ _EVERY_BLOCK = "systems"
 def setup(app: Any) -> dict[str, bool]:
     """Joins Sphinx."""
     app.connect("builder-inited", _write_pages)
+    app.connect("builder-inited", _name_blocks)
     app.connect("source-read", _lead_names_to_docstrings)
     app.connect("autodoc-process-docstring", _read_google_style)
+    app.connect("autodoc-process-signature", _ask_for_what_is_constructed)
+    app.connect("autodoc-skip-member", _leave_out_drake)
     return {"parallel_read_safe": True}
 
 
@@ -43,14 +48,14 @@ def _rooms() -> dict[str, list[str]]:
     return {
         room: re.findall(r"`(\w+)`", told)
         for room, told in zip(parts[::2], parts[1::2], strict=True)
-        if room != _EVERY_BLOCK
     }
 
 
 def _homes() -> dict[str, str]:
-    """The room whose page has a name: the first that exports it."""
-    rooms = reversed(_rooms().items())
-    return {name: room for room, names in rooms for name in names}
+    """The room whose page has a name: the first that exports it, but for systems."""
+    rooms = sorted(_rooms().items(), key=lambda room: room[0] != _EVERY_BLOCK)
+    found = {name: room for room, names in reversed(rooms[1:]) for name in names}
+    return dict.fromkeys(rooms[0][1], _EVERY_BLOCK) | found
 
 
 def _write_pages(_app: Any) -> None:
@@ -67,6 +72,15 @@ def _write_pages(_app: Any) -> None:
             page.write_text(text, "utf-8")
 
 
+def _name_blocks(_app: Any) -> None:
+    """Blocks for several scalars are called as they are exported, not as templates."""
+    for room, names in _rooms().items():
+        module = import_module(room)
+        for name in names:
+            if hasattr(module, f"{name}_"):
+                getattr(module, name).__name__ = name
+
+
 def _lead_names_to_docstrings(_app: Any, page: str, source: list[str]) -> None:
     if page != _LIST:
         return
@@ -74,7 +88,9 @@ def _lead_names_to_docstrings(_app: Any, page: str, source: list[str]) -> None:
 
     def reference(match: re.Match[str]) -> str:
         name = match[1]
-        return f"{{py:obj}}`{name} <{homes[name]}.{name}>`" if name in homes else match[0]
+        return (
+            f"{{py:obj}}`{name} <{homes[name]}.{name}>`" if name in homes else match[0]
+        )
 
     pages = "\n".join(f"reference/{room}" for room in _rooms())
     source[0] = re.sub(r"`(\w+)`", reference, source[0])
@@ -92,3 +108,18 @@ def _read_google_style(*told: Any) -> None:
         parts[::2] = [part.replace("|", r"\|") for part in parts[::2]]
         lines[number] = "``".join(parts)
     lines[:] = GoogleDocstring(lines).lines()
+
+
+def _ask_for_what_is_constructed(*told: Any) -> tuple[str, str] | None:
+    """Blocks for several scalars take what ``_construct`` takes."""
+    construct = getattr(told[3], "_construct", None)
+    if told[1] != "class" or construct is None:
+        return None
+    _, *others = inspect.signature(construct).parameters.values()
+    mine = [each for each in others if each.name != "converter"]
+    return str(inspect.Signature(mine)), ""
+
+
+def _leave_out_drake(_app: Any, what: str, name: str, *_: Any) -> bool | None:
+    """Overrides, and what templates add to blocks, are PascalCase."""
+    return True if what == "class" and name[0].isupper() else None
