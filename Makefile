@@ -13,7 +13,7 @@ FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-fast browser-test lint typecheck docs bench attack mutate clean
+.PHONY: help demo test test-fast browser-test lint typecheck docs package bench attack mutate clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
@@ -40,6 +40,9 @@ typecheck: .venv/.installed-dev ## check types
 docs: .venv/.installed-docs ## build the documentation into build/site, notebooks executed, links checked
 	@$(PY) -m sphinx -q -W --keep-going -c docs . build/site
 	@echo "Open build/site/index.html; it needs no network."
+
+package: .venv/.installed-dev ## build the package, and use it where the sources are not
+	@.ci/check_package
 
 bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks

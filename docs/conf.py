@@ -1,7 +1,7 @@
 """How Sphinx makes the site: ``make docs``.
 
-The pages are README.md, CHANGELOG.md and docs/*.md as they are. Made beside them are
-only the pages of the reference, one for each heading of docs/api.md.
+The pages are those of the repository and of docs/ as they are. Made beside them are
+only those of the reference, one for each heading of docs/api.md.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ copyright = f"2026, {author}"  # noqa: A001  # Sphinx calls it so
 version = release = __version__
 
 root_doc = "docs/index"
-include_patterns = ["README.md", "CHANGELOG.md", "docs/**"]
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
 exclude_patterns = [".*", "build", "results", "docs/results", "docs/tables"]
 extensions = [
     "myst_nb",

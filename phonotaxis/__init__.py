@@ -53,7 +53,7 @@ __all__ = [
     "sweep",
 ]
 
-__version__ = "0.2.0"
+__version__: str
 
 #: The module that each public name is in; the imports above tell type checkers.
 _HOMES = {
@@ -80,9 +80,15 @@ _HOMES = {
 
 def __getattr__(name: str) -> Any:
     """Loads a public name when it is first asked for."""
-    if name not in _HOMES:
+    value: Any
+    if name == "__version__":
+        from importlib.metadata import version
+
+        value = version("phonotaxis")
+    elif name in _HOMES:
+        value = getattr(import_module(_HOMES[name]), name)
+    else:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(import_module(_HOMES[name]), name)
     globals()[name] = value
     return value
 

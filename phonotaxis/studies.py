@@ -249,13 +249,13 @@ def stability(
         chosen_robot,
     )
     from analysis.stability.report_files import stability_document
-    from analysis.stability.report_parts import parts_of
+    from analysis.stability.report_parts import parts_for
 
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     alone, _ = chosen_robot(scenario, robot)
     scenarios = chosen_laws(alone, list(laws))
-    work = parts_of(scenarios, full=full)
+    work = parts_for(scenarios, full=full)
     step = progress or (lambda title: None)
     analyses = [analyse_law(each, work, step=step) for each in scenarios]
     return StabilityResult(analyses, stability_document(analyses, None))

@@ -279,7 +279,7 @@ sys.exit(phonotaxis.main())
 @pytest.mark.parametrize("kind", [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_leaves_nothing_behind(tmp_path, kind):
     out = tmp_path / "results" / "run"
-    root = Path(phonotaxis.__file__).parent
+    root = Path(phonotaxis.__file__).parents[1]
     words = ["simulate", "--set", "duration_s=2000", "--out", str(out)]
     process = subprocess.Popen(
         [sys.executable, "-c", TELLING, *words],

@@ -15,7 +15,7 @@ import soundfile
 
 import phonotaxis
 
-ROOT = Path(phonotaxis.__file__).parent
+ROOT = Path(phonotaxis.__file__).parents[1]
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:

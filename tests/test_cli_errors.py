@@ -14,7 +14,7 @@ import pytest
 
 import phonotaxis
 
-ROOT = Path(phonotaxis.__file__).parent
+ROOT = Path(phonotaxis.__file__).parents[1]
 SHORT = ("--set", "duration_s=0.05", "--set", "hearing=ideal")
 FIVE_LAWS = """
 import functools, math, sys

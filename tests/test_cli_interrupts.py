@@ -13,7 +13,7 @@ import pytest
 
 import phonotaxis
 
-ROOT = Path(phonotaxis.__file__).parent
+ROOT = Path(phonotaxis.__file__).parents[1]
 #: Says when ``main`` began to load: what is before, is Python's own start. A shell's
 #: background job begins with Ctrl-C ignored, which would be inherited.
 CODE = """

@@ -20,7 +20,7 @@ from analysis.sweeps.one_run import Task, results_table, run_task
 from analysis.sweeps.plan import load_sweep
 from analysis.sweeps.store import load_results
 
-ROOT = Path(phonotaxis.__file__).parent
+ROOT = Path(phonotaxis.__file__).parents[1]
 SWEEP = """
 scenario: one_moving_obstacle
 set: {hearing: ideal, obstacle_sensing: ideal, duration_s: 0.5}

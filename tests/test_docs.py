@@ -8,13 +8,19 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+import pytest
 from ruamel.yaml import YAML
 
 from diagrams import Scenario
+from docs.tables.columns import column_table
 from systems.framework.parameters import Parameters
 
 ROOT = Path(__file__).resolve().parents[1]
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCUMENTS = [
+    ROOT / "README.md",
+    ROOT / "CONTRIBUTING.md",
+    *sorted((ROOT / "docs").glob("*.md")),
+]
 #: A file or folder of ours in code quotes, and what it is to hold.
 NAMED_FILE = (
     r"`((?:systems|diagrams|analysis|tests|benchmarks|docs)/[\w./-]*)(?:: (\w+))?`"
@@ -124,11 +130,21 @@ def test_files_that_are_named_exist() -> None:
             assert re.search(rf"\b(def|class) {symbol}\b", text(name)), symbol
 
 
-def test_python_of_the_readme_compiles() -> None:
-    blocks = re.findall(r"(?ms)^```python\n(.*?)^```$", text("README.md"))
+@pytest.mark.parametrize("name", ["README.md", "docs/exports.md"])
+def test_python_of_a_document_runs(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In its order, in a folder of its own."""
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"(?ms)^```python\n(.*?)^```$", text(name))
     assert blocks
     for block in blocks:
-        compile(block, "README.md", "exec")
+        exec(compile(block, name, "exec"), {})
+
+
+def test_table_of_columns_is_that_of_the_dictionary() -> None:
+    """``python -m docs.tables.columns`` prints it."""
+    assert text("docs/exports.md").endswith(column_table())
 
 
 def test_parameter_table_quotes_the_defaults() -> None:

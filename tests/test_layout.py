@@ -17,20 +17,21 @@ import pytest
 ROOT = Path(__file__).resolve().parents[1]
 OURS = {"systems", "diagrams", "analysis", "phonotaxis", "tests", "benchmarks"}
 FOLDERS = ("systems", "diagrams", "analysis")
+#: And the door to them.
+PACKAGES = (*FOLDERS, "phonotaxis")
 #: A room with more is two.
 MOST_FILES = 20
 MAY_IMPORT = {
     "systems": {"systems"},
     "diagrams": {"systems", "diagrams"},
     "analysis": {"systems", "diagrams", "analysis"},
-    "phonotaxis": {"systems", "diagrams", "analysis"},
+    "phonotaxis": {"systems", "diagrams", "analysis", "phonotaxis"},
 }
 
 
 def sources(package: str) -> list[Path]:
-    """The Python files of a package or of a module."""
-    module = ROOT / f"{package}.py"
-    return [module] if module.is_file() else sorted((ROOT / package).rglob("*.py"))
+    """The Python files of a package."""
+    return sorted((ROOT / package).rglob("*.py"))
 
 
 def imported(tree: ast.AST) -> Iterator[str]:
@@ -125,12 +126,17 @@ def test_command_line_imports_nothing_but_python_on_load() -> None:
     """`--help` and a mistyped option answer at once."""
     commands = sources("analysis/commands")
     assert commands
+    doors = (
+        ROOT / "phonotaxis/__init__.py",
+        ROOT / "phonotaxis/__main__.py",
+        ROOT / "analysis/__init__.py",
+    )
     wrong = {
         f"{path.relative_to(ROOT)} imports {name}"
-        for path in (ROOT / "phonotaxis.py", ROOT / "analysis/__init__.py", *commands)
+        for path in (*doors, *commands)
         for name in imported_on_load(ast.parse(path.read_text("utf-8")))
         if top(name) not in sys.stdlib_module_names
-        and not name.startswith("analysis.commands")
+        and not name.startswith(("analysis.commands", "phonotaxis.main"))
     }
     assert not wrong
 
@@ -187,7 +193,7 @@ def test_every_folder_with_code_is_a_package() -> None:
     """A folder without `__init__.py` would be left out of the installation."""
     bare = [
         path.parent.relative_to(ROOT)
-        for package in FOLDERS
+        for package in PACKAGES
         for path in sources(package)
         if not (path.parent / "__init__.py").is_file()
     ]
@@ -196,7 +202,7 @@ def test_every_folder_with_code_is_a_package() -> None:
 
 def rooms() -> list[Path]:
     """Every folder of product code."""
-    return sorted({path.parent for package in FOLDERS for path in sources(package)})
+    return sorted({path.parent for package in PACKAGES for path in sources(package)})
 
 
 def test_rooms_are_small_and_say_what_they_are_for() -> None:
@@ -243,8 +249,15 @@ def test_a_circle_is_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         test_no_rooms_and_no_files_import_one_another_in_a_circle(tmp_path / "house")
 
 
+def test_every_package_is_typed() -> None:
+    assert all((ROOT / package / "py.typed").is_file() for package in PACKAGES)
+
+
 def test_a_name_means_one_thing() -> None:
-    """No two public classes or functions of one name."""
+    """No two public classes or functions of one name.
+
+    Those of ``phonotaxis`` are ours with more to them, and keep their names.
+    """
     homes: dict[str, list[str]] = {}
     for package in FOLDERS:
         for path in sources(package):

@@ -27,6 +27,7 @@ from analysis.commands import (
 )
 from analysis.commands.carry_out import carry_out
 from analysis.commands.command import Command
+from analysis.commands.exporting import columns, export
 from analysis.commands.interrupts import Interrupts
 
 __all__ = ["COMMANDS", "run_words"]
@@ -47,6 +48,8 @@ COMMANDS: dict[str, Command] = {
         stability,
         sweep,
         design,
+        export,
+        columns,
     )
 }
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.exporting.files import Exports, take_exports
 from analysis.commands.progress import Progress
 from analysis.commands.saved_audio import SavedAudio
 
@@ -28,10 +29,12 @@ def _add_arguments(parser: ArgumentParser) -> None:
         metavar="DIR",
         help="new directory for what the robots hear and the loudspeakers play",
     )
+    take_exports(parser)
     take_output(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
+    from analysis.exports.recorded_run import RecordedRun
     from analysis.run_error import RunError
     from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import (
@@ -42,7 +45,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     )
     from systems.framework.input_error import InputError
 
-    place = take(options.out)
+    place, exports = take(options.out), Exports.chosen(options)
     scenario = load_scenario(options.scenario, _settings(options))
     for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
@@ -72,12 +75,16 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         lines = [summary_text(result, document), *([saved.text()] if saved else [])]
         return "\n".join(lines)
 
+    def write(result: RunResult, document: dict[str, Any]) -> None:
+        write_run(result, document, place.directory)
+        exports.write(RecordedRun.of(result), place.directory)
+
     return Job(
         run=run,
         summary=summary,
         text=text,
         out=place.out,
-        write=lambda result, summary: write_run(result, summary, place.directory),
+        write=write,
         where=f"{'results':<21} {{out}}",
         total=scenario.duration_s,
         unit="s simulated",

@@ -45,7 +45,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         stability_text,
         write_stability,
     )
-    from analysis.stability.report_parts import parts_of
+    from analysis.stability.report_parts import parts_for
     from diagrams import load_scenario
 
     place = take(options.out)
@@ -54,7 +54,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
     scenarios = chosen_laws(scenario, options.law or [])
-    work = parts_of(scenarios, full=options.full)
+    work = parts_for(scenarios, full=options.full)
 
     def run(progress: Progress) -> list[LawAnalysis]:
         analyses = [analyse_law(each, work, step=progress.step) for each in scenarios]

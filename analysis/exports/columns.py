@@ -94,7 +94,7 @@ _HEARING = [
     *_of("number", lost_microphone="the first microphone that hears nothing; 0: none"),
 ]
 _OBSTACLES = [
-    *_of("m", range_K="range of sensor k, its last one"),
+    *_of("m", range_K="last range of sensor k; without an echo its greatest range"),
     *_of("0 or 1", echo_K="whether sensor k had an echo"),
     *_of(
         "m",
@@ -106,7 +106,10 @@ _OBSTACLES = [
         feature_K="which sensors vector k is of, a code that is the same as long as "
         "they are; 0: no vector",
     ),
-    *_of("m/s", obstacle_speed_K="speed of obstacle k as the law counts it"),
+    *_of(
+        "m/s",
+        obstacle_speed_K="speed of the obstacle of vector k, as the law counts it",
+    ),
 ]
 _CONTROL = [
     *_xy("N", "attraction", "the force towards the target, in W"),

@@ -101,9 +101,8 @@ def _write(writer: Any, run: RecordedRun) -> None:
 def _ticks(run: RecordedRun) -> Iterator[Iterable[_Entry]]:
     """What is said at each tick."""
     scenario = run.scenario
-    paths = {name: source.path() for name, source in scenario.all_sources.items()}
-    paths |= {each.name: each.path() for each in scenario.obstacles}
-    placed = {name: path.poses(run.time) for name, path in paths.items()}
+    bodies = scenario.all_sources | {each.name: each for each in scenario.obstacles}
+    placed = {name: body.path().poses(run.time) for name, body in bodies.items()}
     once = {each.name for each in scenario.obstacles if not each.path().moves}
     names = _ros_names([*run.robots, *placed])
     for tick, time in enumerate(run.time.tolist()):
@@ -130,12 +129,16 @@ def _ros_names(names: Iterable[str]) -> dict[str, str]:
     """Names that topics and frames may bear: letters, digits, underscores."""
     found: dict[str, str] = {}
     for name in names:
-        plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
-        plain = plain if plain[:1].isalpha() else f"_{plain}"
+        plain = _plain(name)
         while plain in found.values():
             plain += "_"
         found[name] = plain
     return found
+
+
+def _plain(name: str) -> str:
+    plain = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return plain if plain[:1].isalpha() else f"_{plain}"
 
 
 def _robot_frames(
@@ -192,7 +195,7 @@ def _robot_entries(
     for key, values in own.items():
         value = float(values[tick])
         if key not in told and math.isfinite(value):
-            yield f"/{name}/{key}", "std_msgs/Float64", {"data": value}
+            yield f"/{name}/{_plain(key)}", "std_msgs/Float64", {"data": value}
 
 
 def _range(

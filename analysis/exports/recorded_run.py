@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +14,18 @@ from numpy.typing import NDArray
 from diagrams import RunResult, Scenario, load_scenario
 from systems.framework.input_error import InputError
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 __all__ = ["SCENARIO_FILE", "TABLE_FILE", "RecordedRun"]
 
 SCENARIO_FILE, TABLE_FILE = "scenario.yaml", "trajectory.parquet"
 #: Without these there is nothing to see.
-_NEEDED = ("t", "p_WB_x", "p_WB_y", "theta_WB")
+_NEEDED = (
+    *("t", "p_WB_x", "p_WB_y", "theta_WB"),
+    *("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
+    *("p_WS_x", "p_WS_y", "theta_WS", "v_WB_x", "v_WB_y", "omega_WB"),
+)
 
 
 @dataclass(frozen=True)
@@ -25,14 +34,13 @@ class RecordedRun:
 
     scenario: Scenario
     """The whole one."""
-    robots: Mapping[str, Mapping[str, NDArray[np.float64]]]
-    """(n,) columns by name, of each robot by name."""
+    table: pd.DataFrame
+    """``RunResult.trajectory``."""
 
     @classmethod
     def of(cls, result: RunResult) -> RecordedRun:
         """From a run that has just ended."""
-        robots = {name: own.columns for name, own in result.robots.items()}
-        return cls(result.full_scenario, robots)
+        return cls(result.full_scenario, result.trajectory)
 
     @classmethod
     def load(cls, directory: str | Path) -> RecordedRun:
@@ -41,9 +49,6 @@ class RecordedRun:
         Raises:
             InputError: It is none, or its files do not belong together.
         """
-        import pandas as pd
-        from pyarrow import ArrowException
-
         folder = Path(directory)
         for name in (SCENARIO_FILE, TABLE_FILE):
             if not (folder / name).is_file():
@@ -53,23 +58,26 @@ class RecordedRun:
                     "run, as phonotaxis simulate makes it",
                 )
         scenario = load_scenario(folder / SCENARIO_FILE)
-        try:
-            table = pd.read_parquet(folder / TABLE_FILE)
-        except (OSError, ArrowException, ValueError) as error:
-            raise InputError(
-                "result",
-                f"{str(folder / TABLE_FILE)!r} cannot be read ({error}); run again",
-            ) from None
-        columns = {name: table[name].to_numpy(dtype=float) for name in table.columns}
-        robots = {name: _own(columns, name, scenario) for name in scenario.all_robots}
-        for name, own in robots.items():
+        run = cls(scenario, _read(folder / TABLE_FILE))
+        for name, own in run.robots.items():
             if missing := [key for key in _NEEDED if key not in own]:
                 raise InputError(
                     "result",
                     f"{str(folder / TABLE_FILE)!r} has no {missing[0]} of {name}, as "
                     f"{SCENARIO_FILE} beside it would have; run again",
                 )
-        return cls(scenario, robots)
+        return run
+
+    @cached_property
+    def robots(self) -> dict[str, Mapping[str, NDArray[np.float64]]]:
+        """(n,) columns by name, as if each robot were alone, by the robot's name."""
+        names = list(self.scenario.all_robots)
+        columns = {
+            str(name): self.table[name].to_numpy(dtype=float) for name in self.table
+        }
+        if len(names) == 1:
+            return {names[0]: columns}
+        return {name: _own(columns, f"{name}.") for name in names}
 
     @property
     def time(self) -> NDArray[np.float64]:
@@ -77,13 +85,21 @@ class RecordedRun:
         return next(iter(self.robots.values()))["t"]
 
 
+def _read(path: Path) -> pd.DataFrame:
+    import pandas as pd
+    from pyarrow import ArrowException
+
+    try:
+        return pd.read_parquet(path)
+    except (OSError, ArrowException, ValueError) as error:
+        raise InputError(
+            "result", f"{str(path)!r} cannot be read ({error}); run again"
+        ) from None
+
+
 def _own(
-    columns: Mapping[str, NDArray[np.float64]], name: str, scenario: Scenario
+    columns: Mapping[str, NDArray[np.float64]], prefix: str
 ) -> Mapping[str, NDArray[np.float64]]:
-    """The columns of one robot, as if there were no others."""
-    if len(scenario.all_robots) == 1:
-        return columns
-    prefix = f"{name}."
     own = {
         key.removeprefix(prefix): values
         for key, values in columns.items()

@@ -269,10 +269,12 @@ def make_geometry(
     try:
         places = tuple(tuple(float(x) for x in place) for place in geometry)
         return ArrayGeometry.model_validate({"microphones": places})
-    except (TypeError, ValueError) as error:
-        wrong = isinstance(error, ValidationError)
-        what = _first_error(error) if wrong else "is no list of places [x, y] in m"
-        raise InputError("geometry", what) from None
+    except ValidationError as error:
+        raise InputError("geometry", _first_error(error)) from None
+    except (TypeError, ValueError):
+        raise InputError(
+            "geometry", "is no list of places; give [x, y] or [x, y, z] of each, m"
+        ) from None
 
 
 def load_geometry(path: str | Path) -> ArrayGeometry:

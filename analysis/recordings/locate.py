@@ -83,14 +83,14 @@ def locate(
     shape = known.shape
     whole = geometry.columns == tuple(range(len(samples)))
     channels = samples if whole else samples[list(geometry.columns)]
-    recording, faults = _recording(channels, rate, known, geometry.band, where)
-    if not recording.starts.size:
+    spectra, faults = _recording(channels, rate, known, geometry.band, where)
+    if not spectra.starts.size:
         raise InputError(
             "recording",
             f"{where} has {samples.shape[1]} samples, less than one frame of "
-            f"{recording.window.size}; record longer",
+            f"{spectra.window.size}; record longer",
         )
-    search, sightings, estimates = _estimates(recording, known)
+    search, sightings, estimates = _estimates(spectra, known)
     late = late_channel(sightings, known)
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
@@ -105,16 +105,16 @@ def locate(
         "position_std_m": known.budget.position_std,
         "delay_std_s": known.budget.delay_std,
         "largest_range_error": known.largest_range_error,
-        "band_hz": [recording.low_hz, recording.high_hz],
+        "band_hz": [spectra.low_hz, spectra.high_hz],
         "sample_rate_hz": rate,
         "frame_s": search.stretch_s,
     }
     sources, tracks = heard_sources(
-        recording.channels,
+        spectra.channels,
         shape,
         known.c,
         float(rate),
-        (recording.low_hz, recording.high_hz),
+        (spectra.low_hz, spectra.high_hz),
     )
     return LocateResult(
         array, shape, estimates, len(search.stretches), faults, sources, tracks

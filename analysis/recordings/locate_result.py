@@ -88,7 +88,7 @@ class SourceEstimate:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class LocateResult:
     """Estimates of the stretches in which a source was heard."""
 
@@ -106,6 +106,10 @@ class LocateResult:
     """All that were heard over the recording, the one that is heard most first."""
     tracks: list[FollowedSource] = field(default_factory=list)
     """The same over time, in order of their begin."""
+
+    def __repr__(self) -> str:
+        heard = f"{len(self.estimates)} of {self.frames} stretches heard"
+        return f"<LocateResult {self.shape.count} microphones, {heard}>"
 
     def summary(self) -> dict[str, Any]:
         """Medians over the estimates of the main source, and what is not told.

@@ -17,7 +17,7 @@ from analysis.stability.search_parts import SEARCH_CRITERIA, search_parts
 from analysis.stability.verdict_parts import verdict_parts
 from diagrams import Scenario
 
-__all__ = ["parts", "parts_of"]
+__all__ = ["parts", "parts_for"]
 
 
 def parts(
@@ -47,7 +47,7 @@ def parts(
     return (*_sound_parts(full=full), *guard, *verdict_parts())
 
 
-def parts_of(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
+def parts_for(scenarios: Sequence[Scenario], *, full: bool) -> tuple[Part, ...]:
     """The parts of a report about a robot.
 
     Args:

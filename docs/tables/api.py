@@ -9,14 +9,25 @@ from pkgutil import iter_modules
 
 import analysis
 import diagrams
+import phonotaxis
 import systems
 
 __all__ = ["api_page"]
 
 _TOP = """# Names to import
 
-Each room exports what is meant for others; modules below a room may move. Blocks are in
-`systems` itself, too. `python -m docs.tables.api` prints this page.
+What stands in `phonotaxis` is public: it changes as
+[CONTRIBUTING.md](../CONTRIBUTING.md) says. Below it, each room exports what is meant
+for others; modules below a room may move. Blocks are in `systems` itself, too.
+`python -m docs.tables.api` prints this page.
+
+## phonotaxis
+
+Loaded name by name, when first used: `import phonotaxis` itself takes no time. All of
+it is typed.
+
+| name | what it is |
+|---|---|
 """
 
 
@@ -34,9 +45,19 @@ def rooms() -> list[str]:
     return [name for name in found if import_module(name).__all__]
 
 
+def public_names() -> str:
+    """A row a public name, with the first line of its docstring."""
+    rows = []
+    for name in phonotaxis.__all__:
+        value = getattr(phonotaxis, name)
+        text = "Of the package." if isinstance(value, str) else inspect.getdoc(value)
+        rows.append(f"| `{name}` | {(text or '').partition(chr(10))[0]} |\n")
+    return "".join(rows)
+
+
 def api_page() -> str:
     """The page, as Markdown."""
-    parts = [_TOP]
+    parts = [_TOP + public_names()]
     for name in rooms():
         room = import_module(name)
         about = (inspect.getdoc(room) or "").partition("\n")[0]

@@ -1,0 +1,3 @@
+"""Runs for other programs: MCAP, CSV, and what the columns mean."""
+
+__all__: list[str] = []

@@ -1,0 +1,78 @@
+"""``phonotaxis export``: a run that is done, for other programs."""
+
+from __future__ import annotations
+
+import os
+from argparse import ArgumentParser, Namespace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+from analysis.commands.arguments import take_json
+from analysis.commands.command import Command, Job, Take
+from analysis.commands.exporting.files import Exports, take_exports
+
+if TYPE_CHECKING:
+    from analysis.exports.recorded_run import RecordedRun
+
+__all__ = ["COMMAND"]
+
+
+def _add_arguments(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "result", metavar="DIR", help="result directory of phonotaxis simulate"
+    )
+    take_exports(parser)
+    parser.add_argument(
+        "--out", metavar="DIR", help="new directory for them (default: beside the run)"
+    )
+    take_json(parser)
+
+
+def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
+    from analysis.exports.recorded_run import RecordedRun
+    from systems.framework.input_error import InputError
+
+    exports, result = Exports.chosen(options), Path(options.result)
+    if not exports.names:
+        raise InputError("export", "nothing is asked for; give --mcap, --csv or both")
+    if options.out is None:
+        for name in exports.names:
+            if (result / name).exists():
+                raise InputError(
+                    "out", f"{result / name} is there; remove it, or give --out DIR"
+                )
+        if result.is_dir() and not os.access(result, os.W_OK | os.X_OK):
+            raise InputError("out", f"{result} cannot be written; give --out DIR")
+    run = RecordedRun.load(result)
+    place = take(options.out) if options.out is not None else None
+    shown = place.out if place else result
+
+    def write(run: RecordedRun, _: dict[str, Any]) -> None:
+        if place:
+            exports.write(run, place.directory)
+            return
+        with TemporaryDirectory(prefix=".export.", dir=result) as hidden:
+            exports.write(run, Path(hidden))
+            for name in exports.names:  # whole, or not at all
+                (Path(hidden) / name).rename(result / name)
+
+    def summary(run: RecordedRun) -> dict[str, Any]:
+        return {
+            "schema_version": 1,
+            "scenario": run.scenario.name,
+            "rows": len(run.table),
+            "files": [str(shown / name) for name in exports.names],
+        }
+
+    return Job(
+        run=lambda _: run,
+        summary=summary,
+        text=lambda _, document: "\n".join(document["files"]),
+        write=write,
+    )
+
+
+COMMAND = Command(
+    "export", "MCAP and CSV of a run that is done", _add_arguments, _prepare
+)

@@ -1,0 +1,69 @@
+"""What the package needs and holds is declared."""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+import tomllib
+from importlib.metadata import packages_distributions
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+PACKAGES = ("systems", "diagrams", "analysis", "phonotaxis")
+
+
+def plain(requirement: str) -> str:
+    """Name of a distribution, as pip compares it."""
+    name = re.split(r"[<>=!~\[; ]", requirement, maxsplit=1)[0]
+    return re.sub(r"[-_.]+", "-", name).lower()
+
+
+def imported() -> set[str]:
+    """Top names of all that product code imports, at any depth."""
+    found: set[str] = set()
+    for package in PACKAGES:
+        for path in (ROOT / package).rglob("*.py"):
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if isinstance(node, ast.Import):
+                    found |= {alias.name.partition(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module:
+                    found.add(node.module.partition(".")[0])
+    return found - set(sys.stdlib_module_names) - set(PACKAGES)
+
+
+def test_every_library_that_is_imported_is_declared() -> None:
+    project = PROJECT["project"]
+    extras = [
+        each
+        for name in ("export", "live", "sweep")
+        for each in project["optional-dependencies"][name]
+    ]
+    declared = {plain(each) for each in (*project["dependencies"], *extras)}
+    homes = packages_distributions()
+    needed = {
+        name: {plain(each) for each in homes.get(name, [name])} for name in imported()
+    }
+    assert {"pydrake", "numba", "mcap_ros2"} <= needed.keys()
+    assert not {name for name, homes in needed.items() if not homes & declared}
+
+
+def test_every_file_that_is_no_code_goes_along() -> None:
+    """Scenarios, layouts, styles and scripts of pages, and the mark of types."""
+    data = PROJECT["tool"]["setuptools"]["package-data"]
+    declared = {
+        path
+        for package, patterns in data.items()
+        for home in (PACKAGES if package == "*" else [package.replace(".", "/")])
+        for pattern in patterns
+        for path in (ROOT / home).glob(pattern)
+    }
+    files = {
+        path
+        for package in PACKAGES
+        for path in (ROOT / package).rglob("*")
+        if path.is_file() and path.suffix != ".py" and "__pycache__" not in path.parts
+    }
+    assert len(files) > 40
+    assert files == declared

@@ -1,0 +1,230 @@
+"""``import phonotaxis``: cheap to import, typed, and one door to everything."""
+
+from __future__ import annotations
+
+import csv
+import runpy
+import subprocess
+import sys
+import tomllib
+from dataclasses import fields
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from ruamel.yaml import YAML
+
+import diagrams
+import phonotaxis
+from analysis.stability import report_parts
+
+ROOT = Path(__file__).resolve().parents[1]
+IMPORT = """
+import sys, time
+start = time.perf_counter()
+import phonotaxis
+print(time.perf_counter() - start, *sys.modules)
+"""
+
+
+def imported() -> tuple[float, set[str]]:
+    words = subprocess.run(
+        [sys.executable, "-c", IMPORT],
+        cwd=ROOT,
+        capture_output=True,
+        text=True,
+        check=True,
+    ).stdout.split()
+    return float(words[0]), {name.partition(".")[0] for name in words[1:]}
+
+
+def test_import_takes_less_than_a_tenth_of_a_second():
+    seconds, loaded = min((imported() for _ in range(3)), key=lambda found: found[0])
+    assert seconds < 0.1
+    assert not {"numpy", "pydrake", "pydantic", "diagrams", "analysis"} & loaded
+
+
+def test_every_public_name_is_there():
+    assert set(phonotaxis.__all__) <= set(dir(phonotaxis))
+    for name in phonotaxis.__all__:
+        assert getattr(phonotaxis, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'simulation'"):
+        getattr(phonotaxis, "simulation")  # noqa: B009  # mypy knows it, too
+
+
+def test_one_version_is_stated_everywhere():
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    citation = YAML(typ="safe").load((ROOT / "CITATION.cff").read_text("utf-8"))
+    changes = (ROOT / "CHANGELOG.md").read_text("utf-8")
+    stated = project["version"]
+    assert phonotaxis.__version__ == version("phonotaxis") == stated
+    assert citation["version"] == stated
+    assert f"## [{stated}] - {citation['date-released']}" in changes
+    assert changes.index("## [Unreleased]") < changes.index(f"## [{stated}]")
+
+
+@pytest.fixture(scope="module")
+def run() -> phonotaxis.RunResult:
+    scenario = phonotaxis.load_scenario(
+        "obstacle_free", {"hearing": "ideal", "duration_s": 1.0}
+    )
+    return phonotaxis.simulate(scenario)
+
+
+def test_settings_may_be_a_mapping():
+    named = phonotaxis.load_scenario(
+        "default", {"source.speed_m_s": 0.2, "obstacles.0.size_m": [0.2, 0.1]}
+    )
+    listed = phonotaxis.load_scenario(
+        "default", ["source.speed_m_s=0.2", "obstacles.0.size_m=[0.2, 0.1]"]
+    )
+    assert named == listed
+    with pytest.raises(phonotaxis.InputError, match="give a list of key=value"):
+        phonotaxis.load_scenario("default", "hearing=ideal")
+
+
+def test_a_run_is_that_of_the_diagrams(run: phonotaxis.RunResult):
+    ours = diagrams.simulate(run.scenario)
+    assert {each.name for each in fields(run)} == {each.name for each in fields(ours)}
+    assert run.trajectory.equals(ours.trajectory)
+    assert run.ending == ours.ending
+
+
+def test_a_run_is_shown_on_one_short_line(run: phonotaxis.RunResult):
+    assert repr(run) == (
+        "<RunResult obstacle_free, law active, seed 1: completed after 1.0 s>"
+    )
+
+
+def test_tables_lose_no_digit(run: phonotaxis.RunResult, tmp_path: Path):
+    with run.to_csv(tmp_path / "run.csv").open(newline="") as file:
+        names, *rows = csv.reader(file)
+    assert names == list(run.trajectory)
+    numbers = [[float(cell or "nan") for cell in row] for row in rows]
+    np.testing.assert_array_equal(np.array(numbers), run.trajectory.to_numpy())
+    binary = pd.read_parquet(run.to_parquet(tmp_path / "run.parquet"))
+    pd.testing.assert_frame_equal(binary, run.trajectory, check_exact=True)
+
+
+def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path):
+    out = run.save(tmp_path / "run")
+    assert {"replay.html", "summary.json", "scenario.yaml"} <= {
+        path.name for path in out.iterdir()
+    }
+    with pytest.raises(phonotaxis.InputError, match="is not empty"):
+        run.save(out)
+
+
+def test_pictures_are_asked_for_by_name(run: phonotaxis.RunResult):
+    assert len(run.plot().axes) == 1
+    assert len(run.plot("time_series").axes) > 3
+    with pytest.raises(phonotaxis.InputError, match="use 'trajectory'"):
+        run.plot("speed")  # type: ignore[arg-type]  # what mypy is there to tell
+    several = phonotaxis.simulate(
+        phonotaxis.load_scenario(
+            "two_followers", {"hearing": "ideal", "duration_s": 0.1}
+        )
+    )
+    with pytest.raises(phonotaxis.InputError, match=r"result\.robots\['near'\]"):
+        several.plot("time_series")
+
+
+def test_script_of_a_user_runs(tmp_path: Path):
+    """What mypy checks of it, ``make typecheck`` does, and CI with a wheel."""
+    script = runpy.run_path(str(ROOT / "tests" / "user_script.py"))
+    assert all(path.stat().st_size > 1000 for path in script["follow"](tmp_path))
+    assert script["hear"]() == pytest.approx(90.0, abs=1.0)
+
+
+def test_a_sweep_gives_table_and_page(tmp_path: Path):
+    plan = phonotaxis.SweepPlan(
+        scenario="obstacle_free",
+        set={"hearing": "ideal", "duration_s": 0.5},
+        grid={"law": ("none", "active")},
+    )
+    found = phonotaxis.sweep(plan, tmp_path / "sweep", workers=1)
+    assert repr(found) == f"<SweepResult sweep: 2 runs in {tmp_path / 'sweep'}>"
+    assert found.table["law"].tolist() == ["none", "active"]
+    assert "law active" in str(found)
+    assert (found.out / "report.html").is_file()
+
+
+def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
+    found = phonotaxis.compare(
+        "two_static_obstacles",
+        laws=["none", "active"],
+        runs=1,
+        settings={"hearing": "ideal", "duration_s": 0.5},
+        out=tmp_path / "laws",
+        workers=1,
+    )
+    (comparison,) = found.comparisons.values()
+    assert [cell.label for cell in comparison.cells] == ["none", "active"]
+    assert (comparison.pairs[0].first, comparison.pairs[0].second) == ("none", "active")
+    assert "success %" in str(found)
+    assert (found.out / "summary.json").is_file()
+    with pytest.raises(phonotaxis.InputError, match="stands there twice"):
+        phonotaxis.compare("wall", "wall", out=tmp_path / "twice")
+
+
+def test_stability_gives_findings_and_a_page(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """The first parts alone: all of them take a minute."""
+    monkeypatch.setattr(
+        report_parts, "parts_for", lambda _, full: report_parts.parts(full=full)[:2]
+    )
+    told: list[str] = []
+    found = phonotaxis.stability("obstacle_free", progress=told.append)
+    assert repr(found) == "<StabilityResult obstacle_free: active>"
+    assert len(told) == 2
+    assert len(found.analyses[0].findings) == 2
+    assert (found.save(tmp_path / "report") / "report.html").is_file()
+
+
+def test_locate_takes_samples_and_files_alike(tmp_path: Path):
+    import soundfile
+
+    places = [(0.0, 0.4), (0.0, 0.0), (0.0, -0.4)]
+    times = np.arange(24_000) / 48_000.0
+    noise = np.random.default_rng(2).uniform(-0.5, 0.5, 24_000)
+    delays = [np.hypot(1.5, 1.0 - y) / 340.0 for _, y in places]
+    samples = np.array([np.interp(times - delay, times, noise) for delay in delays])
+    soundfile.write(tmp_path / "heard.wav", samples.T, 48_000, subtype="DOUBLE")
+    (tmp_path / "array.yaml").write_text(f"microphones: {[list(p) for p in places]}")
+    by_file = phonotaxis.locate(tmp_path / "heard.wav", tmp_path / "array.yaml")
+    by_samples = phonotaxis.locate(samples, places, sample_rate_hz=48_000)
+    assert by_samples.to_dict() == by_file.to_dict()
+    bearing = by_samples.summary()["bearing_deg"]
+    assert bearing == pytest.approx(np.degrees(np.arctan2(1.0, 1.5)), abs=1.0)
+    counts = np.round(samples * 32767.0).astype(np.int16)
+    by_counts = phonotaxis.locate(counts, sample_rate_hz=48_000)
+    assert by_counts.summary()["bearing_deg"] == pytest.approx(bearing, abs=0.1)
+    assert len(repr(by_counts)) < 100
+
+
+NOISE = np.random.default_rng(3).standard_normal((3, 9600))
+
+
+@pytest.mark.parametrize(
+    ("samples", "options", "message"),
+    [
+        (NOISE, {}, "sample_rate_hz: is not said"),
+        (NOISE, {"sample_rate_hz": 44_100.5}, "whole number of Hz"),
+        (NOISE, {"sample_rate_hz": float("nan")}, "whole number of Hz"),
+        (NOISE.T, {"sample_rate_hz": 48_000}, "transpose"),
+        (NOISE[0], {"sample_rate_hz": 48_000}, r"\(microphones, samples\)"),
+        (NOISE[:2], {"sample_rate_hz": 48_000}, "has 2 channels, but the array"),
+        (0.0 * NOISE, {"sample_rate_hz": 48_000}, "silent"),
+        (NOISE * np.nan, {"sample_rate_hz": 48_000}, "not finite"),
+        ([["a"] * 9], {"sample_rate_hz": 48_000}, "holds no numbers"),
+        (NOISE, {"sample_rate_hz": 48_000, "geometry": [[0.0]]}, "geometry: micro"),
+        (NOISE, {"sample_rate_hz": 48_000, "geometry": [1.0, 2.0]}, "list of places"),
+        ("a.wav", {"sample_rate_hz": 48_000}, "a file has its own"),
+    ],
+)
+def test_samples_that_cannot_be_used_are_refused(samples, options, message):
+    with pytest.raises(phonotaxis.InputError, match=message):
+        phonotaxis.locate(samples, **options)
