@@ -65,7 +65,8 @@ def _write_pages(_app: Any) -> None:
         own = [name for name in names if homes[name] == room]
         lines = [room, "=" * len(room), "", f".. automodule:: {room}"]
         lines += [f"   :members: {', '.join(own)}", ""] if own else [""]
-        if others := [f":py:obj:`.{n}`" for n in names if homes[n] != room]:
+        others = [f":py:obj:`{n} <{homes[n]}.{n}>`" for n in names if n not in own]
+        if others:
             lines += [f"Exported here as well: {', '.join(others)}.", ""]
         page, text = _PAGES / f"{room}.rst", "\n".join(lines)
         if not page.exists() or page.read_text("utf-8") != text:
