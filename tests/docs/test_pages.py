@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from analysis.runs import run_summary, summary_text
 from diagrams import library_scenarios, load_scenario, simulate
 
 DOCS = Path(__file__).resolve().parents[2] / "docs"
@@ -56,6 +57,17 @@ def test_scenario_of_the_page_ends_as_the_page_says(office: Path) -> None:
         scenario = load_scenario(office, [f"law={law}"] if law else [])
         result = simulate(scenario, engine="compiled")
         assert (result.cause, f"{result.simulated_s:.1f}") == (cause, seconds)
+
+
+@pytest.mark.slow
+def test_tutorial_reads_what_the_default_run_prints() -> None:
+    found = re.search(r"(?ms)^```text\n(.*?)^```$", page("tutorial.md"))
+    assert found
+    result = simulate(load_scenario("default"), engine="compiled")
+    printed = summary_text(result, run_summary(result, None)).splitlines()
+    changing = ("speed", "results")
+    told = [line for line in found[1].splitlines() if not line.startswith(changing)]
+    assert told == [line for line in printed if not line.startswith(changing)]
 
 
 def test_gallery_shows_every_scenario() -> None:
