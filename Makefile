@@ -13,7 +13,7 @@ FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-fast browser-test lint typecheck package bench attack mutate clean
+.PHONY: help demo test test-fast browser-test lint typecheck docs package bench attack mutate clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
@@ -27,7 +27,7 @@ test: .venv/.installed ## run all tests but those that need a browser
 test-fast: .venv/.installed ## run the tests that take seconds
 	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser"
 
-browser-test: .venv/.installed ## run the tests that open a page in Chromium
+browser-test: .venv/.installed docs ## run the tests that open a page in Chromium
 	@$(PYTEST) -m browser
 
 lint: .venv/.installed-dev ## check style and format
@@ -36,6 +36,10 @@ lint: .venv/.installed-dev ## check style and format
 
 typecheck: .venv/.installed-dev ## check types
 	@$(PY) -m mypy
+
+docs: .venv/.installed-docs ## build the documentation into build/site, notebooks executed, links checked
+	@$(PY) -m sphinx -q -W --keep-going -c docs . build/site
+	@echo "Open build/site/index.html; it needs no network."
 
 package: .venv/.installed-dev ## build the package, and use it where the sources are not
 	@.ci/check_package
@@ -52,7 +56,7 @@ mutate: .venv/.installed ## make small faults in the code and count those that t
 	@$(PY) -m benchmarks.mutants
 
 clean: ## remove the environment, caches and builds; keep results/
-	@rm -rf .venv .venv-newest build dist phonotaxis.egg-info
+	@rm -rf .venv .venv-newest build dist docs/reference phonotaxis.egg-info
 	@rm -rf .hypothesis .mypy_cache .pytest_cache .ruff_cache
 	@find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
@@ -87,4 +91,8 @@ clean: ## remove the environment, caches and builds; keep results/
 
 .venv/.installed-dev: .venv/.installed
 	@$(PIP_INSTALL) -e '.[dev]'
+	@touch $@
+
+.venv/.installed-docs: .venv/.installed
+	@$(PIP_INSTALL) -e '.[docs]'
 	@touch $@

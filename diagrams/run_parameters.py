@@ -119,7 +119,8 @@ class RunParameters(Parameters):
     one, named ``robot``, that has nothing other."""
     sources: _Participants = Field(default={})
     """By name, what each source has other than ``source`` and ``sound`` say; empty:
-    one, named ``source``."""
+    one, named ``source``. Robots follow the first unless ``follows`` says otherwise;
+    all others are interferers."""
     source: SourceRobotParameters = SourceRobotParameters()
     sound: SoundParameters = SoundParameters()
     obstacles: Annotated[

@@ -33,7 +33,7 @@ GREATEST_ORDER = 150
 
 
 class RoomParameters(Parameters):
-    """A shoebox room round the floor of W."""
+    """A shoebox room round the floor of W, for sound: obstacles are what can be hit."""
 
     size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
         7.0,

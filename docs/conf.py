@@ -1,0 +1,63 @@
+"""How Sphinx makes the site: ``make docs``.
+
+The pages are those of the repository and of docs/ as they are. Made beside them are
+only those of the reference, one for each heading of docs/api.md.
+"""
+
+from __future__ import annotations
+
+import logging
+import sys
+from pathlib import Path
+
+from jupyter_client import KernelManager
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+from phonotaxis import __version__  # noqa: E402  # needs the path
+
+project = "phonotaxis"
+author = "phonotaxis developers"
+copyright = f"2026, {author}"  # noqa: A001  # Sphinx calls it so
+version = release = __version__
+
+root_doc = "docs/index"
+include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
+exclude_patterns = [".*", "build", "results", "docs/results", "docs/tables"]
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "docs.building.navigation",
+    "docs.building.markdown_links",
+    "docs.building.mathematics",
+    "docs.building.wiring",
+    "docs.building.port_tables",
+    "docs.building.reference",
+]
+
+myst_enable_extensions = ["dollarmath"]
+myst_heading_anchors = 4
+myst_fence_as_directive = ["math", "mermaid"]
+
+nb_execution_mode = "force"
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+# Kernels talk to nobody else, and say no more than what fails.
+KernelManager.transport_encryption.default_value = "auto"
+logging.getLogger("traitlets").setLevel(logging.WARNING)
+
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+autodoc_default_options = {"exclude-members": "model_config"}
+
+html_theme = "furo"
+html_title = f"phonotaxis {version}"
+html_static_path = ["_static"]
+html_extra_path = ["building/root"]
+html_css_files = ["site.css"]
+html_show_search_summary = False  # it would be fetched, which files cannot be
+html_show_sphinx = False
+html_copy_source = False

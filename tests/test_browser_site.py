@@ -1,0 +1,85 @@
+"""The site that ``make docs`` has built, in a browser without network."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from pathlib import Path
+
+import pytest
+
+pytestmark = pytest.mark.browser
+
+SITE = Path(__file__).resolve().parents[1] / "build" / "site" / "docs"
+#: One of each kind: prose, tables and formulas, a notebook, pictures, docstrings.
+PAGES = (
+    "index.html",
+    "model.html",
+    "notebooks/own_law.html",
+    "gallery.html",
+    "reference/systems.ranging.html",
+)
+WIDTHS = (390, 1100, 1400)
+THEMES = ("light", "dark")
+
+#: Looks at every frame when all are loaded, and complains on the console.
+SCRIPT = """
+const luminance = ([r, g, b]) => [r, g, b]
+  .map(v => v / 255)
+  .map(v => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
+  .reduce((sum, v, k) => sum + v * [0.2126, 0.7152, 0.0722][k], 0);
+const parts = colour => colour.match(/[\\d.]+/g).map(Number);
+function behind(view, element) {
+  for (; element; element = element.parentElement) {
+    const colour = parts(view.getComputedStyle(element).backgroundColor);
+    if (colour.length === 3 || colour[3] > 0.5) return colour;
+  }
+  return [255, 255, 255];
+}
+function faint(view) {
+  const found = [], texts = view.document.createTreeWalker(view.document.body, 4);
+  while (texts.nextNode()) {
+    const element = texts.currentNode.parentElement;
+    if (!texts.currentNode.data.trim() || !element.checkVisibility()) continue;
+    const ink = luminance(parts(view.getComputedStyle(element).color));
+    const paper = luminance(behind(view, element));
+    const [less, more] = [ink, paper].sort((a, b) => a - b);
+    const ratio = (more + 0.05) / (less + 0.05);
+    if (ratio < 4.5) found.push(`${ratio.toFixed(2)} ${texts.currentNode.data}`);
+  }
+  return found;
+}
+addEventListener("load", () => {
+  for (const frame of document.querySelectorAll("iframe")) {
+    const view = frame.contentWindow, page = view.document, {theme} = frame.dataset;
+    const say = what => console.error(`${frame.src} ${frame.width} ${theme}: ${what}`);
+    page.body.dataset.theme = theme;
+    const wide = page.documentElement.scrollWidth;
+    if (wide > frame.width) say(`${wide} px wide`);
+    for (const text of faint(view)) say(`contrast ${text}`);
+    for (const {name} of view.performance.getEntriesByType("resource"))
+      if (!name.startsWith("file:")) say(`needs ${name}`);
+  }
+  console.log(`looked at ${document.querySelectorAll("iframe").length}`);
+});
+"""
+
+
+def test_pages_fit_are_legible_and_need_no_network(
+    chromium: Callable[..., str], tmp_path: Path
+) -> None:
+    assert (SITE / "index.html").exists(), "there is no site; run make docs first"
+    cases = list(product(PAGES, WIDTHS, THEMES))
+    frames = "".join(
+        f'<iframe src="{(SITE / page).as_uri()}" width="{width}" height="800" '
+        f'data-theme="{theme}"></iframe>'
+        for page, width, theme in cases
+    )
+    harness = tmp_path / "harness.html"
+    harness.write_text(f"<script>{SCRIPT}</script>{frames}")
+    log = chromium(
+        harness, "--allow-file-access-from-files", f"--screenshot={tmp_path / 's.png'}"
+    )
+    said = [line for line in log.splitlines() if "CONSOLE" in line]
+    assert len(said) == 1, "\n".join(said[:40])
+    assert f"looked at {len(cases)}" in said[0]
