@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
-from concurrent.futures import Future, ThreadPoolExecutor
+from concurrent.futures import Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,9 +35,9 @@ _MOST_LAGS = 240
 class LiveFaults:
     """Looks at every half second of a stream, and at three seconds now and then.
 
-    The latter takes a quarter of a second and is done in a thread of its own, beside
-    the stream; what it has found is told two seconds of sound later, however fast the
-    computer is.
+    The latter takes a quarter of a second, more with many channels, and is done in a
+    thread of its own, beside the stream; what it has found is told two seconds of sound
+    later, or when it is done, or at the end of the stream.
     """
 
     geometry: ArrayGeometry
@@ -83,27 +84,55 @@ class LiveFaults:
             self._held = [joined[:, self._size :]]
             yield from self._of_stretch(joined[:, : self._size])
 
+    def finish(self) -> Iterator[ChannelFault]:
+        """What the stream showed that was not told yet.
+
+        Yields:
+            Faults.
+        """
+        if not self._looks and self._stretches and self._hears():
+            self._pending = self._begin_look()
+        if self._pending is not None:
+            yield from self._pending.result()
+
     def _of_stretch(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
         self._count += 1
         self._stretches = [*self._stretches, stretch][-_TOGETHER:]
         yield from _clipped(stretch)
         yield from _dead(stretch)
         yield from self._drift(stretch)
-        if self._pending is not None and self._count >= self._due:
+        if self._pending is not None:
+            if self._count < self._due or not self._is_done(self._pending):
+                return
             pending, self._pending = self._pending, None
             yield from pending.result()
         if self._count < self._next or len(self._stretches) < _TOGETHER:
             return
-        self._looks += 1
-        self._next += _NEXT if self._looks < _FIRST_LOOKS else _LATER
+        if not self._hears():
+            return
+        self._next = self._count + (_NEXT if self._looks < _FIRST_LOOKS else _LATER)
         self._due = self._count + _TOLD
-        self._pending = self._worker.submit(
+        self._pending = self._begin_look()
+
+    def _hears(self) -> bool:
+        """Whether there is sound in what would be looked at: silence shows nothing."""
+        return max(_heard_db(stretch) for stretch in self._stretches) > _LEAST_DB
+
+    def _begin_look(self) -> Future[list[ChannelFault]]:
+        self._looks += 1
+        self._begun = time.monotonic()
+        return self._worker.submit(
             find_channel_faults,
             np.concatenate(self._stretches, axis=1).astype(np.float64),
             self._known,
             sample_rate_hz=float(self.sample_rate_hz),
             band_hz=self.geometry.band,
         )
+
+    def _is_done(self, pending: Future[list[ChannelFault]]) -> bool:
+        """Waits for it only as long as sound that is made now would have taken."""
+        spare = self._begun + _TOLD * STRETCH_S - time.monotonic()
+        return bool(wait([pending], max(0.0, spare)).done)
 
     def _drift(self, stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
         t_s = (self._count - 0.5) * STRETCH_S
@@ -130,11 +159,19 @@ def _clipped(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
 
 
 def _dead(stretch: NDArray[np.float32]) -> Iterator[ChannelFault]:
-    level = 10.0 * np.log10(np.maximum(np.var(stretch, axis=1), 1e-30))
-    # The loudest alone may have the source at its microphone.
-    others = float(np.sort(level)[-2])
+    others = _heard_db(stretch)
     if others < _LEAST_DB:
         return
-    for k in np.flatnonzero(level < others - _DEAD_DB):
+    for k in np.flatnonzero(_levels_db(stretch) < others - _DEAD_DB):
         message = f"channel {k + 1}: dead, and left out; check its microphone"
         yield ChannelFault("dead", (int(k),), message)
+
+
+def _levels_db(stretch: NDArray[np.float32]) -> NDArray[np.float64]:
+    """(n,) of the channels."""
+    return 10.0 * np.log10(np.maximum(np.var(stretch, axis=1), 1e-30))
+
+
+def _heard_db(stretch: NDArray[np.float32]) -> float:
+    """The second highest level: the source may be at one microphone."""
+    return float(np.sort(_levels_db(stretch))[-2])

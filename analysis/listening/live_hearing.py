@@ -134,6 +134,8 @@ class LiveHearing:
                     self.heard.identities |= {track.identity for track in step.tracks}
                     yield HeardStep(step, _decibels(float(np.mean(powers))))
                     powers.clear()
+            for fault in looks.finish():
+                self._mend(fault, looks)
         finally:
             looks.close()
             self._stream.close()

@@ -30,7 +30,12 @@ class Teller(Protocol):
         """The sources of a step."""
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault that was seen at t."""
+        """A fault that was seen at t.
+
+        Args:
+            fault: In words.
+            t_s: When it was seen, s of sound.
+        """
 
     def __enter__(self) -> object:
         """Begins."""
@@ -64,7 +69,12 @@ class TextLines:
             self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault, on standard error."""
+        """A fault, on standard error.
+
+        Args:
+            fault: In words.
+            t_s: When it was seen, s of sound.
+        """
         self._errors.write(f"phonotaxis: at {t_s:.1f} s: {fault}\n")
         self._errors.flush()
 
@@ -90,7 +100,12 @@ class JsonLines(TextLines):
         self._out.flush()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault, on both streams."""
+        """A fault, on both streams.
+
+        Args:
+            fault: In words.
+            t_s: When it was seen, s of sound.
+        """
         super().name_fault(fault, t_s)
         self._out.write(f"{json.dumps({'t_s': round(t_s, 6), 'fault': fault})}\n")
         self._out.flush()
@@ -116,7 +131,12 @@ class Screen(TextLines):
         self._draw()
 
     def name_fault(self, fault: str, t_s: float) -> None:
-        """A fault stays on the screen."""
+        """A fault stays on the screen.
+
+        Args:
+            fault: In words.
+            t_s: When it was seen, s of sound.
+        """
         self._faults.append(f"! {t_s:.1f} s: {fault}")
         self._draw()
 

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from analysis.listening import LiveHearing, listen, open_pipe
+from analysis.listening import HeardStep, LiveHearing, listen, open_pipe
 from analysis.recordings import load_geometry, locate
 from diagrams import (
     RunAudio,
@@ -61,7 +62,7 @@ def true_bearing_deg(trajectory) -> float:
 
 
 def listened(folder):
-    told = []
+    told: list[HeardStep] = []
     geometry = load_geometry(folder / "array.yaml")
     stream = open_pipe((folder / "heard.wav").open("rb"), raw_channels=3)
     heard = listen(LiveHearing(stream, geometry), told.append)
@@ -76,7 +77,7 @@ def test_the_file_has_the_source_where_it_is(run):
     found = locate(folder / "heard.wav", load_geometry(folder / "array.yaml"))
     assert not found.faults
     bearings = [estimate.bearing_deg for estimate in found.estimates]
-    assert np.median(bearings) == pytest.approx(true, abs=1.5)
+    assert np.median(np.array(bearings, dtype=float)) == pytest.approx(true, abs=1.5)
     (track,) = listened(folder)[-1].tracks
     assert math.degrees(track.bearing) == pytest.approx(true, abs=1.5)
 
@@ -89,7 +90,7 @@ def test_the_block_in_the_diagram_tells_what_listen_tells_of_the_file(run):
     context = block.GetMyContextFromRoot(simulator.get_context())
     for sources in listened(folder):
         simulator.AdvanceTo(sources.t_s + 1e-3)
-        told = block.GetOutputPort("sources").Eval(context)
+        told: Any = block.GetOutputPort("sources").Eval(context)
         assert told.t_s == pytest.approx(sources.t_s)
         assert len(told.tracks) == len(sources.tracks)
         for ours, theirs in zip(told.tracks, sources.tracks, strict=True):

@@ -111,6 +111,12 @@ def test_exchanged_and_copied_channels_end_it(order, names):
     assert max((t for t, _, _ in told), default=0.0) <= 5.0
 
 
+@pytest.mark.parametrize("seconds", [2.0, 4.0])
+def test_a_stream_that_ends_early_is_looked_at_as_well(seconds):
+    heard, _, _ = hear(FRIENDS[[0, 1, 2, 2], : round(seconds * RATE)])
+    assert heard.status.startswith("stopped: channels 3 and 4: the same samples")
+
+
 def test_positions_in_centimetres_end_it():
     geometry = ArrayGeometry(
         microphones=tuple((100.0 * x, 100.0 * y) for x, y in SQUARE),
@@ -210,5 +216,8 @@ def test_streams_of_another_array_are_refused_and_closed(channels, rate, complai
 
 
 def test_silence_has_no_sources_and_no_faults():
-    heard, told, named = hear(np.zeros((4, 4 * RATE), np.float32))
-    assert (told, named, heard.identities) == ([], [], set())
+    """Of which 9 s would be long enough for all three looks."""
+    silence = np.zeros((4, 10 * RATE), np.float32)
+    heard, told, named = hear(np.hstack((silence, FRIENDS)))
+    assert (named, heard.failed, heard.identities) == ([], False, {1})
+    assert 10.0 < told[0][0] <= 10.5 + 1e-6
