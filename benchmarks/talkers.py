@@ -141,31 +141,29 @@ def product(places: NDArray[np.float64], sure: list[tuple[float, bool]]) -> Name
     return name
 
 
+TALKERS_HEADINGS = (
+    "array",
+    "talkers",
+    "apart",
+    "T60",
+    "recordings",
+    "recall",
+    "asked",
+    "false each",
+    "all found, none false",
+    "rms error",
+)
+
+
 def talkers_table(
     arrays: list[str], draws: int, seed: int, voices: Voices
 ) -> list[Figure]:
-    """Two and three talkers, and single ones."""
-    print(
-        markdown_head(
-            (
-                "array",
-                "talkers",
-                "apart",
-                "T60",
-                "recordings",
-                "recall",
-                "asked",
-                "false each",
-                "all found, none false",
-                "rms error",
-            )
-        )
-    )
+    """Two and three talkers."""
+    print(markdown_head(TALKERS_HEADINGS))
     figures, sure = [], []
     for array in arrays:
-        places = TALKER_ARRAYS[array]
         share = draws if array == SQUARE else max(1, draws // 3)
-        name = product(places, sure)
+        name = product(TALKER_ARRAYS[array], sure)
         for apart, t60, asked in CELLS:
             for count in (2, 3):
                 rooms = talkers(array, count, apart, t60, share, seed, voices)
@@ -176,14 +174,26 @@ def talkers_table(
                     Figure(f"{cell}: false", counts.false_each, "<=", MOST_FALSE),
                 ]
                 _print_counts(array, str(count), f"{apart:g} deg", t60, counts, asked)
-        for t60 in (0.3, 0.6, 1.2):
-            many = 3 * share if t60 == 1.2 else share
+    return figures + _confidence_table(sure)
+
+
+def singles_table(
+    arrays: list[str], draws: int, seed: int, voices: Voices
+) -> list[Figure]:
+    """Single talkers, six times as many where it echoes most."""
+    print()
+    print(markdown_head(TALKERS_HEADINGS))
+    figures = []
+    for array in arrays:
+        share = draws if array == SQUARE else max(1, draws // 3)
+        name = product(TALKER_ARRAYS[array], [])
+        for t60 in (1.2, 0.6, 0.3):
+            many = 6 * share if t60 == 1.2 else share
             counts = tally(talkers(array, 1, 0.0, t60, many, seed, voices), name)
             exact = counts.exact / counts.recordings
             cell = f"{array}, single, T60 {t60:g} s: exactly one"
             figures.append(Figure(cell, exact, ">=", LEAST_SINGLE))
             _print_counts(array, "1", "-", t60, counts, LEAST_SINGLE)
-    figures += _confidence_table(sure)
     return figures
 
 
@@ -443,13 +453,14 @@ def peers_table(draws: int, seed: int, folder: Path | None) -> None:
 def main() -> int:
     """Prints the tables and what is missed; exit status 1 if anything is."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=100, help="recordings a row (100)")
+    parser.add_argument("--draws", type=int, default=50, help="recordings a row (50)")
     parser.add_argument("--seed", type=int, default=1, help="of all that is drawn (1)")
     parser.add_argument("--voices", type=Path, help="folder of mono WAV files")
     parser.add_argument("--recordings", type=Path, help="folder of recordings")
-    parser.add_argument("--array", choices=TALKER_ARRAYS, help="talkers of one alone")
+    parser.add_argument("--array", choices=TALKER_ARRAYS, help="of talkers, one alone")
     parser.add_argument(
-        "--only", choices=("talkers", "noises", "crossings", "recordings", "peers")
+        "--only",
+        choices=("talkers", "singles", "noises", "crossings", "recordings", "peers"),
     )
     options = parser.parse_args()
     draws, seed = options.draws, options.seed
@@ -457,11 +468,14 @@ def main() -> int:
         parser.error("--draws must be at least 4")
     part = options.only
     figures: list[Figure] = []
+    arrays = [options.array] if options.array else list(TALKER_ARRAYS)
+    voices = voices_of(options.voices)
     if part in (None, "talkers"):
-        arrays = [options.array] if options.array else list(TALKER_ARRAYS)
-        figures += talkers_table(arrays, draws, seed, voices_of(options.voices))
+        figures += talkers_table(arrays, draws, seed, voices)
+    if part in (None, "singles"):
+        figures += singles_table(arrays, draws, seed, voices)
     if part in (None, "noises"):
-        figures += noises_table(draws // 4, seed)
+        figures += noises_table(max(4, draws // 6), seed)
     if part in (None, "crossings"):
         figures += crossings_table(draws // 4, seed)
     if part in (None, "recordings") and options.recordings:

@@ -34,6 +34,10 @@ _PAUSE_S = 0.3
 # A track that turns by more moves, and what is within so much of it is the same, deg.
 _MOVES_DEG, _NEAR_DEG = 20.0, 8.0
 
+# Of the time in which the one of two directions is heard that is heard for less: if the
+# other is heard too in less of that, they may be of one source that moves.
+_TOGETHER = 0.25
+
 # What is not told has no greater confidence.
 _NOT_TOLD = 0.5
 
@@ -135,7 +139,7 @@ def heard_sources(
         votes = steered_only(votes)
     sources = [HeardSource.of(voted) for voted in gather_sources(votes)]
     tracks = _tracks(votes, channels.shape[1] / sample_rate_hz, plan)
-    sources = _counted_once(sources, tracks)
+    sources = _counted_once(sources, tracks, votes)
     if steady:
         sources = [_doubted(source) for source in sources[:1]]
         tracks = [_doubted(track) for track in tracks]
@@ -143,17 +147,34 @@ def heard_sources(
 
 
 def _counted_once(
-    sources: list[HeardSource], tracks: list[FollowedSource]
+    sources: list[HeardSource], tracks: list[FollowedSource], votes: DirectionVotes
 ) -> list[HeardSource]:
-    """Without directions that sources passed which count already."""
+    """Without directions that a source passed on its way, after or before another."""
     moving = [track for track in tracks if _extent_deg(track) > _MOVES_DEG]
     kept: list[HeardSource] = []
     for source in sources:
         passing = [track for track in moving if _passes(track, source)]
-        known = sum(any(_passes(track, k) for track in passing) for k in kept)
-        if not passing or known < len(passing):
+        known = any(
+            _passes(track, other) and _apart_in_time(votes, source, other)
+            for track in passing
+            for other in kept
+        )
+        if not known:
             kept.append(source)
     return kept
+
+
+def _apart_in_time(votes: DirectionVotes, *sources: HeardSource) -> bool:
+    """Whether two directions are hardly heard at the same time."""
+    spans = []
+    for source in sources:
+        off = np.degrees(votes.azimuth) - source.bearing_deg
+        near = np.abs((off + 180.0) % 360.0 - 180.0) < _NEAR_DEG
+        spans.append(np.quantile(votes.t_s[near], (0.1, 0.9)) if near.any() else (0, 0))
+    (first, last), (other_first, other_last) = spans
+    both = min(last, other_last) - max(first, other_first)
+    shorter = min(last - first, other_last - other_first)
+    return bool(both < _TOGETHER * shorter)
 
 
 def _extent_deg(track: FollowedSource) -> float:

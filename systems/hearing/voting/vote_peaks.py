@@ -102,7 +102,7 @@ def gather_sources(
         source = _source(
             azimuth, votes.elevation[use], weight, centres[peak], nearest == peak
         )
-        if source.votes >= least:
+        if source is not None and source.votes >= least:
             height = float(density[peak] / density.max())
             sure = min(1.0, source.votes / (3.0 * least))
             found.append(source._replace(confidence=math.sqrt(height) * sure))
@@ -141,11 +141,16 @@ def _source(
     weight: NDArray[np.float64],
     bearing: float,
     nearest: NDArray[np.bool_],
-) -> VotedSource:
-    """The source at a peak, of the votes that are nearer to it than to others."""
+) -> VotedSource | None:
+    """The source at a peak, of the votes that are nearer to it than to others.
+
+    None where there are none: a peak of the steered response beside single bins.
+    """
     near = np.abs(_wrapped(azimuth - bearing)) < _NEAR_RAD
     count = int(np.count_nonzero(near))
     mine = near & nearest
+    if not mine.any():
+        return None
     a, w = azimuth[mine], weight[mine]
     for _ in range(_STEPS):
         off = _wrapped(a - bearing)

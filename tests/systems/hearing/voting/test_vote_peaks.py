@@ -1,0 +1,49 @@
+"""Sources of votes that are made up."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from systems.hearing.voting import DirectionVotes, gather_sources
+
+
+def votes_at(single_deg, steered_deg):
+    azimuth = np.radians(np.concatenate((single_deg, steered_deg)))
+    count = azimuth.size
+    return DirectionVotes(
+        np.arange(count) * 0.01,
+        azimuth,
+        np.full(count, np.nan),
+        np.ones(count),
+        np.arange(count) >= len(single_deg),
+        np.empty(0),
+        np.empty((0, 24)),
+    )
+
+
+def around(centre, count, rng):
+    return centre + 3.0 * rng.standard_normal(count)
+
+
+def test_where_both_kinds_of_votes_agree_is_a_source():
+    rng = np.random.default_rng(1)
+    single = np.concatenate([around(c, 60, rng) for c in (-50.0, 40.0, 110.0)])
+    steered = np.concatenate([around(c, 20, rng) for c in (-50.0, 40.0, -130.0)])
+    found = sorted(
+        math.degrees(s.bearing) for s in gather_sources(votes_at(single, steered))
+    )
+    assert found == pytest.approx([-50.0, 40.0], abs=1.5)
+
+
+def test_any_votes_can_be_gathered():
+    rng = np.random.default_rng(2)
+    for _ in range(300):
+        centres = rng.uniform(-180.0, 180.0, 3)
+        single = rng.choice(centres, 30) + rng.normal(0.0, 12.0, 30)
+        steered = rng.choice(centres, 12) + rng.normal(0.0, 12.0, 12)
+        for source in gather_sources(votes_at(single, steered)):
+            assert math.isfinite(source.bearing_std)
+            assert 0.0 <= source.confidence <= 1.0
