@@ -293,9 +293,9 @@ def print_chirps(trials: Sequence[Trial]) -> None:
 def main() -> None:
     """Reads the number of draws."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=24, help="of each cell (24)")
-    parser.add_argument("--chirps", type=int, default=30, help="sources (30)")
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--draws", type=int, default=12, help="of each cell (12)")
+    parser.add_argument("--chirps", type=int, default=20, help="sources (20)")
+    parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--processes", type=int, default=1)
     options = parser.parse_args()
     tasks = [

@@ -10,7 +10,6 @@ exchange at all, for all its delays are alike.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,7 +109,11 @@ def exchanged_channels(delays: FrameDelays) -> list[tuple[int, int]]:
     (d, levels), shape = delays.agreeing(), delays.shape
     if len(d) < _LEAST_FRAMES or _fitting(d, levels, delays)[0] > _WRONG:
         return []
-    exchanges = list(combinations(range(shape.count), 2))
+    # Nearer ones may well stand the other way round.
+    apart = shape.distances_m > np.sqrt(2.0) * delays.misplaced_m
+    exchanges = [(int(i), int(j)) for i, j in shape.pairs[apart]]
+    if not exchanges:
+        return []
     trials = len(d) * len(exchanges)
     every = max(1, min(trials // _MOST_TRIALS, len(d) // _LEAST_FRAMES))
     d, levels = d[::every], levels[::every]

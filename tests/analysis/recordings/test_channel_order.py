@@ -8,7 +8,11 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from analysis.recordings.channel_order import levels_contradict
+from analysis.recordings.channel_order import (
+    FrameDelays,
+    exchanged_channels,
+    levels_contradict,
+)
 from systems.hearing.multilateration import locate_source
 from systems.sound.array_shape import ArrayShape
 
@@ -66,3 +70,20 @@ def test_exchanged_neighbours_never_pass_for_a_near_source(angle, distance, firs
     fix = locate_source(tau, 1e-12 * (np.eye(2) + 1.0), ROW, C)
     if fix.range_valid and fix.range < 0.35:
         assert levels_contradict(1.0 / ranges, fix, ROW)
+
+
+def test_neighbours_that_may_stand_either_way_round_are_not_exchanged():
+    """6 cm apart, and each known to 1 cm; known to 1 mm, they are."""
+    places = np.array([[0.0, 0.5], [0.0, 0.06], [0.0, 0.0], [0.0, -0.5]])
+    stated, wired = ArrayShape.of(places), places[[0, 2, 1, 3]]
+    lags = []
+    for bearing in np.radians([78.0, 80.0, 82.0, 84.0, 86.0, 88.0]):
+        source = 3.0 * np.array([np.cos(bearing), np.sin(bearing)])
+        paths = np.linalg.norm(source - wired, axis=1)
+        i, j = stated.pairs.T
+        lags.append((paths[j] - paths[i]) / 0.007)
+    for std, exchanges in ((0.001, [(1, 2)]), (0.01, [])):
+        delays = FrameDelays(
+            np.array(lags), np.ones((6, 4)), stated, 0.007, position_std_m=std
+        )
+        assert exchanged_channels(delays) == exchanges
