@@ -53,8 +53,8 @@ _SECOND = 0.6
 
 # Standard deviations: of what delays leave out, above all the robot's turning within a
 # frame; of what the tracker's covariance does; and of a source's velocity, m and m/s.
-_DELAY_FLOOR_M = 0.015
-_PLACE_FLOOR_M = 0.05
+_DELAY_FLOOR_M = 0.008
+_PLACE_FLOOR_M = 0.03
 _SPEED_M_S = 0.35
 
 # Where only the direction is known the range is about this, and half of it off, m.
