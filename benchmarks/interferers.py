@@ -45,7 +45,6 @@ SOUNDS = {
     "bursts of noise, at once": "kind: band_noise",
     "bursts of noise, 0.9 s later": "kind: band_noise, start_s: 0.9",
     "speech": "kind: wav, on_s: 10.0, period_s: 10.0, file: {file}",
-    "the same chirp, at once": "kind: chirp",
 }
 #: With ``--room``: large enough for all ways.
 ROOM = [
@@ -228,7 +227,7 @@ def print_table(layouts: int, file: str, room: list[str]) -> dict[tuple[Any, ...
 def main() -> int:
     """Prints the table and its verdicts."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    parser.add_argument("--layouts", type=int, default=12, help="a row")
+    parser.add_argument("--layouts", type=int, default=8, help="a row")
     parser.add_argument("--room", action="store_true", help="that reverberates, 0.3 s")
     arguments = parser.parse_args()
     if arguments.layouts < 1:
