@@ -72,6 +72,9 @@ _QUIET = 2.33
 _SETS = 4
 _SET_CORRELATION = 0.1
 
+# Nothing that is left correlates as much as this.
+_SURE_CORRELATION = 0.25
+
 # The delays of its pairs may disagree by so many standard deviations more.
 _SET_CLOSURE = 2.0
 
@@ -167,6 +170,8 @@ class Candidate(NamedTuple):
     """(n - 1, n - 1) of them, s^2."""
     correlation: float
     """Least correlation coefficient of the pairs, 0 to 1."""
+    sure: bool = True
+    """Whether it correlates more than chance does."""
     alone: bool = False
     """Whether it outweighs whatever else sounds."""
 
@@ -298,15 +303,17 @@ class Localiser:
         first, after = self._first(sound, memory, after)
         found = [] if first is None else [first._replace(alone=True)]
         # In a part of a frame chance correlates more.
-        least = _SET_CORRELATION / energy_spread(sound.heard)
+        spread = energy_spread(sound.heard)
         for delays in estimate_delay_sets(
             sound.heard, self.plan, self.parameters.method, sound.seen, _SETS
         ):
             far = [np.abs(delays.tau - other.tau).max() for other in found]
             apart = min(far, default=math.inf) > _ONE_SOUND_S
-            if apart and delays.correlation > least:
+            whole = delays.correlation * spread
+            if apart and whole > _SET_CORRELATION:
                 further = self._one_of_several(delays)
-                found += [] if further is None else [further]
+                sure = whole > _SURE_CORRELATION
+                found += [] if further is None else [further._replace(sure=sure)]
         return [c for c in found if not self._is_copied(frame, c.fix, memory)], after
 
     def _one_of_several(self, delays: DelayEstimate) -> Candidate | None:

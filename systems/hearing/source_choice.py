@@ -33,10 +33,9 @@ _FORGOTTEN_S = 6.0
 # expected place: it is forgotten after so long, when the source has missed a burst.
 _DOUBTED_S = 3.0
 
-# What correlates less than this may be chance, which does not come twice: another
-# source counts when it was heard so many times, at most so long after one another; and
-# the followed one, after a silence, when it is heard a second time, s.
-_SURE = 0.25
+# What is not sure may be chance, which does not come twice: another source counts when
+# it was heard so many times, at most so long after one another; and the followed one,
+# after a silence, when it is heard a second time, s.
 _TIMES = 3
 _GAP_S = 0.06
 _SILENCE_S = 0.2
@@ -54,8 +53,8 @@ _SECOND = 0.6
 
 # Standard deviations: of what delays leave out, above all the robot's turning within a
 # frame; of what the tracker's covariance does; and of a source's velocity, m and m/s.
-_DELAY_FLOOR_M = 0.015
-_PLACE_FLOOR_M = 0.05
+_DELAY_FLOOR_M = 0.008
+_PLACE_FLOOR_M = 0.03
 _SPEED_M_S = 0.35
 
 # Where only the direction is known the range is about this, and half of it off, m.
@@ -187,19 +186,20 @@ class SourceChoice:
         own = np.full(len(candidates), math.inf)
         if may_sound and followed is not None:
             own = np.array([self._cost(c, followed, microphones) for c in candidates])
-        elif may_sound and len(candidates) == 1 and candidates[0].alone:
-            own[0] = 0.0
+        elif may_sound and _is_alone(candidates):
+            own[0] = _NOWHERE - 1.0
         counts = others[:, 1] >= _TIMES
         # Beside a sound that goes on there are its side peaks.
         beside = counts & (others[:, 0] <= _GAP_S)
         own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
+        sure = np.array([c.sure for c in candidates])
         if belief.age > _SILENCE_S:
             again = np.isfinite(costs[:, ~counts]).any(axis=1)
-            sure = np.array([c.correlation >= _SURE for c in candidates])
             own[~again & ~sure] = math.inf
-        # After a silence what was heard once is the followed source, not another one.
         shared = costs.copy()
+        # What was heard once is the followed source then, not another one.
         shared[np.ix_(np.isfinite(own), ~counts)] = math.inf
+        shared[np.ix_(~sure, counts & ~beside)] = math.inf
         belongs = _assigned(np.column_stack((own, shared)))
         chosen = belongs.index(0) if 0 in belongs else None
         for candidate, place in zip(candidates, belongs, strict=True):
@@ -297,6 +297,12 @@ def _assigned(costs: NDArray[np.float64]) -> list[int | None]:
     nowhere = np.full((sounds, sounds), _NOWHERE)
     columns = linear_sum_assignment(np.hstack((finite, nowhere)))[1]
     return [int(k) if k < places else None for k in columns]
+
+
+def _is_alone(candidates: Sequence[Candidate]) -> bool:
+    """Whether the first of all sounds is the only one, side peaks apart."""
+    most = _SECOND * candidates[0].correlation
+    return candidates[0].alone and all(c.correlation <= most for c in candidates[1:])
 
 
 def _is_ambiguous(

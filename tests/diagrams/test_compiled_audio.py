@@ -65,6 +65,7 @@ def assert_same(*overrides, name="obstacle_free"):
         ROOM,
         NOISE,
         ("tdoa.method=ml", "tdoa.schedule_known=true"),
+        (*SOURCES, "tdoa.choose=followed", "tdoa.first_bearing_deg=60"),
     ],
 )
 def test_runs_are_those_of_drake(overrides):
