@@ -75,12 +75,14 @@ def run() -> phonotaxis.RunResult:
 
 def test_settings_may_be_a_mapping():
     named = phonotaxis.load_scenario(
-        "default", {"source.speed_m_s": 0.2, "obstacles.0.size_m": [0.2, 0.1]}
+        "default", {"source.speed_m_s": 0.2, "obstacles.0.size_m": (0.2, 0.1)}
     )
     listed = phonotaxis.load_scenario(
         "default", ["source.speed_m_s=0.2", "obstacles.0.size_m=[0.2, 0.1]"]
     )
     assert named == listed
+    with pytest.raises(phonotaxis.InputError, match=r"seed: .* is no plain value"):
+        phonotaxis.load_scenario("default", {"seed": np.int64(3)})
     with pytest.raises(phonotaxis.InputError, match="give a list of key=value"):
         phonotaxis.load_scenario("default", "hearing=ideal")
 
