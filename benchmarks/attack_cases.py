@@ -23,6 +23,8 @@ _COMMANDS = (
     "stability",
     "sweep",
     "design",
+    "export",
+    "columns",
 )
 _EXTREMES = (
     "0 -1 1e-300 -1e-300 1e300 -1e300 1e999 .inf -.inf .nan null ~ true no '' x 1.5 "
@@ -228,6 +230,8 @@ def _words(draw: random.Random) -> Made:
         "--grid",
         "--full",
         "--sound",
+        "--mcap",
+        "--csv",
         "--no-such",
         "-x",
         "--",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import copy
+import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -67,12 +67,24 @@ def _settings(
     overrides: Iterable[str] | Mapping[str, Any],
 ) -> Iterable[tuple[str, Any]]:
     if isinstance(overrides, Mapping):
-        return copy.deepcopy(dict(overrides)).items()
+        return [(key, _plain(key, value)) for key, value in overrides.items()]
     if isinstance(overrides, str):
         raise InputError(
             "overrides", f"is the text {overrides!r}; give a list of key=value"
         )
     return map(parse_setting, overrides)
+
+
+def _plain(key: str, value: Any) -> Any:
+    """The value as a file would hold it, which nobody else changes."""
+    try:
+        return json.loads(json.dumps(value))
+    except (TypeError, ValueError):
+        raise InputError(
+            key,
+            f"{value!r} is no plain value; give a number, a text, a truth value, or a "
+            "list or mapping of them",
+        ) from None
 
 
 def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:

@@ -75,12 +75,14 @@ def run() -> phonotaxis.RunResult:
 
 def test_settings_may_be_a_mapping():
     named = phonotaxis.load_scenario(
-        "default", {"source.speed_m_s": 0.2, "obstacles.0.size_m": [0.2, 0.1]}
+        "default", {"source.speed_m_s": 0.2, "obstacles.0.size_m": (0.2, 0.1)}
     )
     listed = phonotaxis.load_scenario(
         "default", ["source.speed_m_s=0.2", "obstacles.0.size_m=[0.2, 0.1]"]
     )
     assert named == listed
+    with pytest.raises(phonotaxis.InputError, match=r"seed: .* is no plain value"):
+        phonotaxis.load_scenario("default", {"seed": np.int64(3)})
     with pytest.raises(phonotaxis.InputError, match="give a list of key=value"):
         phonotaxis.load_scenario("default", "hearing=ideal")
 
@@ -120,6 +122,8 @@ def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path
 def test_pictures_are_asked_for_by_name(run: phonotaxis.RunResult):
     assert len(run.plot().axes) == 1
     assert len(run.plot("time_series").axes) > 3
+    picture = run.plot()._repr_png_()  # type: ignore[attr-defined]  # a notebook's
+    assert picture.startswith(b"\x89PNG")
     with pytest.raises(phonotaxis.InputError, match="use 'trajectory'"):
         run.plot("speed")  # type: ignore[arg-type]  # what mypy is there to tell
     several = phonotaxis.simulate(

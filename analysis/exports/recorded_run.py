@@ -51,7 +51,7 @@ class RecordedRun:
         """
         folder = Path(directory)
         for name in (SCENARIO_FILE, TABLE_FILE):
-            if not (folder / name).is_file():
+            if not _is_file(folder / name):
                 raise InputError(
                     "result",
                     f"{str(folder)!r} has no {name}; give the result directory of a "
@@ -83,6 +83,13 @@ class RecordedRun:
     def time(self) -> NDArray[np.float64]:
         """(n,) of the ticks, s."""
         return next(iter(self.robots.values()))["t"]
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except (OSError, ValueError):  # a name that no file can have
+        return False
 
 
 def _read(path: Path) -> pd.DataFrame:

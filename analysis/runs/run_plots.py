@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.plumes.plume_history import concentration_map, plume_history
 from analysis.plumes.search_panels import call_time, search_panels
+from analysis.reporting.notebook_figure import NotebookFigure
 from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
 from analysis.runs.known_space import known_space
@@ -129,7 +130,7 @@ def _map(result: RunResult) -> tuple[Figure, Axes]:
     y_low, y_high = y_low - more, y_high + more
     height = width * (y_high - y_low) / (x_high - x_low)
     total = BELOW_IN + height + ABOVE_IN
-    figure = Figure(figsize=(WIDTH_IN, total))
+    figure = NotebookFigure(figsize=(WIDTH_IN, total))
     axes = figure.add_axes(
         (LEFT_IN / WIDTH_IN, BELOW_IN / total, width / WIDTH_IN, height / total)
     )
@@ -176,7 +177,7 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             "give the clearance of the same run (analysis.runs.proximity)",
         )
     rows = len(panels) + (distance is not None)
-    figure = Figure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")
+    figure = NotebookFigure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")
     all_axes = np.atleast_1d(figure.subplots(rows, sharex=True))
     for axes, panel in zip(all_axes, panels, strict=False):
         panel(axes, result)

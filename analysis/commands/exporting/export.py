@@ -36,15 +36,15 @@ def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
     exports, result = Exports.chosen(options), Path(options.result)
     if not exports.names:
         raise InputError("export", "nothing is asked for; give --mcap, --csv or both")
+    run = RecordedRun.load(result)
     if options.out is None:
         for name in exports.names:
             if (result / name).exists():
                 raise InputError(
                     "out", f"{result / name} is there; remove it, or give --out DIR"
                 )
-        if result.is_dir() and not os.access(result, os.W_OK | os.X_OK):
+        if not os.access(result, os.W_OK | os.X_OK):
             raise InputError("out", f"{result} cannot be written; give --out DIR")
-    run = RecordedRun.load(result)
     place = take(options.out) if options.out is not None else None
     shown = place.out if place else result
 

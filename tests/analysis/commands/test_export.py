@@ -64,6 +64,14 @@ def test_export_refuses(capsys, result, words, field, hint):
     assert hint in complaint
 
 
+@pytest.mark.parametrize("name", ["nowhere", "x" * 10_000, "\udcff", ""])
+def test_a_directory_that_is_none_is_refused(capsys, name):
+    status, _, complaint = call(capsys, "export", name, "--csv")
+    assert status == 2
+    assert "has no scenario.yaml" in complaint
+    assert len(complaint.splitlines()) == 1
+
+
 @pytest.mark.parametrize("missing", ["scenario.yaml", "trajectory.parquet"])
 def test_what_is_no_run_is_refused(capsys, result, tmp_path, missing):
     for name in {"scenario.yaml", "trajectory.parquet"} - {missing}:

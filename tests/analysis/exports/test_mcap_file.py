@@ -113,6 +113,8 @@ def test_poses_are_those_of_the_parquet(run, file: Path, tmp_path: Path, read: R
 
     table = pd.read_parquet(run.to_parquet(tmp_path / "trajectory.parquet"))
     heard = read(file)
+    ticks = [25_000_000 * k for k in range(61)]
+    assert [time_ns for time_ns, _ in heard["/source/pose"]] == ticks
     for robot in run.robots:
         for topic, keys in (
             ("pose", ("p_WB_x", "p_WB_y", "theta_WB")),
