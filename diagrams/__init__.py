@@ -2,7 +2,12 @@
 
 from diagrams.audio.run_audio import RunAudio, check_audible
 from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.loading import dump_scenario, library_scenarios, load_scenario
+from diagrams.loading import (
+    dump_scenario,
+    library_scenarios,
+    load_scenario,
+    write_scenario,
+)
 from diagrams.scenario import Scenario
 from diagrams.simulation import (
     RunResult,
@@ -28,4 +33,5 @@ __all__ = [
     "make_simulator",
     "prepared_loop",
     "simulate",
+    "write_scenario",
 ]

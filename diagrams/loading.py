@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
+from pydantic_core import ValidationError
 
-from diagrams.explain import did_you_mean, explain
+from diagrams.fields import (
+    SCHEMA_FILE,
+    check_fields,
+    did_you_mean,
+    explain,
+    scenario_schema,
+)
 from diagrams.participants import begins_anew
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
@@ -23,6 +30,7 @@ __all__ = [
     "resolve_sound",
     "scenario_from_mapping",
     "set_fields",
+    "write_scenario",
 ]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
@@ -47,9 +55,9 @@ def load_scenario(
         ``Scenario``.
 
     Raises:
-        InputError: Unknown name, unreadable file, or a field that is
-            unknown, of the wrong type or out of range; names the field by
-            its whole path.
+        InputError: Unknown name, unreadable file, or fields that are
+            unknown, of the wrong type or out of range; names each by its whole
+            path.
     """
     path = _find(source)
     data = read_mapping(path)
@@ -57,6 +65,8 @@ def load_scenario(
     resolve_sound(data, path.parent)
     set_fields(data, map(parse_setting, overrides))
     resolve_sound(data, Path.cwd())
+    # What is wrong with single fields is said before what simulates is loaded.
+    check_fields(data)
     return scenario_from_mapping(data)
 
 
@@ -65,12 +75,26 @@ def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise explain(error, Scenario, "a scenario") from None
+        raise explain(error, scenario_schema(), "a scenario") from None
 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The whole scenario as YAML, loadable by ``load_scenario``."""
     return dump_yaml(scenario.model_dump(mode="json"))
+
+
+def write_scenario(scenario: Scenario, directory: Path) -> None:
+    """Writes a whole scenario and its schema, so that editors know its fields.
+
+    The schema is a copy: a result can be moved, and looks the same on every machine.
+
+    Args:
+        scenario: Goes to ``scenario.yaml``.
+        directory: Exists; gets ``scenario.schema.json``, too.
+    """
+    first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
+    (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
+    shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
 
 
 def _find(source: str | Path) -> Path:

@@ -66,7 +66,7 @@ class FollowerParameters(Parameters):
     """One robot that follows a sound: its law, ears, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
-    """A name out of ``systems.laws.LAWS``, ``package.module:Name``, or
+    """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
     ``path/to/file.py:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """Sound waves and microphones, or exact positions."""

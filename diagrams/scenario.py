@@ -23,7 +23,7 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.goal_checks import check_goals, start_note
 from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters, joined
@@ -475,6 +475,6 @@ def _validated(model: type[_P], data: dict[str, Any], where: str) -> _P:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found = explain(error, model, f"one of {where.split('.', maxsplit=1)[0]}")
-        field = f"{where}.{found.field}"
-        raise InputError(field, found.message) from None
+        what = f"one of {where.split('.', maxsplit=1)[0]}"
+        found = explain(error, model.model_json_schema(), what)
+        raise InputError.joined([found], below=where) from None

@@ -153,7 +153,7 @@ def test_a_partial_is_a_law(capsys, laws):
 @pytest.mark.parametrize(
     ("command", "written"),
     [
-        (["simulate", *SHORT], "analysis.runs.run_report.dump_scenario"),
+        (["simulate", *SHORT], "analysis.runs.run_report.write_scenario"),
         (["design", "--json"], "analysis.design.design_text.write_design"),
     ],
 )

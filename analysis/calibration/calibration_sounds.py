@@ -7,7 +7,7 @@ from typing import Annotated
 
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import read_mapping
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters, Time
@@ -83,4 +83,6 @@ def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
     try:
         return CalibrationSounds.model_validate({"folder": str(path.parent), **data})
     except ValidationError as error:
-        raise explain(error, CalibrationSounds, "a list of sounds") from None
+        raise explain(
+            error, CalibrationSounds.model_json_schema(), "a list of sounds"
+        ) from None

@@ -69,4 +69,5 @@ COMMAND = Command(
     "places of microphones from sounds at known places",
     _add_arguments,
     _prepare,
+    examples=("calibrate sounds.yaml --out results/calibrated",),
 )

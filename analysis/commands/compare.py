@@ -5,7 +5,7 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from analysis.commands.arguments import take_output
+from analysis.commands.arguments import SCENARIO_WORDS, completed_by, take_output
 from analysis.commands.command import Command, Job, Take
 
 if TYPE_CHECKING:
@@ -15,12 +15,13 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
+    scenario = parser.add_argument(
         "scenario",
         nargs="*",
         help="library name, YAML file of layouts, or YAML file of a scenario "
         "(default: the papers' four experiments)",
     )
+    completed_by(scenario, SCENARIO_WORDS)
     parser.add_argument(
         "--laws",
         metavar="LAW,...",
@@ -94,5 +95,13 @@ def _prepare(
 
 
 COMMAND = Command(
-    "compare", "laws side by side on the same random layouts", _add_arguments, _prepare
+    "compare",
+    "laws side by side on the same random layouts",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "compare two_static_obstacles --laws conventional,active --runs 20",
+        "compare --set hearing=ideal --velocity-term printed,closing",
+        "compare u_trap clutter --laws guarded,dwa,orca --out results/laws",
+    ),
 )

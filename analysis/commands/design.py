@@ -42,4 +42,8 @@ COMMAND = Command(
     "the laws' gains, derived from stated requirements",
     _add_arguments,
     _prepare,
+    examples=(
+        "design",
+        "design --set robot.mass_kg=8 --json",
+    ),
 )

@@ -140,6 +140,13 @@ def _view(step: TrackedSources) -> str:
 
 
 COMMAND = Command(
-    "listen", "bearings of all sources, live from a pipe or a card", _add_arguments,
+    "listen",
+    "bearings of all sources, live from a pipe or a card",
+    _add_arguments,
     _prepare,
-)  # fmt: skip
+    examples=(
+        "listen recording.wav --geometry array.yaml",
+        "listen --device default --geometry array.yaml",
+        "listen --channels 4 --rate 48000 --format s16le --geometry array.yaml --json",
+    ),
+)

@@ -62,4 +62,8 @@ COMMAND = Command(
     "the papers' localisation tables, ours, and the bound",
     _add_arguments,
     _prepare,
+    examples=(
+        "localization",
+        "localization --trials 20 --tolerances",
+    ),
 )

@@ -55,5 +55,12 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
 
 
 COMMAND = Command(
-    "locate", "bearing and range over time of a recording", _add_arguments, _prepare
+    "locate",
+    "bearing and range over time of a recording",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "locate recording.wav --geometry array.yaml",
+        "locate recording.wav --out results/located --json",
+    ),
 )

@@ -8,7 +8,14 @@ from argparse import ArgumentParser, Namespace
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
-from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
+from analysis.commands.arguments import (
+    LAW_HELP,
+    LAW_WORDS,
+    completed_by,
+    overrides,
+    take_output,
+    take_scenario,
+)
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
 from analysis.commands.saved_audio import SavedAudio
@@ -20,8 +27,9 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--sound", metavar="FILE", help="sound file to play")
-    parser.add_argument("--law", help=LAW_HELP)
+    sound = parser.add_argument("--sound", metavar="FILE", help="sound file to play")
+    completed_by(sound, "file")
+    completed_by(parser.add_argument("--law", help=LAW_HELP), LAW_WORDS)
     take_scenario(parser)
     parser.add_argument(
         "--save-audio",
@@ -94,4 +102,16 @@ def _settings(options: Namespace) -> list[str]:
     return settings
 
 
-COMMAND = Command("simulate", "run a scenario", _add_arguments, _prepare)
+COMMAND = Command(
+    "simulate",
+    "run a scenario",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "simulate",
+        "simulate u_trap --law guarded",
+        "simulate my_scenario.yaml --seed 7 --out results/mine",
+        "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
+        "simulate --law my_laws.py:soft",
+    ),
+)

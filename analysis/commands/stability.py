@@ -6,7 +6,14 @@ import logging
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
+from analysis.commands.arguments import (
+    LAW_HELP,
+    LAW_WORDS,
+    completed_by,
+    overrides,
+    take_output,
+    take_scenario,
+)
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
 
@@ -17,7 +24,7 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
+    law = parser.add_argument(
         "--law",
         metavar="LAW",
         action="append",
@@ -25,6 +32,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "all: those that avoid obstacles, or drive on a route (default: the "
         "scenario's law)",
     )
+    completed_by(law, LAW_WORDS)
     parser.add_argument(
         "--robot",
         metavar="NAME",
@@ -95,4 +103,9 @@ COMMAND = Command(
     "stability of a scenario's loop: report, models, numbers",
     _add_arguments,
     _prepare,
+    examples=(
+        "stability --law all",
+        "stability two_static_obstacles --law active --full",
+        "stability --set attraction.damping_n_s_m=3",
+    ),
 )

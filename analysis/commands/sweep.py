@@ -67,4 +67,8 @@ COMMAND = Command(
     "run many scenarios, drawn from distributions and grids",
     _add_arguments,
     _prepare,
+    examples=(
+        "sweep docs/examples/crossing.yaml",
+        "sweep docs/examples/crossing.yaml --out results/crossing --resume",
+    ),
 )

@@ -22,7 +22,7 @@ from analysis.sweeps.one_run import require_runs
 from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import Scenario, load_scenario
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import parse_setting, read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
@@ -150,7 +150,7 @@ def comparison_plan(
     try:
         return SweepPlan.model_validate(fields)
     except ValidationError as error:
-        raise explain(error, SweepPlan, "a comparison") from None
+        raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
 
 
 def _require_one_law(base: Scenario) -> None:

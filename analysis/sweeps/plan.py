@@ -21,7 +21,7 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from diagrams import Scenario, load_scenario
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import (
     read_mapping,
     resolve_sound,
@@ -66,7 +66,7 @@ class SweepPlan(Parameters):
     parted by commas, which all get the one value that is drawn.
     """
 
-    name: str = Field(default="sweep", min_length=1, pattern=r"\A[^\n]*\z")
+    name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
     """Title of the result page."""
     scenario: str = Field(default="default", min_length=1)
     """Library name, or path of a YAML file from ``folder``."""
@@ -296,7 +296,7 @@ def load_sweep(path: str | Path) -> SweepPlan:
     try:
         return SweepPlan.model_validate(data)
     except ValidationError as error:
-        raise explain(error, SweepPlan, "a sweep") from None
+        raise explain(error, SweepPlan.model_json_schema(), "a sweep") from None
 
 
 def dump_plan(plan: SweepPlan) -> str:

@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
-from analysis.commands.listing import listing
+from analysis.commands.discovery.listing import listing
 
 __all__ = ["COMMAND"]
 
@@ -21,4 +21,13 @@ def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
     )
 
 
-COMMAND = Command("scenarios", "list the library's scenarios", take_json, _prepare)
+COMMAND = Command(
+    "scenarios",
+    "list the library's scenarios",
+    take_json,
+    _prepare,
+    examples=(
+        "scenarios",
+        "scenarios --json",
+    ),
+)

@@ -6,7 +6,7 @@ from argparse import Namespace
 
 from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
-from analysis.commands.listing import listing
+from analysis.commands.discovery.listing import listing
 
 __all__ = ["COMMAND"]
 
@@ -19,4 +19,13 @@ def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
     )
 
 
-COMMAND = Command("laws", "list the laws that can be named", take_json, _prepare)
+COMMAND = Command(
+    "laws",
+    "list the laws that can be named",
+    take_json,
+    _prepare,
+    examples=(
+        "laws",
+        "laws --json",
+    ),
+)
