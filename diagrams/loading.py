@@ -5,27 +5,30 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from pydantic_core import ValidationError
 
 from diagrams.fields import (
     SCHEMA_FILE,
+    begins_anew,
     check_fields,
     did_you_mean,
     explain,
     scenario_schema,
 )
-from diagrams.participants import begins_anew
-from diagrams.scenario import Scenario
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    from diagrams.scenario import Scenario
 
 __all__ = [
     "dump_scenario",
     "library_scenarios",
     "load_scenario",
     "parse_setting",
+    "read_fields",
     "read_mapping",
     "resolve_sound",
     "scenario_from_mapping",
@@ -59,19 +62,41 @@ def load_scenario(
             unknown, of the wrong type or out of range; names each by its whole
             path.
     """
+    return scenario_from_mapping(read_fields(source, overrides))
+
+
+def read_fields(
+    source: str | Path = "default", overrides: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The fields of a scenario, each checked by itself.
+
+    What takes several fields to judge is left to ``scenario_from_mapping``, which
+    loads what simulates.
+
+    Args:
+        source: As of ``load_scenario``.
+        overrides: As of ``load_scenario``.
+
+    Returns:
+        Plain values.
+
+    Raises:
+        InputError: As of ``load_scenario``.
+    """
     path = _find(source)
     data = read_mapping(path)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
     set_fields(data, map(parse_setting, overrides))
     resolve_sound(data, Path.cwd())
-    # What is wrong with single fields is said before what simulates is loaded.
     check_fields(data)
-    return scenario_from_mapping(data)
+    return data
 
 
 def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     """Validates a mapping of plain values; see ``load_scenario``."""
+    from diagrams.scenario import Scenario
+
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:

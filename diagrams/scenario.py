@@ -23,10 +23,10 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.fields import explain
+from diagrams.fields import explain, joined
 from diagrams.goal_checks import check_goals, start_note
 from diagrams.guard_checks import check_guard, guard_note
-from diagrams.participants import FollowerParameters, SourceParameters, joined
+from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
 from diagrams.search_checks import check_searches

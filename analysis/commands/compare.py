@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.commands.arguments import SCENARIO_WORDS, completed_by, take_output
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from analysis.comparison.laws_in_pairs import Comparison, Pair
@@ -63,6 +64,11 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(
     options: Namespace, take: Take
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
+    from analysis.comparison.words import EXPERIMENTS, check_words
+
+    check_words(options.scenario, options.laws, options.seed, options.set, options.grid)
+    say(f"comparing laws in {', '.join(options.scenario or EXPERIMENTS)}")
+
     from analysis.comparison.compare import comparison_plans, prepare_comparison
     from analysis.comparison.report import (
         compare_summary,

@@ -17,6 +17,7 @@ from analysis.commands.arguments import (
     take_scenario,
 )
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 from analysis.commands.progress import Progress
 from analysis.commands.saved_audio import SavedAudio
 
@@ -36,22 +37,27 @@ def _add_arguments(parser: ArgumentParser) -> None:
         metavar="DIR",
         help="new directory for what the robots hear and the loudspeakers play",
     )
+    parser.add_argument(
+        "--no-plots",
+        action="store_true",
+        help="write no pictures: the replay and the numbers alone",
+    )
     take_output(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.run_error import RunError
-    from analysis.runs.run_report import run_summary, summary_text, write_run
-    from diagrams import (
-        build_sound_follower,
-        load_scenario,
-        prepared_loop,
-        simulate,
-    )
+    from diagrams.loading import read_fields, scenario_from_mapping
     from systems.framework.input_error import InputError
 
     place = take(options.out)
-    scenario = load_scenario(options.scenario, _settings(options))
+    fields = read_fields(options.scenario, _settings(options))
+    say(f"simulating {fields['name']}")
+    scenario = scenario_from_mapping(fields)
+
+    from analysis.runs.run_report import run_summary, summary_text, write_run
+    from diagrams import build_sound_follower, prepared_loop, simulate
+
     for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
     saved: SavedAudio | None = None
@@ -85,8 +91,11 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         summary=summary,
         text=text,
         out=place.out,
-        write=lambda result, summary: write_run(result, summary, place.directory),
-        where=f"{'results':<21} {{out}}",
+        write=lambda result, summary: write_run(
+            result, summary, place.directory, pictures=not options.no_plots
+        ),
+        where=f"{'results':<21} {{out}}\n"
+        f"{'replay':<21} {{out}}/replay.html, to be opened in a browser",
         total=scenario.duration_s,
         unit="s simulated",
         left=saved.left if saved else lambda: "",
@@ -112,6 +121,6 @@ COMMAND = Command(
         "simulate u_trap --law guarded",
         "simulate my_scenario.yaml --seed 7 --out results/mine",
         "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
-        "simulate --law my_laws.py:soft",
+        "simulate --law my_laws.py:soft --no-plots",
     ),
 )

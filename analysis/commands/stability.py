@@ -15,6 +15,7 @@ from analysis.commands.arguments import (
     take_scenario,
 )
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 from analysis.commands.progress import Progress
 
 if TYPE_CHECKING:
@@ -47,6 +48,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
+    from diagrams.fields import known_laws, unknown_law
+    from diagrams.loading import read_fields, scenario_from_mapping
+
+    place = take(options.out)
+    fields = read_fields(options.scenario, overrides(options))
+    for law in options.law or []:
+        if law != "all" and ":" not in law and law not in known_laws():
+            raise unknown_law(law, known_laws())
+    say(f"analysing {fields['name']}")
+    whole = scenario_from_mapping(fields)
+
     from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
     from analysis.stability.report_files import (
         stability_document,
@@ -54,10 +66,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         write_stability,
     )
     from analysis.stability.report_parts import parts
-    from diagrams import load_scenario
 
-    place = take(options.out)
-    whole = load_scenario(options.scenario, overrides(options))
     scenario, note = chosen_robot(whole, options.robot)
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)

@@ -69,7 +69,13 @@ def _outcome(result: RunResult) -> dict[str, Any]:
     return ended
 
 
-def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
+def write_run(
+    result: RunResult,
+    summary: dict[str, Any],
+    directory: Path,
+    *,
+    pictures: bool = True,
+) -> None:
     """Writes everything about a run into a directory that exists.
 
     ``scenario.yaml`` (effective, can be run again) and ``scenario.schema.json``,
@@ -82,14 +88,22 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
         result: The run.
         summary: From ``run_summary``.
         directory: Exists.
+        pictures: Off: no PNG and no SVG.
     """
-    from analysis.runs.block_diagram import write_block_diagram
     from analysis.runs.replay import write_replay
-    from analysis.runs.run_plots import plot_time_series, plot_trajectory
 
     write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
+    write_replay(result, directory / "replay.html")
+    if pictures:
+        _write_pictures(result, directory)
+
+
+def _write_pictures(result: RunResult, directory: Path) -> None:
+    from analysis.runs.block_diagram import write_block_diagram
+    from analysis.runs.run_plots import plot_time_series, plot_trajectory
+
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
     for name, own in result.robots.items():
         ending = f"_{name}" if result.several else ""
@@ -102,7 +116,6 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     if result.several:
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
-    write_replay(result, directory / "replay.html")
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:

@@ -6,15 +6,12 @@ anew.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from analysis.sweeps.plan import SweepPlan
 from diagrams.scenario_schema import tidied
 
-__all__ = ["SWEEP_SCHEMA_FILE", "make_sweep_schema"]
-
-SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
+__all__ = ["make_sweep_schema"]
 
 
 def make_sweep_schema() -> dict[str, Any]:

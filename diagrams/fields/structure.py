@@ -7,7 +7,6 @@ simulates; what takes several fields to judge is left to the models.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import cache
 from typing import Any
 
 from pydantic_core import SchemaValidator, ValidationError, core_schema
@@ -17,7 +16,7 @@ from diagrams.fields.near_miss import unknown_law
 from diagrams.fields.shipped import known_laws, scenario_schema
 from systems.framework.input_error import InputError
 
-__all__ = ["check_fields"]
+__all__ = ["check_fields", "check_structure"]
 
 _BOUNDS = {
     "minimum": "ge",
@@ -43,9 +42,9 @@ def check_fields(data: Mapping[str, Any]) -> None:
     """
     faults = []
     try:
-        _validator().validate_python(data)
-    except ValidationError as error:
-        faults.append(explain(error, scenario_schema(), "a scenario"))
+        check_structure(data, scenario_schema(), "a scenario")
+    except InputError as error:
+        faults.append(error)
     robots = data.get("robots")
     places = {"": data}
     if isinstance(robots, Mapping):
@@ -58,14 +57,26 @@ def check_fields(data: Mapping[str, Any]) -> None:
         raise InputError.joined(faults)
 
 
-@cache
-def _validator() -> SchemaValidator:
-    schema = scenario_schema()
+def check_structure(data: Any, schema: Mapping[str, Any], what: str) -> None:
+    """Checks plain values by a JSON Schema that pydantic made.
+
+    Args:
+        data: Plain values.
+        schema: Of what they are to be.
+        what: What that is to a user, as 'a scenario'.
+
+    Raises:
+        InputError: Single fields are wrong; has all of them.
+    """
     definitions = [
-        {**_of_node(node), "ref": name} for name, node in schema["$defs"].items()
+        {**_of_node(node), "ref": name}
+        for name, node in schema.get("$defs", {}).items()
     ]
     whole = core_schema.definitions_schema(_of_node(schema), definitions)  # type: ignore[arg-type]  # a copy with its name
-    return SchemaValidator(whole)
+    try:
+        SchemaValidator(whole).validate_python(data)
+    except ValidationError as error:
+        raise explain(error, schema, what) from None
 
 
 def _of_node(node: Mapping[str, Any]) -> core_schema.CoreSchema:
@@ -82,7 +93,7 @@ def _of_node(node: Mapping[str, Any]) -> core_schema.CoreSchema:
         )
     if "enum" in node:
         return core_schema.literal_schema(node["enum"])
-    return _of_type(node)
+    return _of_type(node) if "type" in node else core_schema.any_schema()
 
 
 def _of_type(node: Mapping[str, Any]) -> core_schema.CoreSchema:
@@ -119,10 +130,12 @@ def _of_array(node: Mapping[str, Any]) -> core_schema.CoreSchema:
 
 
 def _of_object(node: Mapping[str, Any]) -> core_schema.CoreSchema:
-    for pattern, value in node.get("patternProperties", {}).items():
+    if "properties" not in node:
+        named = node.get("patternProperties") or {".*": node["additionalProperties"]}
+        (pattern, value), *_ = named.items()
         return core_schema.dict_schema(
             core_schema.str_schema(pattern=pattern),
-            _of_node(value),
+            _of_node(value) if value is not True else core_schema.any_schema(),
             max_length=node.get("maxProperties"),
             strict=True,
         )

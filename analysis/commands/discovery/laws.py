@@ -12,11 +12,9 @@ __all__ = ["COMMAND"]
 
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
-    from systems.laws.catalogue import LAWS
+    from diagrams.fields import known_laws
 
-    return listing(
-        "laws", "title", lambda: {name: law.title for name, law in LAWS.items()}
-    )
+    return listing("laws", "title", known_laws)
 
 
 COMMAND = Command(

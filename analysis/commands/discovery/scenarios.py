@@ -12,12 +12,16 @@ __all__ = ["COMMAND"]
 
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
-    from diagrams import library_scenarios, load_scenario
+    from diagrams import library_scenarios
+    from diagrams.loading import read_mapping
 
     return listing(
         "scenarios",
         "description",
-        lambda: {name: load_scenario(name).description for name in library_scenarios()},
+        lambda: {
+            name: read_mapping(path).get("description", "")
+            for name, path in library_scenarios().items()
+        },
     )
 
 
