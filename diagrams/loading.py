@@ -19,6 +19,7 @@ from diagrams.fields import (
 )
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 
 if TYPE_CHECKING:
     from diagrams.scenario import Scenario
@@ -90,6 +91,7 @@ def read_fields(
     set_fields(data, map(parse_setting, overrides))
     resolve_sound(data, Path.cwd())
     check_fields(data)
+    _check_files(data)
     return data
 
 
@@ -171,8 +173,8 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """
     for place in [
         data,
-        *_participants(data, "robots"),
-        *_participants(data, "sources"),
+        *_participants(data, "robots").values(),
+        *_participants(data, "sources").values(),
     ]:
         for group, key in (
             ("microphones", "ego_noise_file"),
@@ -184,10 +186,23 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
                 fields[key] = str((folder / fields[key]).resolve())
 
 
-def _participants(data: dict[str, Any], group: str) -> list[dict[str, Any]]:
+def _check_files(data: dict[str, Any]) -> None:
+    """Refuses files of sound that are none, of what plays one."""
+    places = {"": data}
+    for group in ("robots", "sources"):
+        named = _participants(data, group)
+        places |= {f"{group}.{name}.": fields for name, fields in named.items()}
+    for place, fields in places.items():
+        for key in ("sound", "loudspeaker"):
+            sound = fields.get(key) or {}
+            if sound.get("kind") == "wav" and sound.get("file"):
+                require_file(sound["file"], f"{place}{key}.file", "WAV or FLAC")
+
+
+def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:
     named = data.get(group)
-    found = named.values() if isinstance(named, dict) else ()
-    return [fields for fields in found if isinstance(fields, dict)]
+    found = named.items() if isinstance(named, dict) else ()
+    return {name: fields for name, fields in found if isinstance(fields, dict)}
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
 from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.scenario import Scenario
+from systems.framework.meanings import meanings
+from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
 
 __all__ = ["make_schema", "schema_file_text", "tidied", "unit_of"]
@@ -85,8 +87,10 @@ def tidied(schema: dict[str, Any], title: str) -> dict[str, Any]:
         JSON Schema of 2020-12, with a keyword ``unit`` of our own.
     """
     definitions = schema.pop("$defs", {})
-    for each in (schema, *definitions.values()):
-        _tidy(each, definitions)
+    models = {model.__name__: model for model in _models(Parameters)}
+    for name, each in {schema["title"]: schema, **definitions}.items():
+        _tidy(each, definitions, meanings(models[name]))
+        del each["title"]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,
@@ -117,13 +121,20 @@ def unit_of(name: str, meaning: str) -> str:
     return said[1] if said else ""
 
 
-def _tidy(model: dict[str, Any], definitions: Mapping[str, Any]) -> None:
-    """Leaves out what says nothing, and says units."""
-    model.pop("title", None)
+def _models(base: type[Parameters]) -> Iterator[type[Parameters]]:
+    for model in base.__subclasses__():
+        yield model
+        yield from _models(model)
+
+
+def _tidy(
+    model: dict[str, Any], definitions: Mapping[str, Any], told: Mapping[str, str]
+) -> None:
+    """Leaves out what says nothing, and says meanings and units."""
     model["description"] = _one_line(model.get("description", ""))
     for name, field in model.get("properties", {}).items():
         field.pop("title", None)
-        meaning = _one_line(field.get("description", ""))
+        meaning = _one_line(told.get(name, ""))
         if meaning:
             field["description"] = meaning
         if _is_numeric(field) and (unit := unit_of(name, meaning)):

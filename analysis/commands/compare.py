@@ -66,7 +66,15 @@ def _prepare(
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
     from analysis.comparison.words import EXPERIMENTS, check_words
 
-    check_words(options.scenario, options.laws, options.seed, options.set, options.grid)
+    check_words(
+        options.scenario,
+        laws=options.laws,
+        velocity_terms=options.velocity_term,
+        runs=options.runs,
+        seed=options.seed,
+        settings=options.set,
+        grid=options.grid,
+    )
     say(f"comparing laws in {', '.join(options.scenario or EXPERIMENTS)}")
 
     from analysis.comparison.compare import comparison_plans, prepare_comparison

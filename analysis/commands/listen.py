@@ -7,7 +7,7 @@ import math
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, BinaryIO
 
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
@@ -58,12 +58,18 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
+    from systems.framework.input_files import require_file
+
+    if options.geometry:
+        require_file(options.geometry, "geometry", "YAML")
+    pipe = _pipe(options) if options.device is None else None
+
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
     from analysis.recordings.live_hearing import LiveHearing, listen, track_document
 
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
-    stream = _stream(options, max(geometry.columns) + 1)
+    stream = _stream(options, pipe, max(geometry.columns) + 1)
     hearing = LiveHearing(stream, geometry)
 
     def tell(step: TrackedSources) -> None:
@@ -93,30 +99,31 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     )
 
 
-def _stream(options: Namespace, channels: int) -> SoundStream:
-    from analysis.recordings.sound_stream import open_card, open_pipe
+def _pipe(options: Namespace) -> BinaryIO:
     from systems.framework.input_error import InputError
 
-    channels = options.channels or channels
-    if options.device is not None:
-        name = options.device
-        device = int(name) if name.isdigit() else None if name == "default" else name
-        rate = options.rate or 48_000
-        return open_card(device, channels=channels, sample_rate_hz=rate)
     if options.input == "-":
         if sys.stdin is None or sys.stdin.isatty():
             raise InputError(
                 "input",
                 "nothing is piped in; name a file, pipe in sound, or give --device",
             )
-        pipe = sys.stdin.buffer
-    else:
-        try:
-            pipe = Path(options.input).open("rb")  # noqa: SIM115  # read to its end
-        except OSError as error:
-            raise InputError(
-                "input", f"cannot read it ({error}); name a file"
-            ) from None
+        return sys.stdin.buffer
+    try:
+        return Path(options.input).open("rb")  # read to its end
+    except OSError as error:
+        raise InputError("input", f"cannot read it ({error}); name a file") from None
+
+
+def _stream(options: Namespace, pipe: BinaryIO | None, channels: int) -> SoundStream:
+    from analysis.recordings.sound_stream import open_card, open_pipe
+
+    channels = options.channels or channels
+    if pipe is None:
+        name = options.device
+        device = int(name) if name.isdigit() else None if name == "default" else name
+        rate = options.rate or 48_000
+        return open_card(device, channels=channels, sample_rate_hz=rate)
     return open_pipe(
         pipe,
         channels=channels,

@@ -18,6 +18,7 @@ from analysis.comparison.laws_in_pairs import (
 )
 from analysis.comparison.words import (
     EXPERIMENTS,
+    VELOCITY_TERM,
     library_layouts,
     listed_values,
     whole_seed,
@@ -41,7 +42,6 @@ __all__ = [
 
 #: Fields of a sweep that a comparison sets itself.
 _OURS = ("grid", "runs", "pair")
-_VELOCITY_TERM = "repulsion.velocity_term"
 
 
 @dataclass(frozen=True)
@@ -192,9 +192,9 @@ def comparison_plans(
     if velocity_terms is not None:
         terms = velocity_terms.split(",")
         if len(terms) == 1:
-            fields[_VELOCITY_TERM] = terms[0]
+            fields[VELOCITY_TERM] = terms[0]
         else:
-            varied[_VELOCITY_TERM] = terms
+            varied[VELOCITY_TERM] = terms
     plans: dict[str, SweepPlan] = {}
     for scenario in scenarios or EXPERIMENTS:
         name = Path(scenario).stem

@@ -7,13 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import diagrams
-from analysis.sweeps.sweep_file import read_sweep
-from diagrams.fields import known_laws, unknown_law
+from analysis.sweeps.sweep_file import read_sweep, sweep_schema
+from diagrams.fields import check_structure, known_laws, unknown_law
 from diagrams.loading import parse_setting, read_fields
 from systems.framework.input_error import InputError
 
 __all__ = [
     "EXPERIMENTS",
+    "VELOCITY_TERM",
     "check_words",
     "library_layouts",
     "listed_values",
@@ -27,6 +28,7 @@ EXPERIMENTS = (
     "one_moving_obstacle",
     "two_moving_obstacles",
 )
+VELOCITY_TERM = "repulsion.velocity_term"
 _LIBRARY = Path(diagrams.__file__).parent / "layouts"
 
 
@@ -37,7 +39,10 @@ def library_layouts() -> dict[str, Path]:
 
 def check_words(
     scenarios: Sequence[str],
+    *,
     laws: str | None,
+    velocity_terms: str | None,
+    runs: int,
     seed: str | None,
     settings: Iterable[str],
     grid: Iterable[str],
@@ -47,12 +52,14 @@ def check_words(
     Args:
         scenarios: As of ``comparison_plans``.
         laws: As of ``comparison_plans``.
+        velocity_terms: As of ``comparison_plans``.
+        runs: As of ``comparison_plans``.
         seed: As of ``comparison_plans``.
         settings: As of ``comparison_plans``.
         grid: As of ``comparison_plans``.
 
     Raises:
-        InputError: A scenario or a law is unknown, or a setting or the seed is wrong.
+        InputError: A scenario or a law is unknown, or another word is wrong.
     """
     whole_seed(seed)
     for text in grid:
@@ -60,7 +67,11 @@ def check_words(
     for law in laws.split(",") if laws is not None else ():
         if ":" not in law and law not in known_laws():
             raise unknown_law(law, known_laws())
+    check_structure({"runs": runs}, sweep_schema(), "a comparison")
+    terms = velocity_terms.split(",") if velocity_terms is not None else ()
     settings, library = list(settings), library_layouts()
+    for term in terms:
+        read_fields("default", [f"{VELOCITY_TERM}={term}"])
     for name in scenarios or EXPERIMENTS:
         if name not in library:
             if not Path(name).is_file():

@@ -8,9 +8,9 @@ from typing import Any
 
 from diagrams.fields import check_structure
 from diagrams.loading import read_mapping
-from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 
-__all__ = ["SWEEP_SCHEMA_FILE", "read_sweep"]
+__all__ = ["SWEEP_SCHEMA_FILE", "read_sweep", "sweep_schema"]
 
 SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
@@ -28,16 +28,17 @@ def read_sweep(path: str | Path) -> dict[str, Any]:
     Raises:
         InputError: The file cannot be read, or fields are unknown or wrong.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("sweep", f"there is no file {path}; check the path")
+    path = require_file(path, "sweep", "YAML")
     data = read_mapping(path)
     for part in ("set", "grid", "draw", "require"):  # a heading with nothing below it
         if part in data and data[part] is None:
             del data[part]
     data.setdefault("name", path.stem)
-    schema = json.loads(SWEEP_SCHEMA_FILE.read_text("utf-8"))
-    schema["properties"]["folder"] = {"type": "string"}
-    data["folder"] = str(path.parent.absolute())
-    check_structure(data, schema, "a sweep")
-    return data
+    check_structure(data, sweep_schema(), "a sweep")
+    return {**data, "folder": str(path.parent.absolute())}
+
+
+def sweep_schema() -> dict[str, Any]:
+    """The JSON Schema of a sweep's file, as the package carries it."""
+    schema: dict[str, Any] = json.loads(SWEEP_SCHEMA_FILE.read_text("utf-8"))
+    return schema

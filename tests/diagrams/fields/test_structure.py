@@ -50,7 +50,7 @@ def test_it_finds_what_the_models_find(data: dict[str, Any]) -> None:
 @pytest.mark.parametrize("name", library_scenarios())
 def test_it_takes_what_the_models_take(name: str) -> None:
     check_fields(load_scenario(name).model_dump(mode="json"))
-    check_fields({"ultrasonic": {"axes_deg": 8}, "law": "my_laws.py:soft"})
+    check_fields({"ultrasonic": {"axes_deg": 8}, "law": "my_laws:soft"})
 
 
 def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
