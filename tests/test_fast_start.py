@@ -27,7 +27,9 @@ print(json.dumps(told))
 """
 
 
-def loaded_by(tmp_path: Path, *commands: tuple[str, ...]) -> list[list]:
+def loaded_by(
+    tmp_path: Path, *commands: tuple[str, ...]
+) -> list[tuple[list[str], int, list[str]]]:
     """Words, exit status and top-level modules after each of some commands."""
 
     ran = subprocess.run(
@@ -38,7 +40,8 @@ def loaded_by(tmp_path: Path, *commands: tuple[str, ...]) -> list[list]:
         text=True,
         check=True,
     )
-    return json.loads(ran.stdout)
+    told: list[tuple[list[str], int, list[str]]] = json.loads(ran.stdout)
+    return told
 
 
 def test_lists_load_nothing_that_simulates(tmp_path):

@@ -74,3 +74,20 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
     }.items():
         assert f"did you mean {meant!r}?" in told.pop(field)
     assert not told
+
+
+def test_faults_of_several_fields_are_told_at_once() -> None:
+    with pytest.raises(InputError) as raised:
+        load_scenario(
+            "default",
+            [
+                "ultrasonic.period_s=0.03",
+                "plant.motor_lag_s=0.001",
+                "room.size_m=[2,2,3]",
+            ],
+        )
+    assert [each.field for each in raised.value.all] == [
+        "ultrasonic.period_s",
+        "plant.motor_lag_s",
+        "source.waypoints_m",
+    ]
