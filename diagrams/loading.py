@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from diagrams.scenario import Scenario
 
 __all__ = [
+    "check_files",
     "dump_scenario",
     "library_scenarios",
     "load_scenario",
@@ -91,7 +92,6 @@ def read_fields(
     set_fields(data, map(parse_setting, overrides))
     resolve_sound(data, Path.cwd())
     check_fields(data)
-    _check_files(data)
     return data
 
 
@@ -186,8 +186,15 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
                 fields[key] = str((folder / fields[key]).resolve())
 
 
-def _check_files(data: dict[str, Any]) -> None:
-    """Refuses files of sound that are none, of what plays one."""
+def check_files(data: dict[str, Any]) -> None:
+    """Refuses files that a run would not find: of sound, and of own laws.
+
+    Args:
+        data: Fields of a scenario.
+
+    Raises:
+        InputError: One is no file.
+    """
     places = {"": data}
     for group in ("robots", "sources"):
         named = _participants(data, group)
@@ -197,6 +204,9 @@ def _check_files(data: dict[str, Any]) -> None:
             sound = fields.get(key) or {}
             if sound.get("kind") == "wav" and sound.get("file"):
                 require_file(sound["file"], f"{place}{key}.file", "WAV or FLAC")
+        law, colon, _ = fields.get("law", "").rpartition(":")
+        if colon and law.endswith(".py"):
+            require_file(law, f"{place}law", "Python")
 
 
 def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:

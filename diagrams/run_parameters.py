@@ -119,7 +119,7 @@ class RunParameters(Parameters):
     one, named ``robot``, that has nothing other."""
     sources: _Participants = Field(default={})
     """By name, what each source has other than ``source`` and ``sound`` say; empty:
-    one, named ``source``."""
+    one, named ``source``. What no robot follows is an interferer."""
     source: SourceRobotParameters = SourceRobotParameters()
     sound: SoundParameters = SoundParameters()
     obstacles: Annotated[

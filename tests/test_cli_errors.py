@@ -57,7 +57,7 @@ def fail(*_args, **_options):
         (["simulate", *SHORT], "diagrams.simulate"),
         (["stability"], "analysis.stability.law_analysis.analyse_law"),
         (["localization"], "analysis.hearing.localization.prepare_localization"),
-        (["locate", "x.wav"], "analysis.recordings.locate.locate"),
+        (["locate", __file__], "analysis.recordings.locate.locate"),
         (["scenarios"], "diagrams.library_scenarios"),
         (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
     ],

@@ -21,10 +21,11 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
-    from diagrams.loading import read_fields, scenario_from_mapping
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
 
     place = take(options.out)
     fields = read_fields(options.scenario, overrides(options))
+    check_files(fields)
     say(f"designing gains for {fields['name']}")
     scenario = scenario_from_mapping(fields)
 

@@ -47,11 +47,12 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.run_error import RunError
-    from diagrams.loading import read_fields, scenario_from_mapping
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
     from systems.framework.input_error import InputError
 
     place = take(options.out)
     fields = read_fields(options.scenario, _settings(options))
+    check_files(fields)
     say(f"simulating {fields['name']}")
     scenario = scenario_from_mapping(fields)
 

@@ -49,10 +49,11 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
     from diagrams.fields import known_laws, unknown_law
-    from diagrams.loading import read_fields, scenario_from_mapping
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
 
     place = take(options.out)
     fields = read_fields(options.scenario, overrides(options))
+    check_files(fields)
     for law in options.law or []:
         if law != "all" and ":" not in law and law not in known_laws():
             raise unknown_law(law, known_laws())

@@ -7,7 +7,6 @@ simulates; what takes several fields to judge is left to the models.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from pydantic_core import SchemaValidator, ValidationError, core_schema
@@ -52,21 +51,10 @@ def check_fields(data: Mapping[str, Any]) -> None:
         places |= {f"robots.{name}.": own for name, own in robots.items()}
     for place, fields in places.items():
         law = fields.get("law") if isinstance(fields, Mapping) else None
-        if isinstance(law, str) and law:
-            faults += _law_faults(law, f"{place}law")
+        if isinstance(law, str) and law and ":" not in law and law not in known_laws():
+            faults.append(unknown_law(law, known_laws(), f"{place}law"))
     if faults:
         raise InputError.joined(faults)
-
-
-def _law_faults(law: str, field: str) -> list[InputError]:
-    if ":" not in law:
-        known = known_laws()
-        return [] if law in known else [unknown_law(law, known, field)]
-    file = Path(law.rpartition(":")[0])
-    if file.suffix != ".py" or file.is_file():
-        return []
-    text = f"{law!r} cannot be imported: there is no file {file}; check the path"
-    return [InputError(field, text)]
 
 
 def check_structure(data: Any, schema: Mapping[str, Any], what: str) -> None:
