@@ -30,7 +30,7 @@ from analysis.commands.command import Command
 from analysis.commands.discovery import completion, doctor, fields, laws, scenarios
 from analysis.commands.interrupts import Interrupts
 
-__all__ = ["COMMANDS", "make_parser", "run_words"]
+__all__ = ["BAD_INPUT", "COMMANDS", "MOST_FAULTS", "make_parser", "run_words"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 #: So many faults of one input are told.
