@@ -17,6 +17,7 @@ from benchmarks.speed import (
     overhead_of_the_diagram,
     real_time_factor,
 )
+from benchmarks.start import start_figures
 
 IDEAL = ("hearing=ideal", "obstacle_sensing=ideal", "odometry.rounding=false")
 
@@ -57,6 +58,7 @@ def main() -> int:
             ),
             Figure("memory, minute 1 to 10, MB", memory_growth_mb(), "<=", 20.0),
             *frame_figures(),
+            *start_figures(),
         ]
     )
 

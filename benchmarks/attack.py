@@ -22,6 +22,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
+from analysis.commands.command_line import BAD_INPUT, MOST_FAULTS
 from benchmarks.attack_cases import KINDS, Case, cases
 
 __all__ = ["attack", "main"]
@@ -147,6 +148,7 @@ def _fault(folder: Path, case: Case, status: int | None) -> str:
     """The first thing that is wrong with how a case ended."""
     complaint = (folder / "err").read_bytes().decode("utf-8", "replace")
     lines, silent = complaint.splitlines(), "--json" in case.words
+    most = MOST_FAULTS + 1 if status == BAD_INPUT else 1
     kept = [folder / "work" / name / "kept.txt" for name in ("full", "results/0001")]
     lost = [path for path in kept if not path.is_file() or path.read_text() != _KEPT]
     left = list((folder / "work").glob(".*.*"))
@@ -154,7 +156,7 @@ def _fault(folder: Path, case: Case, status: int | None) -> str:
         "does not end": status is None,
         f"ends with status {status}": status not in (None, 0, 1, 2),
         f"traceback: {lines[-1:]}": "Traceback" in complaint,
-        f"several lines: {lines}": len(lines) > 1,
+        f"too many lines: {lines}": len(lines) > most,
         "a line that is too long": any(len(line) > LONGEST_LINE for line in lines),
         f"status {status} without a word": bool(status) and not lines and not silent,
         f"lost: {lost}": bool(lost),

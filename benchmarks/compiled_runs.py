@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from analysis.comparison.compare import comparison_plan, library_layouts
+from analysis.comparison import comparison_plan, library_layouts
 from diagrams import RunResult, simulate
 from systems.laws.catalogue import LAWS
 

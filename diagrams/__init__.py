@@ -1,17 +1,29 @@
 """Scenarios, the builder that wires blocks, and the run."""
 
-from diagrams.audio.run_audio import RunAudio, check_audible
-from diagrams.builder import SoundFollower, build_sound_follower
-from diagrams.loading import dump_scenario, library_scenarios, load_scenario
-from diagrams.scenario import Scenario
-from diagrams.simulation import (
-    RunResult,
-    load_compiled_code,
-    make_simulator,
-    prepared_loop,
-    simulate,
-)
-from systems.framework.input_error import InputError
+from typing import TYPE_CHECKING
+
+from systems.framework.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from diagrams.audio.run_audio import RunAudio, check_audible
+    from diagrams.builder import SoundFollower, build_sound_follower
+    from diagrams.loading import (
+        dump_scenario,
+        library_scenarios,
+        load_scenario,
+        write_scenario,
+    )
+    from diagrams.scenario import Scenario
+    from diagrams.simulation import (
+        RunResult,
+        load_compiled_code,
+        make_simulator,
+        prepared_loop,
+        simulate,
+    )
+    from systems.framework.input_error import InputError
+else:
+    __getattr__, __dir__ = lazy_exports(__name__)
 
 __all__ = [
     "InputError",
@@ -28,4 +40,5 @@ __all__ = [
     "make_simulator",
     "prepared_loop",
     "simulate",
+    "write_scenario",
 ]

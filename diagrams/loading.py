@@ -3,27 +3,40 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import ValidationError
+from pydantic_core import ValidationError
 
-from diagrams.explain import did_you_mean, explain
-from diagrams.participants import begins_anew
-from diagrams.scenario import Scenario
+from diagrams.fields import (
+    SCHEMA_FILE,
+    begins_anew,
+    check_fields,
+    did_you_mean,
+    explain,
+    scenario_schema,
+)
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
+
+if TYPE_CHECKING:
+    from diagrams.scenario import Scenario
 
 __all__ = [
+    "check_files",
     "dump_scenario",
     "library_scenarios",
     "load_scenario",
     "parse_setting",
+    "read_fields",
     "read_mapping",
     "resolve_sound",
     "scenario_from_mapping",
     "set_fields",
+    "write_scenario",
 ]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
@@ -50,9 +63,30 @@ def load_scenario(
         ``Scenario``.
 
     Raises:
-        InputError: Unknown name, unreadable file, or a field that is
-            unknown, of the wrong type or out of range; names the field by
-            its whole path.
+        InputError: Unknown name, unreadable file, or fields that are
+            unknown, of the wrong type or out of range; names each by its whole
+            path.
+    """
+    return scenario_from_mapping(read_fields(source, overrides))
+
+
+def read_fields(
+    source: str | Path = "default", overrides: Iterable[str] = ()
+) -> dict[str, Any]:
+    """The fields of a scenario, each checked by itself.
+
+    What takes several fields to judge is left to ``scenario_from_mapping``, which
+    loads what simulates.
+
+    Args:
+        source: As of ``load_scenario``.
+        overrides: As of ``load_scenario``.
+
+    Returns:
+        Plain values.
+
+    Raises:
+        InputError: As of ``load_scenario``.
     """
     path = _find(source)
     data = read_mapping(path)
@@ -60,7 +94,8 @@ def load_scenario(
     resolve_sound(data, path.parent)
     set_fields(data, _settings(overrides))
     resolve_sound(data, Path.cwd())
-    return scenario_from_mapping(data)
+    check_fields(data)
+    return data
 
 
 def _settings(
@@ -89,15 +124,31 @@ def _plain(key: str, value: Any) -> Any:
 
 def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
     """Validates a mapping of plain values; see ``load_scenario``."""
+    from diagrams.scenario import Scenario
+
     try:
         return Scenario.model_validate(data)
     except ValidationError as error:
-        raise explain(error, Scenario, "a scenario") from None
+        raise explain(error, scenario_schema(), "a scenario") from None
 
 
 def dump_scenario(scenario: Scenario) -> str:
     """The whole scenario as YAML, loadable by ``load_scenario``."""
     return dump_yaml(scenario.model_dump(mode="json"))
+
+
+def write_scenario(scenario: Scenario, directory: Path) -> None:
+    """Writes a whole scenario and its schema, so that editors know its fields.
+
+    The schema is a copy: a result can be moved, and looks the same on every machine.
+
+    Args:
+        scenario: Goes to ``scenario.yaml``.
+        directory: Exists; gets ``scenario.schema.json``, too.
+    """
+    first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
+    (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
+    shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
 
 
 def _find(source: str | Path) -> Path:
@@ -149,8 +200,8 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
     """
     for place in [
         data,
-        *_participants(data, "robots"),
-        *_participants(data, "sources"),
+        *_participants(data, "robots").values(),
+        *_participants(data, "sources").values(),
     ]:
         for group, key in (
             ("microphones", "ego_noise_file"),
@@ -162,10 +213,33 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
                 fields[key] = str((folder / fields[key]).resolve())
 
 
-def _participants(data: dict[str, Any], group: str) -> list[dict[str, Any]]:
+def check_files(data: dict[str, Any]) -> None:
+    """Refuses files that a run would not find: of sound, and of own laws.
+
+    Args:
+        data: Fields of a scenario.
+
+    Raises:
+        InputError: One is no file.
+    """
+    places = {"": data}
+    for group in ("robots", "sources"):
+        named = _participants(data, group)
+        places |= {f"{group}.{name}.": fields for name, fields in named.items()}
+    for place, fields in places.items():
+        for key in ("sound", "loudspeaker"):
+            sound = fields.get(key) or {}
+            if sound.get("kind") == "wav" and sound.get("file"):
+                require_file(sound["file"], f"{place}{key}.file", "WAV or FLAC")
+        law, colon, _ = fields.get("law", "").rpartition(":")
+        if colon and law.endswith(".py"):
+            require_file(law, f"{place}law", "Python")
+
+
+def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:
     named = data.get(group)
-    found = named.values() if isinstance(named, dict) else ()
-    return [fields for fields in found if isinstance(fields, dict)]
+    found = named.items() if isinstance(named, dict) else ()
+    return {name: fields for name, fields in found if isinstance(fields, dict)}
 
 
 def parse_setting(text: str) -> tuple[str, Any]:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
@@ -43,8 +42,6 @@ __all__ = [
     "FollowerParameters",
     "SourceParameters",
     "StartParameters",
-    "begins_anew",
-    "joined",
 ]
 
 
@@ -66,7 +63,7 @@ class FollowerParameters(Parameters):
     """One robot that follows a sound: its law, ears, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
-    """A name out of ``systems.laws.LAWS``, ``package.module:Name``, or
+    """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
     ``path/to/file.py:Name``."""
     hearing: Literal["audio", "ideal"] = "audio"
     """Sound waves and microphones, or exact positions."""
@@ -155,36 +152,3 @@ class SourceParameters(SourceRobotParameters):
     """What it plays."""
     body: bool = True
     """Whether it can be hit and seen; off: a loudspeaker in the air."""
-
-
-def begins_anew(changes: Mapping[str, Any]) -> bool:
-    """Whether changes to a group choose its preset, so that the rest is forgotten.
-
-    Args:
-        changes: Plain values by field.
-
-    Returns:
-        False of a group of robots or sources one of which bears that name.
-    """
-    return isinstance(changes.get("preset"), str)
-
-
-def joined(base: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """A tree of plain values, with some of its leaves changed.
-
-    Args:
-        base: The tree.
-        changes: A tree of the leaves to change, or to add; a group that chooses a
-            preset is that of the changes alone.
-
-    Returns:
-        A new tree; neither argument is changed.
-    """
-    result = {} if begins_anew(changes) else dict(base)
-    for key, value in changes.items():
-        before = result.get(key)
-        if isinstance(value, Mapping) and isinstance(before, Mapping):
-            result[key] = joined(before, value)
-        else:
-            result[key] = value
-    return result

@@ -41,7 +41,7 @@ Engine = Literal["drake", "compiled"]
 #: So many runs are worth the time that compiling takes.
 MANY_RUNS = 100
 
-_Name = Annotated[str, StringConstraints(pattern=r"\A[a-z][a-z0-9_]*\z")]
+_Name = Annotated[str, StringConstraints(pattern=r"^[a-z][a-z0-9_]*$")]
 _Participants = Annotated[dict[_Name, dict[str, Any]], Field(max_length=16)]
 
 
@@ -59,7 +59,7 @@ class StopParameters(Parameters):
     following_share: Fraction = 0.5
     """Completed: P follows in this share of the time since the first detection."""
     stuck_after_s: Duration = 10.0
-    """Stuck: P stays within ``stuck_radius_m`` for so long, outside of its goal."""
+    """Stuck: P stays within ``stuck_radius_m`` for so long, s, outside of its goal."""
     stuck_radius_m: Length = 0.1
     """See ``stuck_after_s``, m."""
     lost_after_s: Duration = 20.0
@@ -97,11 +97,11 @@ class IntegratorParameters(Parameters):
 class RunParameters(Parameters):
     """What a run has beside its robots: name, seed, world, sources, end."""
 
-    name: str = Field(default="default", min_length=1, pattern=r"\A[^\n]*\z")
+    name: str = Field(default="default", min_length=1, pattern=r"^[^\n]*$")
     """Name in results."""
-    description: str = Field(default="", pattern=r"\A[^\n]*\z")
+    description: str = Field(default="", pattern=r"^[^\n]*$")
     """One line for ``phonotaxis scenarios``."""
-    engine: Engine | Literal["auto"] = "auto"
+    engine: Literal["drake", "compiled", "auto"] = "auto"
     """What carries the run out: Drake's simulator, or one compiled loop over the same
     blocks, the same to 1e-9 m in a fraction of the time; auto: compiled where 100 runs
     or more are asked at once."""
@@ -119,8 +119,7 @@ class RunParameters(Parameters):
     one, named ``robot``, that has nothing other."""
     sources: _Participants = Field(default={})
     """By name, what each source has other than ``source`` and ``sound`` say; empty:
-    one, named ``source``. Robots follow the first unless ``follows`` says otherwise;
-    all others are interferers."""
+    one, named ``source``. What no robot follows is an interferer."""
     source: SourceRobotParameters = SourceRobotParameters()
     sound: SoundParameters = SoundParameters()
     obstacles: Annotated[

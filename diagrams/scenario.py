@@ -23,10 +23,10 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.explain import explain
+from diagrams.fields import explain, joined
 from diagrams.goal_checks import check_goals, start_note
 from diagrams.guard_checks import check_guard, guard_note
-from diagrams.participants import FollowerParameters, SourceParameters, joined
+from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
 from diagrams.search_checks import check_searches
@@ -346,7 +346,24 @@ class Scenario(FollowerParameters, RunParameters):
         return self
 
     @model_validator(mode="after")
-    def _check_rates(self) -> Scenario:
+    def _check_numbers(self) -> Scenario:
+        """What does not rest on one another is told at once."""
+        faults = []
+        for check in (
+            self._check_rates,
+            self._check_step,
+            self._check_room,
+            self._check_start,
+        ):
+            try:
+                check()
+            except InputError as fault:
+                faults.append(fault)
+        if faults:
+            raise InputError.joined(faults)
+        return self
+
+    def _check_rates(self) -> None:
         tick = self.tick_s
         if not whole(tick * SAMPLE_RATE_HZ):
             raise InputError(
@@ -370,10 +387,8 @@ class Scenario(FollowerParameters, RunParameters):
                     f"{period:g} s is no multiple of tick_s, {tick:g} s; use "
                     f"{ticks * tick:g}, or another tick_s",
                 )
-        return self
 
-    @model_validator(mode="after")
-    def _check_step(self) -> Scenario:
+    def _check_step(self) -> None:
         # Where explicit Runge-Kutta steps of these orders amplify a decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         step = self.integrator.step_s
@@ -385,12 +400,10 @@ class Scenario(FollowerParameters, RunParameters):
                     f"{lag} s is too short for steps of {step} s, which "
                     f"would be unstable; set integrator.step_s to {lag:g} or less",
                 )
-        return self
 
-    @model_validator(mode="after")
-    def _check_room(self) -> Scenario:
+    def _check_room(self) -> None:
         if self.room is None:
-            return self
+            return
         self.room.walls(self.acoustics.c)
         places: dict[str, Any] = {}
         for name, source in self.all_sources.items():
@@ -409,10 +422,8 @@ class Scenario(FollowerParameters, RunParameters):
                         f"which begins at {tuple(self.room.corner.tolist())} and is "
                         f"{self.room.size_m} m; set room.corner_m or room.size_m",
                     )
-        return self
 
-    @model_validator(mode="after")
-    def _check_start(self) -> Scenario:
+    def _check_start(self) -> None:
         footprints = {
             name: (prefix, robot, robot_rectangle(robot.start.pose, robot.robot))
             for name, (prefix, robot) in zip(
@@ -443,7 +454,6 @@ class Scenario(FollowerParameters, RunParameters):
                         f"{robot.start.position_m}; move its first waypoint or "
                         f"{prefix}start.position_m",
                     )
-        return self
 
     @model_validator(mode="after")
     def _check_guards(self) -> Scenario:
@@ -475,6 +485,6 @@ def _validated(model: type[_P], data: dict[str, Any], where: str) -> _P:
     try:
         return model.model_validate(data)
     except ValidationError as error:
-        found = explain(error, model, f"one of {where.split('.', maxsplit=1)[0]}")
-        field = f"{where}.{found.field}"
-        raise InputError(field, found.message) from None
+        what = f"one of {where.split('.', maxsplit=1)[0]}"
+        found = explain(error, model.model_json_schema(), what)
+        raise InputError.joined([found], below=where) from None

@@ -1,4 +1,4 @@
-"""Bad inputs of every kind end in one line; thousands more: ``make attack``."""
+"""Bad inputs of every kind end in a line a fault; thousands more: ``make attack``."""
 
 from __future__ import annotations
 

@@ -220,6 +220,7 @@ def test_json_document_and_result_directory(capsys, tmp_path):
     assert summary == json.loads((out / "summary.json").read_text())
     assert {p.name for p in out.iterdir()} == {
         "scenario.yaml",
+        "scenario.schema.json",
         "summary.json",
         "trajectory.parquet",
         "trajectory.png",

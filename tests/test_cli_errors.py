@@ -57,7 +57,7 @@ def fail(*_args, **_options):
         (["simulate", *SHORT], "diagrams.simulate"),
         (["stability"], "analysis.stability.law_analysis.analyse_law"),
         (["localization"], "analysis.hearing.localization.prepare_localization"),
-        (["locate", "x.wav"], "analysis.recordings.locate.locate"),
+        (["locate", __file__], "analysis.recordings.locate.locate"),
         (["scenarios"], "diagrams.library_scenarios"),
         (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
     ],
@@ -153,7 +153,7 @@ def test_a_partial_is_a_law(capsys, laws):
 @pytest.mark.parametrize(
     ("command", "written"),
     [
-        (["simulate", *SHORT], "analysis.runs.run_report.dump_scenario"),
+        (["simulate", *SHORT], "analysis.runs.run_report.write_scenario"),
         (["design", "--json"], "analysis.design.design_text.write_design"),
     ],
 )

@@ -26,7 +26,7 @@ def test_json_and_files(capsys, tmp_path):
     again = load_scenario(out / "scenario.yaml")
     assert again.microphones.position_tolerance_m == 2e-4
     assert {path.name for path in out.iterdir()} == {
-        "scenario.yaml", "summary.json", "localization.png"
+        "scenario.yaml", "scenario.schema.json", "summary.json", "localization.png"
     }  # fmt: skip
 
 

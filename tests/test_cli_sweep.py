@@ -95,7 +95,7 @@ def test_json_document_page_and_reproduction(capsys, tmp_path):
         ("runs: 5", ["--workers", "two"], "command line", "--help"),
         ("runs: 5", ["--scheduler", "tcp://127.0.0.1:9"], "scheduler", "reached"),
         ("runs: 5", ["--scheduler", "nonsense"], "scheduler", "tcp://host:8786"),
-        (None, [], "sweep", "check the path"),
+        (None, [], "sweep", "give the path of a YAML file"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(capsys, tmp_path, text, words, field, hint):

@@ -26,6 +26,7 @@ from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.heard_sounds import HeardSound, heard_sound, sightings_of
 from analysis.recordings.recording_search import Sighting
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 
 __all__ = ["CalibrationRun", "calibrate", "calibration_run"]
 
@@ -79,11 +80,7 @@ def calibrate(sounds: CalibrationSounds, geometry: ArrayGeometry) -> Calibration
         if listed.position_m is not None:
             position = np.array(listed.position_m)
             check_position(places, position, f"sounds.{k}.position_m")
-        if not path.is_file():
-            raise InputError(
-                f"sounds.{k}.recording",
-                f"{str(path)!r} is not a file; give the path of a WAV or FLAC file",
-            )
+        require_file(path, f"sounds.{k}.recording", "WAV or FLAC")
     top_hz = _top_hz(
         geometry, float(np.sqrt(np.mean(np.diag(geometry.known.budget.of_places))))
     )

@@ -7,9 +7,10 @@ from typing import Annotated
 
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import read_mapping
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Time
 
 __all__ = ["CalibrationSound", "CalibrationSounds", "load_calibration_sounds"]
@@ -70,9 +71,7 @@ def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
         InputError: The file is missing, not YAML, or names no sounds; the message
             names the field and the remedy.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("sounds", f"there is no file {str(path)!r}; check the path")
+    path = require_file(path, "sounds", "YAML")
     data = read_mapping(path)
     if not data.get("sounds"):
         raise InputError(
@@ -83,4 +82,6 @@ def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
     try:
         return CalibrationSounds.model_validate({"folder": str(path.parent), **data})
     except ValidationError as error:
-        raise explain(error, CalibrationSounds, "a list of sounds") from None
+        raise explain(
+            error, CalibrationSounds.model_json_schema(), "a list of sounds"
+        ) from None

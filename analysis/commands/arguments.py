@@ -3,11 +3,37 @@
 from __future__ import annotations
 
 from argparse import ArgumentParser, Namespace
+from typing import Any
 
-__all__ = ["LAW_HELP", "overrides", "take_json", "take_output", "take_scenario"]
+__all__ = [
+    "LAW_HELP",
+    "LAW_WORDS",
+    "SCENARIO_WORDS",
+    "completed_by",
+    "overrides",
+    "take_json",
+    "take_output",
+    "take_scenario",
+]
 
 #: The names stand in ``phonotaxis laws`` alone: to load them takes seconds.
 LAW_HELP = "a name (phonotaxis laws lists them), or package.module:Name"
+
+#: Functions of shells that complete them, which ``phonotaxis completion`` writes.
+SCENARIO_WORDS, LAW_WORDS = (
+    {"bash": name, "zsh": name, "fish": f"({name})"}
+    for name in ("_phonotaxis_scenario_or_file", "_phonotaxis_law_or_file")
+)
+
+
+def completed_by(argument: Any, words: dict[str, str] | str) -> None:
+    """What a shell completes an argument with.
+
+    Args:
+        argument: What ``add_argument`` returns.
+        words: Functions by shell, ``file`` or ``directory``; see shtab.
+    """
+    argument.complete = words
 
 
 def take_json(parser: ArgumentParser) -> None:
@@ -17,17 +43,19 @@ def take_json(parser: ArgumentParser) -> None:
 
 def take_output(parser: ArgumentParser) -> None:
     """``--out`` and ``--json``."""
-    parser.add_argument(
+    out = parser.add_argument(
         "--out", metavar="DIR", help="result directory (default: results/NUMBER)"
     )
+    completed_by(out, "directory")
     take_json(parser)
 
 
 def take_scenario(parser: ArgumentParser) -> None:
     """A scenario, and the options that change its fields."""
-    parser.add_argument(
+    scenario = parser.add_argument(
         "scenario", nargs="?", default="default", help="library name or YAML file"
     )
+    completed_by(scenario, SCENARIO_WORDS)
     parser.add_argument("--seed", metavar="N", help="seed of all random numbers")
     parser.add_argument(
         "--velocity-term",
@@ -44,7 +72,8 @@ def take_scenario(parser: ArgumentParser) -> None:
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="set any field, as source.speed_m_s=0.2; may be repeated",
+        help="set any field (phonotaxis fields lists them), as source.speed_m_s=0.2; "
+        "may be repeated",
     )
 
 

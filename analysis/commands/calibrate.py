@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import CalibrationRun
@@ -29,6 +30,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
+    from systems.framework.input_files import require_file
+
+    require_file(options.sounds, "sounds", "YAML")
+    if options.geometry:
+        require_file(options.geometry, "geometry", "YAML")
+    say(f"calibrating by {options.sounds}")
+
     from analysis.calibration.calibrate import calibrate
     from analysis.calibration.calibration_sounds import load_calibration_sounds
     from analysis.calibration.calibration_text import (
@@ -69,4 +77,5 @@ COMMAND = Command(
     "places of microphones from sounds at known places",
     _add_arguments,
     _prepare,
+    examples=("calibrate sounds.yaml --out results/calibrated",),
 )

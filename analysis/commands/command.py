@@ -70,3 +70,5 @@ class Command:
     add_arguments: Callable[[ArgumentParser], None]
     prepare: Callable[[Namespace, Take], Job[Any]]
     """Loads and checks the input."""
+    examples: tuple[str, ...] = ()
+    """Words after the program's name, for the help."""

@@ -6,39 +6,43 @@ import argparse
 import json
 import logging
 import os
+import re
 import sys
 import traceback
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import NoReturn
 
 from analysis.commands import (
     calibrate,
     compare,
     design,
-    laws,
     listen,
     localization,
     locate,
-    scenarios,
     simulate,
     stability,
     sweep,
 )
 from analysis.commands.carry_out import carry_out
 from analysis.commands.command import Command
+from analysis.commands.discovery import completion, doctor, fields, laws, scenarios
 from analysis.commands.exporting import columns, export
 from analysis.commands.interrupts import Interrupts
 
-__all__ = ["COMMANDS", "run_words"]
+__all__ = ["BAD_INPUT", "COMMANDS", "MOST_FAULTS", "make_parser", "run_words"]
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+#: So many faults of one input are told.
+MOST_FAULTS = 20
 #: By name, in the order of the help.
 COMMANDS: dict[str, Command] = {
     module.COMMAND.name: module.COMMAND
     for module in (
         simulate,
         scenarios,
+        fields,
         laws,
         locate,
         listen,
@@ -50,6 +54,8 @@ COMMANDS: dict[str, Command] = {
         design,
         export,
         columns,
+        doctor,
+        completion,
     )
 }
 
@@ -59,8 +65,36 @@ class _UsageError(Exception):
 
 
 class _Parser(argparse.ArgumentParser):
+    """One that raises what is wrong, and names what may have been meant."""
+
     def error(self, message: str) -> NoReturn:
-        raise _UsageError(f"{message}; see {self.prog} --help")
+        raise _UsageError(f"{message}{self._hint(message)}; see {self.prog} --help")
+
+    def _hint(self, message: str) -> str:
+        command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
+        option = re.search(r"unrecognized arguments:.*?(--[\w-]+)", message)
+        if not command and not option:
+            return ""
+        from diagrams.fields import did_you_mean
+
+        if command:
+            return did_you_mean(command[1], COMMANDS)
+        assert option is not None
+        helps = [self.format_help(), *(p.format_help() for p in self.below.values())]
+        return did_you_mean(option[1], re.findall(r"--[\w-]+", " ".join(helps)))
+
+    #: Parsers of the subcommands, by name.
+    below: Mapping[str, argparse.ArgumentParser] = MappingProxyType({})
+
+
+class _Version(argparse.Action):
+    """Prints the version, which is looked up only then."""
+
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        from importlib.metadata import version
+
+        print(parser.prog, version("phonotaxis"))
+        parser.exit()
 
 
 def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
@@ -78,7 +112,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
     """
     _prepare_process()
     try:
-        options = _parser().parse_args(words)
+        options = make_parser().parse_args(words)
         carry_out(COMMANDS[options.command], options, interrupts)
     except BrokenPipeError:
         # The reader of our output has left; Python must not complain at exit.
@@ -112,46 +146,75 @@ def _prepare_process() -> None:
     logger.setLevel(logging.INFO)
 
 
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(prog="phonotaxis", description="A robot that follows a sound.")
+def make_parser() -> argparse.ArgumentParser:
+    """The parser of the whole command line."""
+    parser = _Parser(
+        prog="phonotaxis",
+        description="A robot that follows a sound.",
+        epilog="examples:\n  phonotaxis simulate\n  phonotaxis fields room\n"
+        "  phonotaxis COMMAND --help",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--version", nargs=0, action=_Version, help="print the version and exit"
+    )
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for command in COMMANDS.values():
-        subparser = subparsers.add_parser(command.name, help=command.help)
+        lines = [f"  phonotaxis {words}" for words in command.examples]
+        subparser = subparsers.add_parser(
+            command.name,
+            help=command.help,
+            epilog="\n".join(["examples:", *lines]),
+            formatter_class=argparse.RawDescriptionHelpFormatter,
+        )
         command.add_arguments(subparser)
         subparser.add_argument(
             "--debug", action="store_true", help="print the traceback of an error"
         )
+    parser.below = subparsers.choices
+    parser.set_defaults(parser=parser)
     return parser
 
 
 def _report(error: Exception, words: Sequence[str]) -> int:
-    """Says on one line what an exception means; returns the exit status."""
+    """Says in a line each what an exception means; returns the exit status."""
     if "--debug" in words:
         traceback.print_exception(error)
+    faults: list[tuple[str, str]]
     if isinstance(error, _UsageError):
-        field, message, status = "command line", str(error), BAD_INPUT
+        faults, status = [("command line", str(error))], BAD_INPUT
     elif isinstance(error, ImportError):
         text = f"{error}; the installation is not whole, install it again"
-        field, message, status = "", text, FAILED
+        faults, status = [("", text)], FAILED
     else:
         from analysis.run_error import failure_text
         from systems.framework.input_error import InputError
 
         if isinstance(error, InputError):
-            field, message, status = error.field, error.message, BAD_INPUT
+            faults = [(each.field, each.message) for each in error.all]
+            status = BAD_INPUT
         else:
-            field, message, status = "", failure_text(error), FAILED
-    _complain(field, message, as_json="--json" in words)
+            faults, status = [("", failure_text(error))], FAILED
+    _complain(faults, as_json="--json" in words)
     return status
 
 
-def _complain(field: str, message: str, *, as_json: bool) -> None:
-    if len(message) > 250 or not message.isprintable():
-        from systems.framework.input_error import LONGEST_MESSAGE, shortened
-
-        message = shortened(message, LONGEST_MESSAGE - len(field) - 2)
+def _complain(faults: Sequence[tuple[str, str]], *, as_json: bool) -> None:
+    told = [(field, _short(field, message)) for field, message in faults[:MOST_FAULTS]]
     if as_json:
-        print(json.dumps({"error": {"field": field, "message": message}}))
+        errors = [{"field": field, "message": text} for field, text in told]
+        print(json.dumps({"error": errors[0], "errors": errors}))
         return
-    text = f"{field}: {message}" if field else message
-    print(f"phonotaxis: {text}", file=sys.stderr)
+    for field, message in told:
+        text = f"{field}: {message}" if field else message
+        print(f"phonotaxis: {text}", file=sys.stderr)
+    if more := len(faults) - len(told):
+        print(f"phonotaxis: and {more} more of the kind", file=sys.stderr)
+
+
+def _short(field: str, message: str) -> str:
+    if len(message) <= 250 and message.isprintable():
+        return message
+    from systems.framework.input_error import LONGEST_MESSAGE, shortened
+
+    return shortened(message, LONGEST_MESSAGE - len(field) - 2)

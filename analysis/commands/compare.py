@@ -5,8 +5,9 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from analysis.commands.arguments import take_output
+from analysis.commands.arguments import SCENARIO_WORDS, completed_by, take_output
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from analysis.comparison.laws_in_pairs import Comparison, Pair
@@ -15,12 +16,13 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
+    scenario = parser.add_argument(
         "scenario",
         nargs="*",
         help="library name, YAML file of layouts, or YAML file of a scenario "
         "(default: the papers' four experiments)",
     )
+    completed_by(scenario, SCENARIO_WORDS)
     parser.add_argument(
         "--laws",
         metavar="LAW,...",
@@ -62,6 +64,19 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(
     options: Namespace, take: Take
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
+    from analysis.comparison.words import EXPERIMENTS, check_words
+
+    check_words(
+        options.scenario,
+        laws=options.laws,
+        velocity_terms=options.velocity_term,
+        runs=options.runs,
+        seed=options.seed,
+        settings=options.set,
+        grid=options.grid,
+    )
+    say(f"comparing laws in {', '.join(options.scenario or EXPERIMENTS)}")
+
     from analysis.comparison.compare import comparison_plans, prepare_comparison
     from analysis.comparison.report import (
         compare_summary,
@@ -94,5 +109,13 @@ def _prepare(
 
 
 COMMAND = Command(
-    "compare", "laws side by side on the same random layouts", _add_arguments, _prepare
+    "compare",
+    "laws side by side on the same random layouts",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "compare two_static_obstacles --laws conventional,active --runs 20",
+        "compare --set hearing=ideal --velocity-term printed,closing",
+        "compare u_trap clutter --laws guarded,dwa,orca --out results/laws",
+    ),
 )

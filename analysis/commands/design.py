@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.commands.arguments import overrides, take_output, take_scenario
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from analysis.design.design_study import DesignStudy
@@ -20,12 +21,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
-    from analysis.design.design_study import STUDY_RUNS, study_design
-    from analysis.design.design_text import design_summary, design_text, write_design
-    from diagrams import load_scenario
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
 
     place = take(options.out)
-    scenario = load_scenario(options.scenario, overrides(options))
+    fields = read_fields(options.scenario, overrides(options))
+    check_files(fields)
+    say(f"designing gains for {fields['name']}")
+    scenario = scenario_from_mapping(fields)
+
+    from analysis.design.design_study import STUDY_RUNS, study_design
+    from analysis.design.design_text import design_summary, design_text, write_design
+
     return Job(
         run=lambda progress: study_design(scenario, progress=progress),
         summary=lambda study: design_summary(study, place.out),
@@ -42,4 +48,8 @@ COMMAND = Command(
     "the laws' gains, derived from stated requirements",
     _add_arguments,
     _prepare,
+    examples=(
+        "design",
+        "design --set robot.mass_kg=8 --json",
+    ),
 )

@@ -6,7 +6,7 @@ import os
 import sys
 from argparse import ArgumentParser, Namespace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypedDict
+from typing import TYPE_CHECKING, Any, BinaryIO, TypedDict
 
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.progress import Progress
@@ -62,6 +62,16 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
+    from systems.framework.input_error import InputError
+    from systems.framework.input_files import require_file
+
+    for name in ("rate", "channels"):
+        if (value := getattr(options, name)) is not None and value < 1:
+            raise InputError(f"--{name}", f"is {value}; give a number above 0")
+    if options.geometry:
+        require_file(options.geometry, "geometry", "YAML")
+    pipe = _pipe(options) if options.device is None else None
+
     from analysis.listening.live_hearing import LiveHearing, listen
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
     from analysis.run_error import RunError
@@ -69,7 +79,7 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
     teller = _teller(as_json=options.json)
-    stream = _stream(options, max(geometry.columns) + 1)
+    stream = _stream(options, pipe, max(geometry.columns) + 1)
     hearing = LiveHearing(stream, geometry, teller.name_fault)
 
     def run(progress: Progress) -> HeardStream:
@@ -107,15 +117,29 @@ def _teller(*, as_json: bool) -> Teller:
     return view(sys.stdout, sys.stderr)
 
 
-def _stream(options: Namespace, raw_channels: int) -> SoundStream:
-    from analysis.listening.sound_card import open_card
-    from analysis.listening.sound_pipe import open_flac, open_pipe
+def _pipe(options: Namespace) -> BinaryIO:
     from systems.framework.input_error import InputError
 
-    for name in ("rate", "channels"):
-        if (value := getattr(options, name)) is not None and value < 1:
-            raise InputError(f"--{name}", f"is {value}; give a number above 0")
-    if options.device is not None:
+    if options.input == "-":
+        if sys.stdin is None or sys.stdin.isatty():
+            raise InputError(
+                "input",
+                "nothing is piped in; name a file, pipe in sound, or give --device",
+            )
+        return os.fdopen(os.dup(sys.stdin.fileno()), "rb")
+    try:
+        return Path(options.input).open("rb")  # read to its end
+    except OSError as error:
+        raise InputError("input", f"cannot read it ({error}); name a file") from None
+
+
+def _stream(
+    options: Namespace, pipe: BinaryIO | None, raw_channels: int
+) -> SoundStream:
+    from analysis.listening.sound_card import open_card
+    from analysis.listening.sound_pipe import open_flac, open_pipe
+
+    if pipe is None:
         name = options.device
         device = int(name) if name.isdigit() else None if name == "default" else name
         return open_card(
@@ -124,31 +148,29 @@ def _stream(options: Namespace, raw_channels: int) -> SoundStream:
             sample_rate_hz=options.rate or 48_000,
         )
     stated: _Stated = {"channels": options.channels, "sample_rate_hz": options.rate}
-    if options.input == "-":
-        if sys.stdin is None or sys.stdin.isatty():
-            raise InputError(
-                "input",
-                "nothing is piped in; name a file, pipe in sound, or give --device",
-            )
-        pipe = os.fdopen(os.dup(sys.stdin.fileno()), "rb")
-    else:
-        path = Path(options.input)
-        try:
-            with path.open("rb") as file:
-                is_flac = path.is_file() and file.read(4) == b"fLaC"
-            if is_flac:
-                return open_flac(path, **stated)
-            pipe = path.open("rb")  # read to its end
-        except OSError as error:
-            raise InputError(
-                "input", f"cannot read it ({error}); name a file"
-            ) from None
+    if _is_flac(Path(options.input)):
+        pipe.close()
+        return open_flac(Path(options.input), **stated)
     return open_pipe(
         pipe, raw_channels=raw_channels, sample_format=options.format, **stated
     )
 
 
+def _is_flac(path: Path) -> bool:
+    if not path.is_file():
+        return False
+    with path.open("rb") as file:
+        return file.read(4) == b"fLaC"
+
+
 COMMAND = Command(
-    "listen", "bearings of all sources, live from a pipe or a card", _add_arguments,
+    "listen",
+    "bearings of all sources, live from a pipe or a card",
+    _add_arguments,
     _prepare,
-)  # fmt: skip
+    examples=(
+        "listen recording.wav --geometry array.yaml",
+        "listen --device default --geometry array.yaml",
+        "listen --channels 4 --rate 48000 --format s16le --geometry array.yaml --json",
+    ),
+)

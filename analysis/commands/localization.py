@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 from analysis.commands.arguments import take_output
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -31,6 +32,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
+    from diagrams.loading import read_fields
+
+    place = take(options.out)
+    overrides = [] if options.seed is None else [f"seed={options.seed}"]
+    read_fields("default", overrides)
+    say("measuring how well sounds are located")
+
     from analysis.hearing.localization import prepare_localization
     from analysis.hearing.localization_report import (
         localization_summary,
@@ -38,9 +46,8 @@ def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
         write_localization,
     )
 
-    place = take(options.out)
     experiment = prepare_localization(
-        [] if options.seed is None else [f"seed={options.seed}"],
+        overrides,
         trials=options.trials,
         tolerances=options.tolerances,
     )
@@ -62,4 +69,8 @@ COMMAND = Command(
     "the papers' localisation tables, ours, and the bound",
     _add_arguments,
     _prepare,
+    examples=(
+        "localization",
+        "localization --trials 20 --tolerances",
+    ),
 )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     from analysis.recordings.locate_result import LocateResult
@@ -27,6 +28,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
+    from systems.framework.input_files import require_file
+
+    require_file(options.recording, "recording", "WAV or FLAC")
+    if options.geometry:
+        require_file(options.geometry, "geometry", "YAML")
+    say(f"locating what {options.recording} holds")
+
     from analysis.recordings.locate import load_geometry, locate
     from analysis.recordings.locate_text import locate_text
 
@@ -55,5 +63,12 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
 
 
 COMMAND = Command(
-    "locate", "bearing and range over time of a recording", _add_arguments, _prepare
+    "locate",
+    "bearing and range over time of a recording",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "locate recording.wav --geometry array.yaml",
+        "locate recording.wav --out results/located --json",
+    ),
 )

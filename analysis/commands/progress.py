@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING, NoReturn
 
 from analysis.commands.interrupts import Interrupts
+
+if TYPE_CHECKING:
+    from tqdm import tqdm
 
 __all__ = ["Progress"]
 
@@ -22,24 +26,22 @@ class Progress:
     def __init__(
         self, interrupts: Interrupts, total: float, unit: str, done: float = 0.0
     ) -> None:
-        from tqdm import tqdm
-
-        form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {{remaining}} left"
         self._interrupts = interrupts
-        self._bar = tqdm(
-            total=total,
-            initial=done,
-            disable=not total or not sys.stderr.isatty(),
-            bar_format=form,
-            leave=False,
-        )
+        self._bar: tqdm[NoReturn] | None = None
+        if total and sys.stderr.isatty():
+            from tqdm import tqdm
+
+            left = "{remaining} left"
+            form = f"{{l_bar}}{{bar}}| {{n:.0f}}/{{total:.0f}} {unit}, {left}"
+            self._bar = tqdm(total=total, initial=done, bar_format=form, leave=False)
         self._steps = 0
 
     def __enter__(self) -> Progress:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._bar.close()
+        if self._bar is not None:
+            self._bar.close()
 
     def __call__(self, done: float) -> None:
         """Shows how much is done.
@@ -47,7 +49,8 @@ class Progress:
         Raises:
             KeyboardInterrupt: An interrupt has come meanwhile.
         """
-        self._bar.update(done - self._bar.n)
+        if self._bar is not None:
+            self._bar.update(done - self._bar.n)
         self._interrupts.check()
 
     def take_interrupt(self) -> None:
@@ -60,6 +63,7 @@ class Progress:
         Raises:
             KeyboardInterrupt: As a call.
         """
-        self._bar.set_description(title)
+        if self._bar is not None:
+            self._bar.set_description(title)
         self(self._steps)
         self._steps += 1

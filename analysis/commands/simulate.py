@@ -8,9 +8,17 @@ from argparse import ArgumentParser, Namespace
 from contextlib import nullcontext
 from typing import TYPE_CHECKING, Any
 
-from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
+from analysis.commands.arguments import (
+    LAW_HELP,
+    LAW_WORDS,
+    completed_by,
+    overrides,
+    take_output,
+    take_scenario,
+)
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.exporting.files import Exports, take_exports
+from analysis.commands.first_words import say
 from analysis.commands.progress import Progress
 from analysis.commands.saved_audio import SavedAudio
 
@@ -21,8 +29,9 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("--sound", metavar="FILE", help="sound file to play")
-    parser.add_argument("--law", help=LAW_HELP)
+    sound = parser.add_argument("--sound", metavar="FILE", help="sound file to play")
+    completed_by(sound, "file")
+    completed_by(parser.add_argument("--law", help=LAW_HELP), LAW_WORDS)
     take_scenario(parser)
     parser.add_argument(
         "--save-audio",
@@ -30,23 +39,29 @@ def _add_arguments(parser: ArgumentParser) -> None:
         help="new directory for what the robots hear and the loudspeakers play",
     )
     take_exports(parser)
+    parser.add_argument(
+        "--no-plots",
+        action="store_true",
+        help="write no pictures: the replay and the numbers alone",
+    )
     take_output(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
-    from analysis.exports.recorded_run import RecordedRun
     from analysis.run_error import RunError
-    from analysis.runs.run_report import run_summary, summary_text, write_run
-    from diagrams import (
-        build_sound_follower,
-        load_scenario,
-        prepared_loop,
-        simulate,
-    )
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
     from systems.framework.input_error import InputError
 
     place, exports = take(options.out), Exports.chosen(options)
-    scenario = load_scenario(options.scenario, _settings(options))
+    fields = read_fields(options.scenario, _settings(options))
+    check_files(fields)
+    say(f"simulating {fields['name']}")
+    scenario = scenario_from_mapping(fields)
+
+    from analysis.exports.recorded_run import RecordedRun
+    from analysis.runs.run_report import run_summary, summary_text, write_run
+    from diagrams import build_sound_follower, prepared_loop, simulate
+
     for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
     saved: SavedAudio | None = None
@@ -76,7 +91,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         return "\n".join(lines)
 
     def write(result: RunResult, document: dict[str, Any]) -> None:
-        write_run(result, document, place.directory)
+        write_run(result, document, place.directory, pictures=not options.no_plots)
         exports.write(RecordedRun.of(result), place.directory)
 
     return Job(
@@ -85,7 +100,8 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         text=text,
         out=place.out,
         write=write,
-        where=f"{'results':<21} {{out}}",
+        where=f"{'results':<21} {{out}}\n"
+        f"{'replay':<21} {{out}}/replay.html, to be opened in a browser",
         total=scenario.duration_s,
         unit="s simulated",
         left=saved.left if saved else lambda: "",
@@ -101,4 +117,16 @@ def _settings(options: Namespace) -> list[str]:
     return settings
 
 
-COMMAND = Command("simulate", "run a scenario", _add_arguments, _prepare)
+COMMAND = Command(
+    "simulate",
+    "run a scenario",
+    _add_arguments,
+    _prepare,
+    examples=(
+        "simulate",
+        "simulate u_trap --law guarded",
+        "simulate my_scenario.yaml --seed 7 --out results/mine",
+        "simulate --set source.speed_m_s=0.2 --set hearing=ideal --json",
+        "simulate --law my_laws.py:soft --no-plots",
+    ),
+)

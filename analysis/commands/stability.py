@@ -6,8 +6,16 @@ import logging
 from argparse import ArgumentParser, Namespace
 from typing import TYPE_CHECKING
 
-from analysis.commands.arguments import LAW_HELP, overrides, take_output, take_scenario
+from analysis.commands.arguments import (
+    LAW_HELP,
+    LAW_WORDS,
+    completed_by,
+    overrides,
+    take_output,
+    take_scenario,
+)
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 from analysis.commands.progress import Progress
 
 if TYPE_CHECKING:
@@ -17,7 +25,7 @@ __all__ = ["COMMAND"]
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument(
+    law = parser.add_argument(
         "--law",
         metavar="LAW",
         action="append",
@@ -25,6 +33,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
         "all: those that avoid obstacles, or drive on a route (default: the "
         "scenario's law)",
     )
+    completed_by(law, LAW_WORDS)
     parser.add_argument(
         "--robot",
         metavar="NAME",
@@ -39,6 +48,18 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
+    from diagrams.fields import known_laws, unknown_law
+    from diagrams.loading import check_files, read_fields, scenario_from_mapping
+
+    place = take(options.out)
+    fields = read_fields(options.scenario, overrides(options))
+    check_files(fields)
+    for law in options.law or []:
+        if law != "all" and ":" not in law and law not in known_laws():
+            raise unknown_law(law, known_laws())
+    say(f"analysing {fields['name']}")
+    whole = scenario_from_mapping(fields)
+
     from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
     from analysis.stability.report_files import (
         stability_document,
@@ -46,10 +67,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         write_stability,
     )
     from analysis.stability.report_parts import parts_for
-    from diagrams import load_scenario
 
-    place = take(options.out)
-    whole = load_scenario(options.scenario, overrides(options))
     scenario, note = chosen_robot(whole, options.robot)
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
@@ -90,4 +108,9 @@ COMMAND = Command(
     "stability of a scenario's loop: report, models, numbers",
     _add_arguments,
     _prepare,
+    examples=(
+        "stability --law all",
+        "stability two_static_obstacles --law active --full",
+        "stability --set attraction.damping_n_s_m=3",
+    ),
 )

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from analysis.commands.arguments import take_output
 from analysis.commands.command import Command, Job, Take
+from analysis.commands.first_words import say
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -29,6 +30,11 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
+    from analysis.sweeps.sweep_file import read_sweep
+
+    read_sweep(options.sweep)
+    say(f"sweeping {options.sweep}")
+
     from analysis.sweeps.one_run import require_runs
     from analysis.sweeps.page import write_sweep
     from analysis.sweeps.plan import load_sweep
@@ -67,4 +73,8 @@ COMMAND = Command(
     "run many scenarios, drawn from distributions and grids",
     _add_arguments,
     _prepare,
+    examples=(
+        "sweep docs/examples/crossing.yaml",
+        "sweep docs/examples/crossing.yaml --out results/crossing --resume",
+    ),
 )

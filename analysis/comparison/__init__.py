@@ -1,16 +1,26 @@
 """Laws side by side on the same layouts, and the papers' claims judged."""
 
-from analysis.comparison.claims import CLAIMS, claims_table
-from analysis.comparison.compare import (
-    EXPERIMENTS,
-    comparison_plan,
-    library_layouts,
-    prepare_comparison,
-)
-from analysis.comparison.laws_in_pairs import compare_runs
-from analysis.comparison.mechanisms import failure_mechanisms
-from analysis.comparison.paired_statistics import paired_median, paired_rate
-from analysis.comparison.report import compare_summary, compare_text, write_comparison
+from typing import TYPE_CHECKING
+
+from systems.framework.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from analysis.comparison.claims import CLAIMS, claims_table
+    from analysis.comparison.compare import (
+        comparison_plan,
+        prepare_comparison,
+    )
+    from analysis.comparison.laws_in_pairs import compare_runs
+    from analysis.comparison.mechanisms import failure_mechanisms
+    from analysis.comparison.paired_statistics import paired_median, paired_rate
+    from analysis.comparison.report import (
+        compare_summary,
+        compare_text,
+        write_comparison,
+    )
+    from analysis.comparison.words import EXPERIMENTS, library_layouts
+else:
+    __getattr__, __dir__ = lazy_exports(__name__)
 
 __all__ = [
     "CLAIMS",

@@ -10,43 +10,38 @@ from typing import Any
 
 from pydantic import ValidationError
 
-import diagrams
 from analysis.comparison.laws_in_pairs import (
     Comparison,
     Pair,
     compare_runs,
     pooled_pairs,
 )
+from analysis.comparison.words import (
+    EXPERIMENTS,
+    VELOCITY_TERM,
+    library_layouts,
+    listed_values,
+    whole_seed,
+)
 from analysis.reporting.result_directory import ResultDirectory, take_directory
 from analysis.sweeps.one_run import require_runs
 from analysis.sweeps.plan import SweepPlan, load_sweep
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 from diagrams import Scenario, load_scenario
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import parse_setting, read_mapping, scenario_from_mapping
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 __all__ = [
-    "EXPERIMENTS",
     "PreparedComparison",
     "comparison_plan",
     "comparison_plans",
-    "library_layouts",
     "prepare_comparison",
 ]
 
-#: The papers' experiments.
-EXPERIMENTS = (
-    "obstacle_free",
-    "two_static_obstacles",
-    "one_moving_obstacle",
-    "two_moving_obstacles",
-)
-_LIBRARY = Path(diagrams.__file__).parent / "layouts"
 #: Fields of a sweep that a comparison sets itself.
 _OURS = ("grid", "runs", "pair")
-_VELOCITY_TERM = "repulsion.velocity_term"
 
 
 @dataclass(frozen=True)
@@ -99,11 +94,6 @@ class PreparedComparison:
         return comparisons, pooled_pairs(tables)
 
 
-def library_layouts() -> dict[str, Path]:
-    """Names and files of the layouts that come with the package."""
-    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
-
-
 def comparison_plan(
     scenario: str,
     *,
@@ -150,7 +140,7 @@ def comparison_plan(
     try:
         return SweepPlan.model_validate(fields)
     except ValidationError as error:
-        raise explain(error, SweepPlan, "a comparison") from None
+        raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
 
 
 def _require_one_law(base: Scenario) -> None:
@@ -198,13 +188,13 @@ def comparison_plans(
         InputError: A word is no good; names the option or the field.
     """
     fields = dict(parse_setting(text) for text in settings)
-    varied = dict(_values(text) for text in grid)
+    varied = dict(listed_values(text) for text in grid)
     if velocity_terms is not None:
         terms = velocity_terms.split(",")
         if len(terms) == 1:
-            fields[_VELOCITY_TERM] = terms[0]
+            fields[VELOCITY_TERM] = terms[0]
         else:
-            varied[_VELOCITY_TERM] = terms
+            varied[VELOCITY_TERM] = terms
     plans: dict[str, SweepPlan] = {}
     for scenario in scenarios or EXPERIMENTS:
         name = Path(scenario).stem
@@ -214,7 +204,7 @@ def comparison_plans(
             scenario,
             laws=None if laws is None else laws.split(","),
             runs=runs,
-            seed=_seed(seed),
+            seed=whole_seed(seed),
             settings=fields,
             grid=varied,
         )
@@ -283,18 +273,3 @@ def _layouts(scenario: str) -> SweepPlan:
             return load_sweep(path)
     load_scenario(scenario)
     return SweepPlan(name=path.stem, scenario=scenario)
-
-
-def _values(text: str) -> tuple[str, list[Any]]:
-    key, values = parse_setting(text)
-    if not isinstance(values, list):
-        raise InputError(key, f"{values!r} is no list of values; write [a, b]")
-    return key, values
-
-
-def _seed(text: str | None) -> int:
-    if text is None:
-        return 1
-    if not text.isdigit():
-        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
-    return int(text)

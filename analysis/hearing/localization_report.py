@@ -12,7 +12,7 @@ from analysis.hearing.localization import LocalizationCell, LocalizationExperime
 from analysis.hearing.sensitivity import sensitivity_table
 from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
-from diagrams import dump_scenario
+from diagrams import write_scenario
 
 __all__ = ["localization_summary", "localization_text", "write_localization"]
 
@@ -85,9 +85,7 @@ def write_localization(
     """
     from analysis.hearing.localization_plots import plot_localization
 
-    (directory / "scenario.yaml").write_text(
-        dump_scenario(experiment.scenario), "utf-8"
-    )
+    write_scenario(experiment.scenario, directory)
     write_json(summary, directory / "summary.json")
     plot_localization(cells).savefig(directory / "localization.png", dpi=150)
 

@@ -13,6 +13,7 @@ from pydantic import Field, Strict, ValidationError, model_validator
 
 from diagrams.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive
 from systems.sound.acoustics import AcousticParameters, sound_speed
 from systems.sound.array_budget import ArrayBudget
@@ -288,7 +289,7 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
         InputError: The file is missing, not YAML or makes no sense; the
             message names the field and the remedy.
     """
-    path = Path(path)
+    path = require_file(path, "geometry", "YAML")
     try:
         content = parse_yaml(path.read_text(encoding="utf-8"), "geometry")
     except InputError as error:

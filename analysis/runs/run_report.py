@@ -12,7 +12,7 @@ from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.guarded_motion import halts_of
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
-from diagrams import RunResult, build_sound_follower, dump_scenario
+from diagrams import RunResult, build_sound_follower, write_scenario
 from diagrams.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
@@ -69,11 +69,17 @@ def _outcome(result: RunResult) -> dict[str, Any]:
     return ended
 
 
-def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> None:
+def write_run(
+    result: RunResult,
+    summary: dict[str, Any],
+    directory: Path,
+    *,
+    pictures: bool = True,
+) -> None:
     """Writes everything about a run into a directory that exists.
 
-    ``scenario.yaml`` (effective, can be run again), ``summary.json``,
-    ``trajectory.parquet``, ``trajectory.png``, ``time_series.png``,
+    ``scenario.yaml`` (effective, can be run again) and ``scenario.schema.json``,
+    ``summary.json``, ``trajectory.parquet``, ``trajectory.png``, ``time_series.png``,
     ``diagram.svg`` and ``replay.html``. Of several robots each has its own
     ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows
     how they are joined.
@@ -82,16 +88,22 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
         result: The run.
         summary: From ``run_summary``.
         directory: Exists.
+        pictures: Off: no PNG and no SVG.
     """
-    from analysis.runs.block_diagram import write_block_diagram
     from analysis.runs.replay import write_replay
-    from analysis.runs.run_plots import plot_time_series, plot_trajectory
 
-    (directory / "scenario.yaml").write_text(
-        dump_scenario(result.full_scenario), "utf-8"
-    )
+    write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
+    write_replay(result, directory / "replay.html")
+    if pictures:
+        _write_pictures(result, directory)
+
+
+def _write_pictures(result: RunResult, directory: Path) -> None:
+    from analysis.runs.block_diagram import write_block_diagram
+    from analysis.runs.run_plots import plot_time_series, plot_trajectory
+
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
     for name, own in result.robots.items():
         ending = f"_{name}" if result.several else ""
@@ -104,7 +116,6 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     if result.several:
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
-    write_replay(result, directory / "replay.html")
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:

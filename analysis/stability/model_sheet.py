@@ -13,6 +13,7 @@ from typing import Any
 
 from analysis.reporting.provenance import versions
 from diagrams import Scenario, dump_scenario
+from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
@@ -193,13 +194,14 @@ def _parameters(scenario: Scenario) -> Iterator[ParameterRow]:
 def _rows(parameters: Parameters, prefix: str) -> Iterator[ParameterRow]:
     default = type(parameters)()
     part = (type(parameters).__doc__ or "").partition("\n\n")[0]
-    for name, info in type(parameters).model_fields.items():
+    told = meanings(type(parameters))
+    for name in type(parameters).model_fields:
         value = getattr(parameters, name)
         if isinstance(value, Parameters):
             yield from _rows(value, f"{prefix}{name}.")
             continue
         changed = value != getattr(default, name)
-        text = _one_line(info.description or "")
+        text = _one_line(told.get(name, ""))
         yield ParameterRow(f"{prefix}{name}", _one_line(part), value, changed, text)
 
 

@@ -14,7 +14,7 @@ from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.stability.law_analysis import LawAnalysis
 from analysis.stability.report_page import stability_page
 from analysis.stability.verdicts import compare_verdicts, shown_value
-from diagrams import dump_scenario
+from diagrams import write_scenario
 
 __all__ = ["stability_document", "stability_text", "write_stability"]
 
@@ -134,6 +134,6 @@ def write_stability(
     ]
     write_models(models, directory)
     scenario = analyses[0].scenario
-    (directory / "scenario.yaml").write_text(dump_scenario(scenario), "utf-8")
+    write_scenario(scenario, directory)
     (directory / "summary.json").write_text(json.dumps(document) + "\n")
     (directory / "report.html").write_text(stability_page(analyses), "utf-8")

@@ -20,10 +20,10 @@ from pydantic import Field, Strict, ValidationError, model_validator
 
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
+from analysis.sweeps.sweep_file import read_sweep
 from diagrams import Scenario, load_scenario
-from diagrams.explain import explain
+from diagrams.fields import explain
 from diagrams.loading import (
-    read_mapping,
     resolve_sound,
     scenario_from_mapping,
     set_fields,
@@ -66,7 +66,7 @@ class SweepPlan(Parameters):
     parted by commas, which all get the one value that is drawn.
     """
 
-    name: str = Field(default="sweep", min_length=1, pattern=r"\A[^\n]*\z")
+    name: str = Field(default="sweep", min_length=1, pattern=r"^[^\n]*$")
     """Title of the result page."""
     scenario: str = Field(default="default", min_length=1)
     """Library name, or path of a YAML file from ``folder``."""
@@ -284,19 +284,11 @@ def load_sweep(path: str | Path) -> SweepPlan:
     Raises:
         InputError: The file cannot be read, or a field is unknown or wrong.
     """
-    path = Path(path)
-    if not path.is_file():
-        raise InputError("sweep", f"there is no file {path}; check the path")
-    data = read_mapping(path)
-    for part in ("set", "grid", "draw", "require"):  # a heading with nothing below it
-        if part in data and data[part] is None:
-            del data[part]
-    data.setdefault("name", path.stem)
-    data["folder"] = str(path.parent.absolute())
+    data = read_sweep(path)
     try:
         return SweepPlan.model_validate(data)
     except ValidationError as error:
-        raise explain(error, SweepPlan, "a sweep") from None
+        raise explain(error, SweepPlan.model_json_schema(), "a sweep") from None
 
 
 def dump_plan(plan: SweepPlan) -> str:

@@ -22,7 +22,7 @@ from analysis.reporting.result_directory import whole_directory
 from analysis.run_error import RunError
 from analysis.sweeps.one_run import Outcome, parquet_bytes, results_table
 from analysis.sweeps.plan import SweepPlan, dump_plan
-from diagrams import dump_scenario
+from diagrams import write_scenario
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
 
@@ -181,7 +181,7 @@ def _make(out: Path, plan: SweepPlan) -> None:
         (out / "trajectories").mkdir()
     (out / PLAN).write_text(dump_plan(plan), "utf-8")
     base = scenario_from_mapping(plan.base)
-    (out / "scenario.yaml").write_text(dump_scenario(base), "utf-8")
+    write_scenario(base, out)
     (out / JOURNAL).touch()
     manifest = {
         "schema_version": SCHEMA_VERSION,

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Mapping
 from typing import Any
 
-from analysis.comparison.compare import library_layouts
+from analysis.comparison import library_layouts
 from analysis.reporting.intervals import wilson_interval
 from analysis.reporting.markdown import markdown_table
 from analysis.sweeps.plan import load_sweep

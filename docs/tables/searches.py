@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from analysis.comparison.compare import library_layouts
+from analysis.comparison import library_layouts
 from analysis.reporting.intervals import wilson_interval
 from analysis.reporting.markdown import markdown_table
 from analysis.runs.search_metrics import ARMS_M

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from analysis.comparison.compare import library_layouts
+from analysis.comparison import library_layouts
 from analysis.comparison.paired_statistics import paired_median, paired_rate
 from analysis.reporting.intervals import (
     median_interval,

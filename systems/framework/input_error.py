@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 __all__ = ["InputError", "shortened"]
 
 #: A whole message, with its field, has at most so many characters.
@@ -19,13 +21,41 @@ class InputError(ValueError):
     Args:
         field: Dotted path of the field, name of the option, or name of the block.
         message: The value, what is wrong, and the remedy.
+        others: What else is wrong with the same input.
     """
 
-    def __init__(self, field: str, message: str) -> None:
+    def __init__(
+        self, field: str, message: str, others: Iterable[InputError] = ()
+    ) -> None:
         self.field = shortened(field, _LONGEST_FIELD)
         room = LONGEST_MESSAGE - len(self.field) - 2
         self.message = shortened(message, room)
+        self._others = tuple(others)
         super().__init__(self.field, self.message)
+
+    @property
+    def all(self) -> tuple[InputError, ...]:
+        """This error and the others."""
+        return (self, *self._others)
+
+    @classmethod
+    def joined(cls, errors: Iterable[InputError], below: str = "") -> InputError:
+        """One error that has all of some, each once.
+
+        Args:
+            errors: One or more.
+            below: Begins the path of each.
+
+        Returns:
+            The first, with the others.
+        """
+        texts = {
+            (".".join(filter(None, (below, each.field))), each.message): None
+            for error in errors
+            for each in error.all
+        }
+        first, *others = texts
+        return cls(*first, others=[cls(*other) for other in others])
 
     def __str__(self) -> str:
         return f"{self.field}: {self.message}" if self.field else self.message

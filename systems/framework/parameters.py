@@ -76,14 +76,16 @@ Size = Annotated[tuple[Length, Length], Strict(False)]
 
 
 class Parameters(BaseModel):
-    """Frozen, strictly typed, no unknown keys, no NaN and no infinity."""
+    """Frozen, strictly typed, no unknown keys, no NaN and no infinity.
+
+    The docstring of a field says what it means, and in which unit; see ``meanings``.
+    """
 
     model_config = ConfigDict(
         frozen=True,
         extra="forbid",
         strict=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
     )
 
     def model_copy(

@@ -25,7 +25,7 @@ class Active2017Parameters(Parameters):
     """
 
     distance_gain_j: Positive = 1.22
-    """K_0, N m: the push is K_0/c. Not the K_0 of Han's laws."""
+    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
     saturation_distance_m: Length = 0.1
     """rho_1: nearer than this the push stays at K_0/rho_1, m (Kim 2017, 5)."""
     damping_n_s_m: Damping = 0.8

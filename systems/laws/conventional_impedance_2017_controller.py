@@ -25,7 +25,7 @@ class Conventional2017Parameters(Parameters):
     """
 
     distance_gain_j: Positive = 0.917
-    """K_0, N m: the push is K_0/c. Not the K_0 of Han's laws."""
+    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
     damping_n_s_m: Damping = 0.8
     """D_0, N s/m."""
 

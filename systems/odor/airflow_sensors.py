@@ -28,7 +28,7 @@ class AirflowParameters(Parameters):
     """The two wires; unit, gain and direction pattern are not printed."""
 
     gain_s_m: Positive = 3.0
-    """k: reading of a sensor that the wind meets squarely, a m/s."""
+    """k: reading of a sensor that the wind meets squarely, a m/s: s/m."""
     lobe: Literal["cosine", "crosswind"] = "cosine"
     """``cosine``: each feels what blows at it, 45 deg to either side; ``crosswind``:
     wires along the robot's axis, beside a partition, feel the wind across if it comes

@@ -91,7 +91,7 @@ class GasSensorParameters(Parameters):
     slope_mismatch: float = Field(default=0.03, ge=0.0, le=0.15)
     """That of each sensor's exponent, drawn once."""
     drift_per_h: float = Field(default=0.0, ge=-0.03, le=0.03)
-    """Growth of all readings, as a share an hour."""
+    """Growth of all readings, as a share an hour, 1/h."""
     faults: Annotated[
         tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
     ] = ()

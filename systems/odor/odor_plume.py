@@ -84,7 +84,7 @@ class OdorParameters(Parameters):
     height_m: NonNegativeLength = 0.0
     """H, above the floor, m."""
     puffs_per_s: float = Field(default=16.0, ge=1.0, le=50.0)
-    """Puffs released a second; 320 are kept, which at 1 m/s reach 6 m."""
+    """Puffs released a second, 1/s; 320 are kept, which at 1 m/s reach 6 m."""
     level_growth: float = Field(default=0.12, ge=1e-3, le=1.0)
     """Growth of a puff's level spread with its way."""
     upright_growth: float = Field(default=0.13, ge=1e-3, le=1.0)

@@ -137,7 +137,11 @@ class UltrasonicParameters(Parameters):
             )
         return self
 
-    @field_validator("axes_deg", mode="before")
+    @field_validator(
+        "axes_deg",
+        mode="before",
+        json_schema_input_type=_Axes | Annotated[int, Field(ge=1, le=360)],
+    )
     @classmethod
     def _ring(cls, axes: Any) -> Any:
         """So many directions all around, one of them ahead."""

@@ -12,6 +12,7 @@ import soundfile
 from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
+from systems.framework.input_files import require_file
 
 __all__ = ["MOST_SAMPLES", "read_sound"]
 
@@ -48,12 +49,8 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
             in every channel or not finite; holds more than ``MOST_SAMPLES``; or
             has a rate outside 1 to 400 kHz.
     """
-    path = Path(path)
+    path = require_file(path, field, "WAV or FLAC")
     where = repr(str(path))
-    if not path.is_file():
-        raise InputError(
-            field, f"{where} is not a file; give the path of a WAV or FLAC file"
-        )
     if path.stat().st_size == 0:
         raise InputError(field, f"{where} is empty; record or copy it again")
     try:

@@ -291,7 +291,7 @@ PAIR = "robots={a: {}, b: {start: {position_m: [-2, 0]}}}"
             [PAIR, "obstacles=[{name: b}]"],
             r"obstacles: the name 'b' is taken; give each",
         ),
-        (["robots={A b: {}}"], r"robots\.A b\.\[key\]: is 'A b'; string should match"),
+        (["robots={A b: {}}"], r"robots\.A b: is 'A b'; string should match"),
         ([PAIR, "robots.b.lawn=none"], r"robots\.b\.lawn: is not a field .*'law'"),
         ([PAIR, "robots.b.law=3"], r"robots\.b\.law: is 3; input should be a valid"),
         (

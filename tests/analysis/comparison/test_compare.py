@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from analysis.comparison.compare import (
-    EXPERIMENTS,
     comparison_plan,
     comparison_plans,
-    library_layouts,
     prepare_comparison,
 )
 from analysis.comparison.report import (
@@ -19,6 +17,7 @@ from analysis.comparison.report import (
     compare_text,
     write_comparison,
 )
+from analysis.comparison.words import EXPERIMENTS, library_layouts
 from analysis.sweeps.plan import load_sweep
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError

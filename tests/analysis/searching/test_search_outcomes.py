@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 from scipy.stats import binomtest
 
-from analysis.comparison.compare import library_layouts
+from analysis.comparison import library_layouts
 from analysis.searching import search_outcomes, search_runs
 
 

@@ -245,5 +245,5 @@ def test_bad_plan_is_refused(tmp_path, changes, field, hint):
 def test_unreadable_file_is_refused(tmp_path, text, hint):
     with pytest.raises(InputError, match=hint):
         load_sweep(written(tmp_path / "sweep.yaml", text))
-    with pytest.raises(InputError, match="check the path"):
+    with pytest.raises(InputError, match="give the path of a YAML file"):
         load_sweep(tmp_path / "missing.yaml")

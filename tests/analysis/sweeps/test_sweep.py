@@ -128,6 +128,7 @@ def test_directory_holds_the_plan_and_one_table(tmp_path, undisturbed):
     assert {path.name for path in out.iterdir()} == {
         "sweep.yaml",
         "scenario.yaml",
+        "scenario.schema.json",
         "sweep.json",
         "runs.parquet",
     }

@@ -6,17 +6,24 @@ from argparse import Namespace
 
 from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
-from analysis.commands.listing import listing
+from analysis.commands.discovery.listing import listing
 
 __all__ = ["COMMAND"]
 
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
-    from systems.laws.catalogue import LAWS
+    from diagrams.fields import known_laws
 
-    return listing(
-        "laws", "title", lambda: {name: law.title for name, law in LAWS.items()}
-    )
+    return listing("laws", "title", known_laws)
 
 
-COMMAND = Command("laws", "list the laws that can be named", take_json, _prepare)
+COMMAND = Command(
+    "laws",
+    "list the laws that can be named",
+    take_json,
+    _prepare,
+    examples=(
+        "laws",
+        "laws --json",
+    ),
+)

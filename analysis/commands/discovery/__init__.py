@@ -1,0 +1,3 @@
+"""Commands that tell what there is: scenarios, laws, fields, and the installation."""
+
+__all__: list[str] = []

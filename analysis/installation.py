@@ -1,0 +1,151 @@
+"""What of an installation works, and how to mend what does not."""
+
+from __future__ import annotations
+
+import importlib
+import os
+import platform
+import shutil
+import sys
+import webbrowser
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+from typing import Literal
+
+__all__ = ["Diagnosis", "examine"]
+
+#: A run's files take some MB, compiled code some hundred.
+LEAST_FREE_MB = 500
+#: Packages by the module whose loading shows that they work.
+_PACKAGES = {
+    "drake": "pydrake.systems.framework",
+    "numpy": "numpy",
+    "numba": "numba",
+    "scipy": "scipy.fft",
+    "rocket-fft": "rocket_fft",
+    "pandas": "pandas",
+    "pyarrow": "pyarrow",
+    "pydantic": "pydantic",
+    "pyroomacoustics": "pyroomacoustics",
+    "soundfile": "soundfile",
+    "matplotlib": "matplotlib",
+}
+_ROOT = Path(__file__).resolve().parents[1]
+_BROWSERS = ("chromium", "google-chrome", "chromium-browser", "firefox")
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """One thing that was looked at."""
+
+    name: str
+    verdict: Literal["ok", "note", "bad"]
+    """``note``: something optional is missing; ``bad``: runs would fail."""
+    found: str
+    remedy: str = ""
+    """What to do; empty: nothing."""
+
+
+def examine() -> list[Diagnosis]:
+    """Looks at everything that runs need, and at what is of use besides.
+
+    Returns:
+        A finding each.
+    """
+    return [
+        _python(),
+        *(_package(name, module) for name, module in _PACKAGES.items()),
+        _compiled_code(),
+        _free_disk(),
+        _sound_card(),
+        _browser(),
+    ]
+
+
+def _python() -> Diagnosis:
+    good = sys.version_info >= (3, 11)
+    found = f"{platform.python_version()} on {platform.system()} {platform.machine()}"
+    remedy = "" if good else "install Python 3.11 or newer"
+    return Diagnosis("python", "ok" if good else "bad", found, remedy)
+
+
+def _package(name: str, module: str) -> Diagnosis:
+    again = f"install it again: pip install --force-reinstall {name}"
+    try:
+        number = version(name)
+        importlib.import_module(module)
+    except PackageNotFoundError:
+        return Diagnosis(name, "bad", "is not installed", f"pip install {name}")
+    except (ImportError, OSError) as error:
+        return Diagnosis(name, "bad", f"{number}, but does not load: {error}", again)
+    return Diagnosis(name, "ok", number)
+
+
+def _compiled_code() -> Diagnosis:
+    from systems.framework.compiling import cache_folder
+
+    folder = cache_folder()
+    beside = folder.is_relative_to(_ROOT)
+    folders = _ROOT.glob("*/**/__pycache__") if beside else [folder]
+    files = [file for each in folders for file in each.glob("**/*.nb[ci]")]
+    size_mb = sum(file.stat().st_size for file in files) / 1e6
+    where = f"beside the code in {_ROOT}" if beside else f"in {folder}"
+    found = f"{len(files)} files, {size_mb:.0f} MB, {where}"
+    remedy = "set NUMBA_CACHE_DIR to a folder that can be written"
+    if folder.name.startswith("phonotaxis-numba-"):
+        return Diagnosis("compiled code", "note", "is kept by no folder", remedy)
+    if not os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK):
+        return Diagnosis("compiled code", "bad", f"{found}, read-only", remedy)
+    return Diagnosis("compiled code", "ok", found)
+
+
+def _free_disk() -> Diagnosis:
+    free_mb = shutil.disk_usage(Path.cwd()).free / 1e6
+    found = f"{free_mb / 1e3:.1f} GB free here"
+    if not os.access(Path.cwd(), os.W_OK):
+        remedy = "go where files can be written, or use --out"
+        return Diagnosis("disk", "note", f"{found}, but read-only", remedy)
+    if free_mb < LEAST_FREE_MB:
+        return Diagnosis("disk", "bad", found, f"make {LEAST_FREE_MB} MB free")
+    return Diagnosis("disk", "ok", found)
+
+
+def _sound_card() -> Diagnosis:
+    try:
+        sounddevice = importlib.import_module("sounddevice")
+    except (ImportError, OSError) as error:
+        return Diagnosis(
+            "sound card",
+            "note",
+            f"cannot be asked ({error})",
+            "phonotaxis listen takes a pipe; for a card: pip install 'phonotaxis[live]'"
+            " and PortAudio",
+        )
+    inputs = [
+        each for each in sounddevice.query_devices() if each["max_input_channels"]
+    ]
+    if not inputs:
+        remedy = "phonotaxis listen takes a pipe"
+        return Diagnosis("sound card", "note", "none that records", remedy)
+    most = max(inputs, key=_channels)
+    return Diagnosis("sound card", "ok", f"{most['name']}, {_channels(most)} channels")
+
+
+def _channels(device: dict[str, int]) -> int:
+    return device["max_input_channels"]
+
+
+def _browser() -> Diagnosis:
+    found = next(filter(None, map(shutil.which, _BROWSERS)), None)
+    if found is None:
+        try:
+            found = webbrowser.get().name
+        except webbrowser.Error:
+            return Diagnosis(
+                "browser",
+                "note",
+                "none found",
+                "copy replay.html and reports to where one is",
+            )
+    return Diagnosis("browser", "ok", found)

@@ -1,0 +1,72 @@
+"""What a mistyped name is most like."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any
+
+from diagrams.fields.schema_walk import at_place, leaf_paths
+from systems.framework.input_error import InputError
+
+__all__ = ["did_you_mean", "near_field", "unknown_law"]
+
+
+def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
+    """The end of a message that names what is most like a name.
+
+    Args:
+        name: What was given.
+        known: What could be.
+        most: So many are named at most.
+
+    Returns:
+        Empty where nothing is like it.
+    """
+    by_folded = {each.casefold(): each for each in known}
+    near = get_close_matches(name.casefold(), by_folded, n=most)
+    if not near:
+        return ""
+    return f" (did you mean {' or '.join(repr(by_folded[each]) for each in near)}?)"
+
+
+def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
+    """``did_you_mean`` of a field that is none.
+
+    Args:
+        schema: JSON Schema of the whole.
+        place: Parts of its path.
+
+    Returns:
+        A field at the same place; without one, a field of that name elsewhere.
+    """
+    *parents, last = place
+    here = did_you_mean(last, at_place(schema, parents))
+    return here or _elsewhere(schema, last)
+
+
+def unknown_law(name: str, known: Collection[str], field: str = "law") -> InputError:
+    """The error of a law that there is not.
+
+    Args:
+        name: What was given.
+        known: What could be.
+        field: Where.
+
+    Returns:
+        The error, to be raised.
+    """
+    near = did_you_mean(name, known)
+    return InputError(
+        field,
+        f"{name!r} is not known; use {', '.join(known)}, or file.py:Name{near}",
+    )
+
+
+def _elsewhere(schema: Mapping[str, Any], name: str) -> str:
+    """One of that name, or of that name and a unit: those are often left out."""
+    paths = list(leaf_paths(schema))
+    named = [path for path in paths if path[-1] == name]
+    found = named or [path for path in paths if path[-1].startswith(f"{name}_")]
+    shortest = min(map(".".join, found), key=len, default="")
+    return f" (did you mean {shortest!r}?)" if shortest else ""

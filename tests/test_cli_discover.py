@@ -1,0 +1,150 @@
+"""What a new user finds out from the command line alone."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import subprocess
+from importlib.metadata import version
+
+import pytest
+
+import phonotaxis
+from analysis import installation
+from analysis.commands.command_line import COMMANDS, make_parser
+from diagrams import library_scenarios, load_scenario
+from diagrams.fields import schema_text
+
+
+def call(capsys, *words: str) -> tuple[int, str, str]:
+    status = phonotaxis.main(words)
+    printed = capsys.readouterr()
+    return status, printed.out, printed.err
+
+
+def test_fields(capsys):
+    status, out, _ = call(capsys, "fields", "room.reverb")
+    assert status == 0
+    assert out.startswith(
+        "room.reverberation_time_s = 0.4 s  (number, from 0.001 to 20)"
+    )
+    listed = json.loads(call(capsys, "fields", "room.reverb", "--json")[1])["fields"]
+    assert [(each["path"], each["unit"]) for each in listed] == [
+        ("room.reverberation_time_s", "s")
+    ]
+    assert call(capsys, "fields", "--schema")[1] == schema_text()
+    status, out, complaint = call(capsys, "fields", "reverberatoin_time_s")
+    assert (status, out) == (2, "")
+    assert "did you mean 'reverberation_time_s'" in complaint
+
+
+def test_all_faults_are_told_a_line_each(capsys, tmp_path):
+    words = ["simulate", "--set", "room.reverberation_time=1", "--set", "seed=x"]
+    status, out, complaint = call(capsys, *words)
+    assert (status, out) == (2, "")
+    seed, room = complaint.splitlines()
+    assert seed.startswith("phonotaxis: seed: is 'x'")
+    assert room.endswith("remove it (did you mean 'reverberation_time_s'?)")
+    document = json.loads(call(capsys, *words, "--json")[1])
+    assert document["error"] == document["errors"][0]
+    assert [each["field"] for each in document["errors"]] == [
+        "seed",
+        "room.reverberation_time",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["simulat"], "simulate"),
+        (["simulate", "--velocity-therm", "printed"], "--velocity-term"),
+        (["simulate", "two_static_obstacle"], "two_static_obstacles"),
+        (["simulate", "--law", "activ"], "active"),
+        (["simulate", "--set", "source.spee_m_s=1"], "speed_m_s"),
+    ],
+)
+def test_near_misses_are_named(capsys, words, meant):
+    status, _, complaint = call(capsys, *words)
+    assert status == 2
+    assert f"did you mean {meant!r}?" in complaint
+
+
+def test_examples_of_the_help_are_commands():
+    for command in COMMANDS.values():
+        assert command.examples, command.name
+        for example in command.examples:
+            words = example.partition(" > ")[0].replace("'", "").split()
+            assert make_parser().parse_args(words).command == command.name
+
+
+def test_version(capsys):
+    with pytest.raises(SystemExit) as left:
+        phonotaxis.main(["--version"])
+    assert left.value.code == 0
+    assert capsys.readouterr().out == f"phonotaxis {version('phonotaxis')}\n"
+
+
+def test_doctor(capsys, monkeypatch):
+    status, out, _ = call(capsys, "doctor", "--json")
+    document = json.loads(out)
+    assert (status, document["ok"]) == (0, True)
+    found = {each["name"]: each for each in document["findings"]}
+    assert found["drake"]["found"] == version("drake")
+    assert {"python", "numba", "compiled code", "disk", "sound card", "browser"} <= {
+        *found
+    }
+    monkeypatch.setattr(installation, "LEAST_FREE_MB", 1e12)
+    status, out, complaint = call(capsys, "doctor")
+    assert status == 1
+    assert "BAD  disk" in out
+    assert "not ready: disk" in complaint
+
+
+def completed(script: str, *words: str) -> set[str]:
+    """What bash offers for the last of some words."""
+    line = " ".join(f"'{word}'" for word in words)
+    code = (
+        f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}\n"
+        "_shtab_phonotaxis\nprintf '%s\\n' \"${COMPREPLY[@]}\""
+    )
+    ran = subprocess.run(
+        ["bash", "--norc", "-c", code], capture_output=True, text=True, check=True
+    )
+    return set(ran.stdout.split())
+
+
+def test_bash_completes_commands_options_scenarios_and_laws(
+    capsys, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "two_of_mine.yaml").touch()
+    script = call(capsys, "completion", "bash")[1]
+    assert completed(script, "phonotaxis", "s") == {
+        name for name in COMMANDS if name.startswith("s")
+    }
+    assert completed(script, "phonotaxis", "simulate", "two_") == {
+        "two_of_mine.yaml",
+        *(name for name in library_scenarios() if name.startswith("two_")),
+    }
+    assert completed(script, "phonotaxis", "simulate", "--velo") == {"--velocity-term"}
+    assert "active2017" in completed(script, "phonotaxis", "simulate", "--law", "act")
+
+
+@pytest.mark.parametrize("shell", ["zsh", "fish"])
+def test_other_shells_complete_scenarios(capsys, shell):
+    status, script, _ = call(capsys, "completion", shell)
+    assert status == 0
+    assert "_phonotaxis_scenario_or_file" in script
+    assert "two_static_obstacles" in script
+    if program := shutil.which(shell):
+        subprocess.run([program, "-n"], input=script, text=True, check=True)
+
+
+def test_result_directory_has_what_an_editor_needs(tmp_path):
+    from diagrams import write_scenario
+
+    write_scenario(load_scenario("u_trap"), tmp_path)
+    first = (tmp_path / "scenario.yaml").read_text().partition("\n")[0]
+    assert first == "# yaml-language-server: $schema=scenario.schema.json"
+    assert (tmp_path / "scenario.schema.json").read_text() == schema_text()
+    assert load_scenario(tmp_path / "scenario.yaml") == load_scenario("u_trap")

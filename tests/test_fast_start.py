@@ -1,0 +1,90 @@
+"""To list what there is and to refuse bad input loads nothing that simulates."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import subprocess
+import sys
+from pathlib import Path
+
+import phonotaxis
+from benchmarks.start import LATE_REFUSAL, REFUSALS
+
+ROOT = Path(phonotaxis.__file__).parent
+HEAVY = {"pydrake", "numba", "numpy", "scipy", "pandas", "matplotlib", "pydantic"}
+TELLING = """
+import contextlib, io, json, sys
+import phonotaxis
+told = []
+for words in json.loads(sys.argv[1]):
+    with contextlib.redirect_stdout(io.StringIO()):
+        with contextlib.redirect_stderr(io.StringIO()):
+            status = phonotaxis.main(words)
+    told.append([words, status, [*{name.partition(".")[0] for name in sys.modules}]])
+print(json.dumps(told))
+"""
+
+
+def loaded_by(
+    tmp_path: Path, *commands: tuple[str, ...]
+) -> list[tuple[list[str], int, list[str]]]:
+    """Words, exit status and top-level modules after each of some commands."""
+
+    ran = subprocess.run(
+        [sys.executable, "-c", TELLING, json.dumps(commands)],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    told: list[tuple[list[str], int, list[str]]] = json.loads(ran.stdout)
+    return told
+
+
+def test_lists_load_nothing_that_simulates(tmp_path):
+    lists = [("scenarios",), ("fields", "room"), ("laws",), ("completion", "bash")]
+    for words, status, modules in loaded_by(tmp_path, *lists):
+        assert status == 0, words
+        assert not HEAVY & set(modules), words
+
+
+def test_refusals_load_nothing_that_simulates(tmp_path):
+    for words, status, modules in loaded_by(tmp_path, *REFUSALS):
+        assert status == 2, words
+        assert not HEAVY & set(modules), words
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_terminal_is_told_what_begins_before_it_is_loaded(tmp_path):
+    terminal, other_end = pty.openpty()
+    with subprocess.Popen(
+        [sys.executable, "-X", "importtime", "-m", "phonotaxis", *LATE_REFUSAL],
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stderr=other_end,
+        stdout=subprocess.DEVNULL,
+    ) as process:
+        os.close(other_end)
+        shown = b""
+        try:
+            while part := os.read(terminal, 65_536):
+                shown += part
+        except OSError:  # the terminal's other end is closed
+            pass
+    os.close(terminal)
+    assert process.returncode == 2
+    first = shown.index(b"phonotaxis: simulating default ...")
+    assert first < shown.index(b"pydrake") < shown.index(b"phonotaxis: tick_s: ")
+
+
+def test_no_plots_and_the_last_line(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    words = ["simulate", "--no-plots", "--out", "out", "--set", "duration_s=0.1"]
+    assert phonotaxis.main([*words, "--set", "hearing=ideal"]) == 0
+    assert not [*(tmp_path / "out").glob("*.png"), *(tmp_path / "out").glob("*.svg")]
+    last = capsys.readouterr().out.splitlines()[-1].split()
+    assert last[:3] == ["replay", "out/replay.html,", "to"]
+    assert (tmp_path / "out/replay.html").is_file()
