@@ -22,6 +22,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
 __all__ = [
+    "COLOURS_CSS",
     "ZERO",
     "Cell",
     "Judged",
@@ -39,7 +40,10 @@ __all__ = [
     "table",
 ]
 
-_CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
+_HERE = Path(__file__).parent
+#: Variables with the colours of pages, by day and by night.
+COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
+_CSS = COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")
 
 
 class Judged(NamedTuple):

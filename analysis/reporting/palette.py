@@ -25,6 +25,11 @@ COLOURS = {
     "seen": "#009E73",
     "echoes": "#9A6A00",
     "tracked": "#882255",
+    "interferer": "#7B3F00",
+    "hit": "#C1121F",
+    "law": "#009E73",
+    "wall": "#8A8478",
+    "odor": "#772266",
 }
 #: Of several robots, in turn.
 ROBOT_COLOURS = (

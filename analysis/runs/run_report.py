@@ -83,9 +83,9 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
         summary: From ``run_summary``.
         directory: Exists.
     """
-    from analysis.runs.block_diagram import write_block_diagram
     from analysis.runs.replay import write_replay
     from analysis.runs.run_plots import plot_time_series, plot_trajectory
+    from analysis.wiring.block_diagram import write_block_diagram
 
     (directory / "scenario.yaml").write_text(
         dump_scenario(result.full_scenario), "utf-8"
@@ -93,9 +93,10 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     write_json(summary, directory / "summary.json")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
+    clearance = {name: Proximity(o).clearance for name, o in result.robots.items()}
     for name, own in result.robots.items():
         ending = f"_{name}" if result.several else ""
-        figure = plot_time_series(own, Proximity(own).clearance)
+        figure = plot_time_series(own, clearance[name])
         figure.savefig(directory / f"time_series{ending}.png", dpi=150)
     follower = build_sound_follower(result.full_scenario)
     write_block_diagram(
@@ -104,7 +105,7 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
     if result.several:
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
-    write_replay(result, directory / "replay.html")
+    write_replay(result, directory / "replay.html", clearance)
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:

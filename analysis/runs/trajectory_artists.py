@@ -205,7 +205,7 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         look: The robot's run, colours and labels.
     """
     result, columns = look.result, look.result.columns
-    if "target_valid" not in columns:
+    if "target_valid" not in columns or "detected" not in columns:
         return
     heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
     if not heard.any():
