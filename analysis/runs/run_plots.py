@@ -24,6 +24,7 @@ from analysis.runs.trajectory_artists import (
     draw_known_space,
     draw_obstacles,
     draw_robot,
+    draw_room,
     draw_sources,
     times_apart,
 )
@@ -70,6 +71,7 @@ def plot_trajectory(result: RunResult) -> Figure:
         else:
             # What the cones have seen: they would hide it.
             draw_known_space(axes, look, known)
+    draw_room(axes, result)
     draw_obstacles(axes, result)
     if result.full_scenario.odor is not None:
         _draw_odor(axes, result)

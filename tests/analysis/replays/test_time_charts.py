@@ -64,7 +64,9 @@ def test_the_charts_are_plain_json(charts):
 
 
 def test_phases_of_a_search_keep_their_names():
-    result = simulate(load_scenario("odor_search", ["duration_s=3"]))
+    result = simulate(
+        load_scenario("odor_search", ["duration_s=3", "search.rules=song2011"])
+    )
     charts = {chart.title: chart for chart in time_charts(result, {})}
     phase = next(chart for chart in charts.values() if chart.ticks)
     assert [text for _, text in phase.ticks or []] == [
