@@ -10,7 +10,8 @@ from analysis.comparison.compare import (
 from analysis.comparison.laws_in_pairs import compare_runs
 from analysis.comparison.mechanisms import failure_mechanisms
 from analysis.comparison.paired_statistics import paired_median, paired_rate
-from analysis.comparison.report import compare_summary, compare_text, write_comparison
+from analysis.comparison.report import compare_summary, write_comparison
+from analysis.comparison.report_text import compare_text
 
 __all__ = [
     "CLAIMS",

@@ -30,12 +30,14 @@ __all__ = [
     "definitions",
     "equation",
     "figure_html",
+    "file_links",
     "heading",
     "links",
     "note",
     "number",
     "page",
     "paragraph",
+    "picture",
     "section",
     "table",
 ]
@@ -212,7 +214,39 @@ def figure_html(figure: Figure, name: str, caption: str) -> str:
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
     drawing = _embed(stream.getvalue(), name, caption)
-    return f"<figure>{drawing}<figcaption>{_inline(caption)}</figcaption></figure>"
+    return _figure(drawing, caption)
+
+
+def picture(file: str, caption: str) -> str:
+    """A picture that lies beside the page, as wide as the page.
+
+    Args:
+        file: Its name, in the page's directory.
+        caption: Stands below.
+
+    Returns:
+        HTML; the picture leads to its file.
+    """
+    label, source = html.escape(caption.replace("`", "")), html.escape(file)
+    image = f'<a href="{source}"><img src="{source}" alt="{label}"></a>'
+    return _figure(image, caption)
+
+
+def _figure(drawing: str, caption: str) -> str:
+    """A wide drawing scrolls by itself."""
+    return (
+        f'<figure><div class="drawing">{drawing}</div>'
+        f"<figcaption>{_inline(caption)}</figcaption></figure>"
+    )
+
+
+def file_links(files: Iterable[tuple[str, str]]) -> str:
+    """A list of files that lie beside the page, given as name and what is in it."""
+    lines = [
+        f'<li><a href="{html.escape(name)}">{html.escape(name)}</a>: {_inline(text)}'
+        for name, text in files
+    ]
+    return f"<ul>{'</li>'.join([*lines, ''])}</ul>"
 
 
 def equation(tex: str, name: str, text: str) -> str:

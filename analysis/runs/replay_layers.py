@@ -137,6 +137,15 @@ def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         found.append(Layer("walls", "of the room", (COLOURS["wall"],), ("room",)))
     if scenario.odor is not None:
         found.append(Layer("odour", "the plume", (COLOURS["odor"],), ("odor",)))
+    lamps = [
+        path
+        for name, robot in paths.items()
+        if result.robots[name].scenario.searches is not None
+        for path in (f"{robot}/lamp", f"{robot}/radio")
+    ]
+    if lamps:
+        text = "grey rests, yellow senses, blue moves, green found, orange gave up"
+        found.append(Layer("lamps", text, (COLOURS["sound"],), tuple(lamps)))
     adaptive = [
         f"{paths[name]}/{gain}"
         for name, own in result.robots.items()

@@ -16,7 +16,7 @@ from diagrams import RunResult, build_sound_follower, dump_scenario
 from diagrams.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
-__all__ = ["run_summary", "summary_text", "write_run"]
+__all__ = ["run_summary", "summary_rows", "summary_text", "write_run"]
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
@@ -74,9 +74,9 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
 
     ``scenario.yaml`` (effective, can be run again), ``summary.json``,
     ``trajectory.parquet``, ``trajectory.png``, ``time_series.png``,
-    ``diagram.svg`` and ``replay.html``. Of several robots each has its own
-    ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows
-    how they are joined.
+    ``diagram.svg``, ``replay.html``, and ``report.html``, which shows all of them. Of
+    several robots each has its own ``time_series_<name>.png`` and
+    ``diagram_<name>.svg``, and ``diagram.svg`` shows how they are joined.
 
     Args:
         result: The run.
@@ -84,6 +84,7 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
         directory: Exists.
     """
     from analysis.runs.replay import write_replay
+    from analysis.runs.run_page import run_page
     from analysis.runs.run_plots import plot_time_series, plot_trajectory
     from analysis.wiring.block_diagram import write_block_diagram
 
@@ -106,6 +107,10 @@ def write_run(result: RunResult, summary: dict[str, Any], directory: Path) -> No
         for name, parts in follower.robots.items():
             write_block_diagram(parts.diagram, directory / f"diagram_{name}.svg")
     write_replay(result, directory / "replay.html", clearance)
+    rows = summary_rows(result, summary)
+    (directory / "report.html").write_text(
+        run_page(result, rows, summary, directory), "utf-8"
+    )
 
 
 def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
@@ -117,6 +122,22 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
 
     Returns:
         Lines without an end of line after the last one.
+    """
+    return "\n".join(
+        f"{name.split('.')[-1]:<21} {value}"
+        for name, value in summary_rows(result, summary).items()
+    )
+
+
+def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
+    """What one screen tells of a run, as words by name.
+
+    Args:
+        result: The run.
+        summary: From ``run_summary``.
+
+    Returns:
+        Of several robots, what one did is named by it, a dot, and what it is.
     """
     timing = summary["timing"]
     scenario = result.full_scenario
@@ -133,9 +154,7 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
         rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.law}"}
         rows |= _robot_rows(own, summary["metrics"], f"{name}.")
     rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
-    return "\n".join(
-        f"{name.split('.')[-1]:<21} {value}" for name, value in rows.items()
-    )
+    return rows
 
 
 def _ended(result: RunResult) -> str:
