@@ -195,13 +195,14 @@ def _inline(text: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 
-def figure_html(figure: Figure, name: str, caption: str) -> str:
+def figure_html(figure: Figure, name: str, caption: str, *, scale: bool = False) -> str:
     """A figure as inline SVG.
 
     Args:
         figure: Drawn with matplotlib.
         name: Unlike that of any other figure on the page; letters, digits, _.
         caption: Stands below.
+        scale: Whether lightness tells how much, so that it stays by night.
 
     Returns:
         HTML, the same at every run.
@@ -214,7 +215,7 @@ def figure_html(figure: Figure, name: str, caption: str) -> str:
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
     drawing = _embed(stream.getvalue(), name, caption)
-    return _figure(drawing, caption)
+    return _figure(drawing, caption, "scale" if scale else "")
 
 
 def picture(file: str, caption: str) -> str:
@@ -232,10 +233,11 @@ def picture(file: str, caption: str) -> str:
     return _figure(image, caption)
 
 
-def _figure(drawing: str, caption: str) -> str:
+def _figure(drawing: str, caption: str, kind: str = "") -> str:
     """A wide drawing scrolls by itself."""
+    opening = f'<figure class="{kind}">' if kind else "<figure>"
     return (
-        f'<figure><div class="drawing">{drawing}</div>'
+        f'{opening}<div class="drawing">{drawing}</div>'
         f"<figcaption>{_inline(caption)}</figcaption></figure>"
     )
 

@@ -35,6 +35,7 @@ __all__ = [
     "Panel",
     "clearance_panel",
     "heard_bursts",
+    "map_axes",
     "plot_time_series",
     "plot_trajectory",
     "time_panels",
@@ -61,7 +62,7 @@ def plot_trajectory(result: RunResult) -> Figure:
     are drawn where a frame was heard, faint ones early, strong ones late. Of a
     guarded robot, what it knew of the floor at the end stands for the cones.
     """
-    figure, axes = _map(result)
+    figure, axes = map_axes(result)
     draw_grid(axes)
     axes.set_title(_title(result), fontsize=11)
     for look in looks(result):
@@ -135,11 +136,17 @@ def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
     return sound_bursts(sound, result.simulated_s)
 
 
-def _map(result: RunResult) -> tuple[Figure, Axes]:
+def map_axes(result: RunResult) -> tuple[Figure, Axes]:
     """Axes to one scale that hold all bodies, with room below for the legend.
 
     The picture is never taller or flatter than can be read: instead, more of
     the floor is shown.
+
+    Args:
+        result: The run.
+
+    Returns:
+        The figure, and its axes in W, m.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN

@@ -343,7 +343,10 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
         ),
         *(
             figure_html(
-                plot_chart(chart), f"{name}-chart{k}", f"Growth: {chart.title}."
+                plot_chart(chart),
+                f"{name}-chart{k}",
+                f"Growth: {chart.title}.",
+                scale=True,
             )
             for k, chart in enumerate(data.charts)
         ),
