@@ -89,16 +89,12 @@ class MovieFile:
     def _write_gif(self, frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
         from PIL import Image
 
-        # One palette for all pictures, so that colours do not flicker.
-        images = iter(Image.fromarray(frame) for frame in frames)
-        first = next(images).quantize(128)
-        rest = (
-            image.quantize(palette=first, dither=Image.Dither.NONE) for image in images
-        )
+        images = (Image.fromarray(frame).quantize(128) for frame in frames)
+        first = next(images)
         first.save(
             path,
             save_all=True,
-            append_images=rest,
+            append_images=images,
             duration=round(1000.0 / self.frames_per_s),
             loop=0,
         )
