@@ -160,7 +160,6 @@ WIDTHS = (390, 1100, 1400)
 _AXE_RULES = (
     "color-contrast",
     "scrollable-region-focusable",
-    "focus-order-semantics",
     "tabindex",
     "button-name",
     "link-name",

@@ -2,7 +2,7 @@
 
 Plain functions from text to HTML: each takes plain text, which it escapes, and
 returns a string of HTML; whatever takes HTML says so. Nothing on a page needs a
-network, a script or a font of its own.
+network or a font of its own; its only script lets keyboards scroll what is too wide.
 """
 
 from __future__ import annotations
@@ -46,6 +46,15 @@ _HERE = Path(__file__).parent
 #: Variables with the colours of pages, by day and by night.
 COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
 _CSS = COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")
+
+#: What scrolls by itself is reached by the Tab key, and nothing else is.
+_SCRIPT = """
+const reach = () => document.querySelectorAll(".wide, .drawing, .equation").forEach(
+  (box) => box.scrollWidth > box.clientWidth
+    ? box.setAttribute("tabindex", 0) : box.removeAttribute("tabindex"));
+addEventListener("resize", reach);
+reach();
+"""
 
 
 class Judged(NamedTuple):
@@ -338,5 +347,5 @@ def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) 
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
         f"<style>{_CSS}</style></head>\n<body>\n{heading(1, title)}\n"
-        f"<nav><ol>{links}</ol></nav>\n{inner}\n</body></html>\n"
+        f"<nav><ol>{links}</ol></nav>\n{inner}\n<script>{_SCRIPT}</script></body></html>\n"
     )

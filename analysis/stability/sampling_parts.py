@@ -340,6 +340,7 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
             plot_poles_against_period(data.period),
             f"{name}-period",
             "Poles against the sample period.",
+            scale=True,
         ),
         *(
             figure_html(

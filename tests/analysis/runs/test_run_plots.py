@@ -343,3 +343,10 @@ def test_robots_know_each_its_own_floor():
         known = known_space(own, own.simulated_s)
         assert known is not None
         assert layer.get_extent() == pytest.approx(known.extent)
+
+
+def test_a_robot_on_a_route_which_hears_nothing_has_its_goal_and_target():
+    result = simulate(load_scenario("robots_2", ["duration_s=1"]))
+    labels = plot_trajectory(result).axes[0].get_legend_handles_labels()[1]
+    assert {"goals", "paths of the targets"} <= set(labels)
+    assert not [label for label in labels if "estimates" in label]
