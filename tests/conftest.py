@@ -7,7 +7,9 @@ import os
 import shutil
 import subprocess
 from collections.abc import Callable, Iterator
+from itertools import product
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import numpy as np
@@ -133,6 +135,107 @@ def chromium(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., str]:
         return "".join(line for line in lines if "source: chrome://" not in line)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def browser() -> Iterator[Any]:
+    """Chromium by Playwright; its pages have no network."""
+    from playwright.sync_api import sync_playwright
+
+    executable = shutil.which("chromium")
+    if executable is None:
+        pytest.fail("chromium is not on PATH; install the package chromium")
+    arguments = [flag for flag in _CHROMIUM_FLAGS if "headless" not in flag]
+    with sync_playwright() as playwright:
+        opened = playwright.chromium.launch(
+            executable_path=executable, args=[*arguments, "--disable-gpu"]
+        )
+        yield opened
+        opened.close()
+
+
+#: Widths at which pages must do, in pixels: a telephone, two windows.
+WIDTHS = (390, 1100, 1400)
+#: Of axe-core: contrast after WCAG 2.2 AA, 4.5 to 1, and what a keyboard needs.
+_AXE_RULES = (
+    "color-contrast",
+    "scrollable-region-focusable",
+    "tabindex",
+    "button-name",
+    "link-name",
+    "label",
+    "select-name",
+    "image-alt",
+    "svg-img-alt",
+    "html-has-lang",
+    "document-title",
+)
+#: What a page lets one do, as long as it can be seen.
+_CONTROLS = """() => [...document.querySelectorAll(
+    "a[href], button, select, input, textarea, [tabindex='0']")]
+    .filter((e) => e.checkVisibility() && !e.disabled)"""
+
+
+@pytest.fixture(scope="session")
+def check_page(browser: Any) -> Callable[..., None]:
+    """``check_page(path, ready)``: a page does, at all widths, by day and by night.
+
+    No error on the console, nothing beside the window, contrast and names as axe-core
+    wants them, every control reached by the Tab key, and nothing loaded from
+    elsewhere. ``ready`` is a selector that is there once the page's script is.
+    """
+    from axe_playwright_python.sync_playwright import Axe
+
+    axe = Axe()
+
+    def check(path: Path, ready: str = "body") -> None:
+        for width, scheme in product(WIDTHS, ("light", "dark")):
+            context = browser.new_context(
+                viewport={"width": width, "height": 844},
+                color_scheme=scheme,
+                reduced_motion="reduce",
+                offline=True,
+            )
+            page, where = context.new_page(), f"{width} px, {scheme}"
+            wrong: list[str] = []
+            page.on("pageerror", lambda error, wrong=wrong: wrong.append(str(error)))
+            page.on(
+                "console",
+                lambda said, wrong=wrong: (
+                    wrong.append(said.text) if said.type == "error" else None
+                ),
+            )
+            page.goto(path.as_uri())
+            page.wait_for_selector(ready, state="attached")
+            wide = page.evaluate("document.documentElement.scrollWidth")
+            assert wide <= width, where
+            found = axe.run(page, options={"runOnly": [*_AXE_RULES]}).response
+            assert not found["violations"], (where, found["violations"])
+            if scheme == "light":
+                _check_keyboard(page, where)
+            assert not wrong, where
+            context.close()
+
+    return check
+
+
+def _check_keyboard(page: Any, where: str) -> None:
+    """Tab comes to every control, and each shows that it has been reached."""
+    controls = page.evaluate(f"({_CONTROLS})().length")
+    page.evaluate(f"({_CONTROLS})().forEach((e, k) => e.dataset.control = k)")
+    reached: set[str] = set()
+    for _ in range(controls + 60):
+        page.keyboard.press("Tab")
+        control, shown = page.evaluate(
+            """() => { const e = document.activeElement, s = getComputedStyle(e);
+            return [e.dataset.control ?? "", s.outlineStyle !== "none"]; }"""
+        )
+        if control:
+            assert shown, (where, control)
+            reached.add(control)
+        if len(reached) == controls:
+            return
+    pytest.fail(f"{where}: Tab reaches {len(reached)} of {controls} controls")
 
 
 @pytest.fixture(scope="session")

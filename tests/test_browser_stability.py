@@ -42,6 +42,12 @@ def test_opens_without_a_word_on_the_console(
     assert np.median(picture) > 0.95
 
 
+def test_it_does_at_all_widths_by_day_and_by_night(
+    report: Path, check_page: Callable[..., None]
+) -> None:
+    check_page(report)
+
+
 def test_a_script_that_fails_would_be_seen(
     chromium: Callable[..., str], tmp_path: Path
 ) -> None:

@@ -23,7 +23,7 @@ SWEEP = {
 
 
 def test_opens_without_a_word_on_the_console(
-    chromium: Callable[..., str], tmp_path: Path
+    chromium: Callable[..., str], check_page: Callable[..., None], tmp_path: Path
 ) -> None:
     (tmp_path / "sweep.yaml").write_text(json.dumps(SWEEP))
     out = tmp_path / "out"
@@ -39,3 +39,4 @@ def test_opens_without_a_word_on_the_console(
     rows = picture.min(axis=(1, 2)).reshape(8, -1).min(axis=1)
     assert (rows < 0.5).all()
     assert np.median(picture) > 0.95
+    check_page(out / "report.html")

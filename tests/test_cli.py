@@ -227,6 +227,7 @@ def test_json_document_and_result_directory(capsys, tmp_path):
         "time_series.png",
         "diagram.svg",
         "replay.html",
+        "report.html",
     }
 
     again = tmp_path / "again"

@@ -78,11 +78,8 @@ def _prepare(
     say(f"comparing laws in {', '.join(options.scenario or EXPERIMENTS)}")
 
     from analysis.comparison.compare import comparison_plans, prepare_comparison
-    from analysis.comparison.report import (
-        compare_summary,
-        compare_text,
-        write_comparison,
-    )
+    from analysis.comparison.report import compare_summary, write_comparison
+    from analysis.comparison.report_text import compare_text
 
     plans = comparison_plans(
         options.scenario,
@@ -101,7 +98,7 @@ def _prepare(
         summary=lambda found: compare_summary(prepared, *found),
         text=lambda found, summary: compare_text(summary, *found),
         out=prepared.out,
-        write=lambda found, summary: write_comparison(prepared, found[0], summary),
+        write=lambda found, summary: write_comparison(prepared, *found, summary),
         total=prepared.runs,
         unit="runs",
         kept=lambda: prepared.done,

@@ -67,6 +67,12 @@ class SavedAudio:
             # Directories that were made, and stayed empty.
             taken.undo()
 
+    @property
+    def heard(self) -> Path:
+        """What the first robot that listens has heard; the file is closed by then."""
+        assert self._files is not None
+        return self._files.first_heard
+
     def left(self) -> str:
         """What an interrupt leaves, in words; nothing where there is nothing."""
         if self._files is None or self._files.until_s == 0.0:

@@ -21,6 +21,7 @@ from analysis.commands.exporting.files import Exports, take_exports
 from analysis.commands.first_words import say
 from analysis.commands.progress import Progress
 from analysis.commands.saved_audio import SavedAudio
+from analysis.commands.saved_movie import SavedMovie
 
 if TYPE_CHECKING:
     from diagrams import RunResult
@@ -39,6 +40,12 @@ def _add_arguments(parser: ArgumentParser) -> None:
         help="new directory for what the robots hear and the loudspeakers play",
     )
     take_exports(parser)
+    parser.add_argument(
+        "--movie",
+        metavar="FILE",
+        help="new .gif or .mp4 of the run from above; an .mp4 has the microphones' "
+        "sound, and needs ffmpeg",
+    )
     parser.add_argument(
         "--no-plots",
         action="store_true",
@@ -67,6 +74,10 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     saved: SavedAudio | None = None
     if options.save_audio is not None:
         saved = SavedAudio(options.save_audio, place.out, scenario)
+    movie: SavedMovie | None = None
+    if options.movie is not None:
+        movie = SavedMovie(options.movie, scenario, place.directory, saved)
+    listening = movie or saved
     follower = None
     if scenario.engine == "compiled":
         prepared_loop(scenario)
@@ -74,7 +85,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         follower = build_sound_follower(scenario, log=True)
 
     def run(progress: Progress) -> RunResult:
-        with saved.opened() if saved else nullcontext() as audio:
+        with listening.opened() if listening else nullcontext() as audio:
             try:
                 return simulate(
                     scenario, follower=follower, progress=progress, audio=audio
@@ -83,16 +94,20 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
                 raise RunError(str(error)) from error
 
     def summary(result: RunResult) -> dict[str, Any]:
-        audio = {"audio": saved.facts()} if saved else {}
-        return {**run_summary(result, place.out), **audio}
+        extra: dict[str, Any] = {"audio": saved.facts()} if saved else {}
+        if movie is not None:
+            extra["movie"] = options.movie
+        return {**run_summary(result, place.out), **extra}
 
     def text(result: RunResult, document: dict[str, Any]) -> str:
-        lines = [summary_text(result, document), *([saved.text()] if saved else [])]
-        return "\n".join(lines)
+        lines = [summary_text(result, document)]
+        return "\n".join([*lines, *(each.text() for each in (saved, movie) if each)])
 
     def write(result: RunResult, document: dict[str, Any]) -> None:
         write_run(result, document, place.directory, pictures=not options.no_plots)
         exports.write(RecordedRun.of(result), place.directory)
+        if movie is not None:
+            movie.write(result)
 
     return Job(
         run=run,

@@ -13,11 +13,8 @@ if TYPE_CHECKING:
     from analysis.comparison.laws_in_pairs import compare_runs
     from analysis.comparison.mechanisms import failure_mechanisms
     from analysis.comparison.paired_statistics import paired_median, paired_rate
-    from analysis.comparison.report import (
-        compare_summary,
-        compare_text,
-        write_comparison,
-    )
+    from analysis.comparison.report import compare_summary, write_comparison
+    from analysis.comparison.report_text import compare_text
     from analysis.comparison.words import EXPERIMENTS, library_layouts
 else:
     __getattr__, __dir__ = lazy_exports(__name__)

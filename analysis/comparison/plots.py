@@ -18,6 +18,7 @@ from analysis.runs.trajectory_artists import (
     draw_collision,
     draw_obstacles,
     draw_robot,
+    draw_room,
     draw_sources,
 )
 from diagrams import RunResult
@@ -116,6 +117,7 @@ def plot_examples(rows: Sequence[tuple[LawCell, Sequence[RunResult]]]) -> Figure
 
 def _example(axes: Axes, result: RunResult) -> None:
     end = result.simulated_s
+    draw_room(axes, result)
     draw_obstacles(axes, result)
     draw_sources(axes, result, [end])
     for look in looks(result):

@@ -12,6 +12,9 @@ __all__ = ["fact_table", "readable_name", "row_table"]
 #: Endings of names, longest first, and what they stand for.
 _UNITS = {
     "_n_s_m": "N s/m",
+    "_rad_s3": "rad/s\u00b3",
+    "_m_s3": "m/s\u00b3",
+    "_rad_m": "rad/m",
     "_rad_s": "rad/s",
     "_per_s": "1/s",
     "_1_s": "1/s",

@@ -2,7 +2,7 @@
 
 Plain functions from text to HTML: each takes plain text, which it escapes, and
 returns a string of HTML; whatever takes HTML says so. Nothing on a page needs a
-network, a script or a font of its own.
+network or a font of its own; its only script lets keyboards scroll what is too wide.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
 __all__ = [
+    "COLOURS_CSS",
     "ZERO",
     "Cell",
     "Judged",
@@ -29,17 +30,31 @@ __all__ = [
     "definitions",
     "equation",
     "figure_html",
+    "file_links",
     "heading",
     "links",
     "note",
     "number",
     "page",
     "paragraph",
+    "picture",
     "section",
     "table",
 ]
 
-_CSS = (Path(__file__).parent / "html_page.css").read_text("utf-8")
+_HERE = Path(__file__).parent
+#: Variables with the colours of pages, by day and by night.
+COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")
+_CSS = COLOURS_CSS + (_HERE / "html_page.css").read_text("utf-8")
+
+#: What scrolls by itself is reached by the Tab key, and nothing else is.
+_SCRIPT = """
+const reach = () => document.querySelectorAll(".wide, .drawing, .equation").forEach(
+  (box) => box.scrollWidth > box.clientWidth
+    ? box.setAttribute("tabindex", 0) : box.removeAttribute("tabindex"));
+addEventListener("resize", reach);
+reach();
+"""
 
 
 class Judged(NamedTuple):
@@ -191,13 +206,14 @@ def _inline(text: str) -> str:
     return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text, quote=False))
 
 
-def figure_html(figure: Figure, name: str, caption: str) -> str:
+def figure_html(figure: Figure, name: str, caption: str, *, scale: bool = False) -> str:
     """A figure as inline SVG.
 
     Args:
         figure: Drawn with matplotlib.
         name: Unlike that of any other figure on the page; letters, digits, _.
         caption: Stands below.
+        scale: Whether lightness tells how much, so that it stays by night.
 
     Returns:
         HTML, the same at every run.
@@ -210,7 +226,40 @@ def figure_html(figure: Figure, name: str, caption: str) -> str:
             metadata={"Date": None, "Creator": None, "Format": None, "Type": None},
         )
     drawing = _embed(stream.getvalue(), name, caption)
-    return f"<figure>{drawing}<figcaption>{_inline(caption)}</figcaption></figure>"
+    return _figure(drawing, caption, "scale" if scale else "")
+
+
+def picture(file: str, caption: str) -> str:
+    """A picture that lies beside the page, as wide as the page.
+
+    Args:
+        file: Its name, in the page's directory.
+        caption: Stands below.
+
+    Returns:
+        HTML; the picture leads to its file.
+    """
+    label, source = html.escape(caption.replace("`", "")), html.escape(file)
+    image = f'<a href="{source}"><img src="{source}" alt="{label}"></a>'
+    return _figure(image, caption)
+
+
+def _figure(drawing: str, caption: str, kind: str = "") -> str:
+    """A wide drawing scrolls by itself."""
+    opening = f'<figure class="{kind}">' if kind else "<figure>"
+    return (
+        f'{opening}<div class="drawing">{drawing}</div>'
+        f"<figcaption>{_inline(caption)}</figcaption></figure>"
+    )
+
+
+def file_links(files: Iterable[tuple[str, str]]) -> str:
+    """A list of files that lie beside the page, given as name and what is in it."""
+    lines = [
+        f'<li><a href="{html.escape(name)}">{html.escape(name)}</a>: {_inline(text)}'
+        for name, text in files
+    ]
+    return f"<ul>{'</li>'.join([*lines, ''])}</ul>"
 
 
 def equation(tex: str, name: str, text: str) -> str:
@@ -300,5 +349,5 @@ def page(title: str, contents: Iterable[tuple[str, str]], parts: Iterable[str]) 
         '<meta name="viewport" content="width=device-width, initial-scale=1">'
         f'<title>{html.escape(title)}</title><link rel="icon" href="data:,">'
         f"<style>{_CSS}</style></head>\n<body>\n{heading(1, title)}\n"
-        f"<nav><ol>{links}</ol></nav>\n{inner}\n</body></html>\n"
+        f"<nav><ol>{links}</ol></nav>\n{inner}\n<script>{_SCRIPT}</script></body></html>\n"
     )

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = ["COLOURS", "ROBOT_COLOURS", "SERIES_COLOURS", "draw_grid"]
+__all__ = ["COLOURS", "ROBOT_COLOURS", "SERIES_COLOURS", "draw_grid", "luminance"]
 
 #: Okabe and Ito's palette: told apart with any colour vision.
 COLOURS = {
@@ -25,6 +25,11 @@ COLOURS = {
     "seen": "#009E73",
     "echoes": "#9A6A00",
     "tracked": "#882255",
+    "interferer": "#7B3F00",
+    "hit": "#C1121F",
+    "law": "#009E73",
+    "wall": "#8A8478",
+    "odor": "#772266",
 }
 #: Of several robots, in turn.
 ROBOT_COLOURS = (
@@ -50,6 +55,25 @@ SERIES_COLOURS = (
     "#F0E442",
     "#000000",
 )
+
+
+def luminance(colour: Any) -> float:
+    """How light a colour is, 0 to 1, after WCAG 2.2.
+
+    Below 0.18 white letters stand out more than black ones.
+
+    Args:
+        colour: As matplotlib takes it; how transparent it is does not count.
+    """
+    from matplotlib.colors import to_rgb
+
+    linear = [
+        level / 12.92 if level <= 0.04045 else ((level + 0.055) / 1.055) ** 2.4
+        for level in to_rgb(colour)
+    ]
+    return sum(
+        k * level for k, level in zip((0.2126, 0.7152, 0.0722), linear, strict=True)
+    )
 
 
 def draw_grid(axes: Axes, axis: Literal["both", "x", "y"] = "both") -> None:

@@ -2,29 +2,35 @@
 
 from __future__ import annotations
 
-import html
 import logging
 import math
-import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from pydrake.geometry import Meshcat, MeshcatParams
 
 from analysis.plumes.search_panels import call_time
 from analysis.plumes.search_replay import record_searches, record_switch
+from analysis.replays.arrows import record_arrows, scale_m_n
+from analysis.replays.replay_page import ReplayFacts, replay_page
+from analysis.replays.time_charts import Chart, time_chart
 from analysis.reporting.palette import COLOURS
 from analysis.runs import replay_scene
 from analysis.runs.floor_layers import clipped, floor_layers
 from analysis.runs.guarded_motion import guarded_motion
 from analysis.runs.known_space import known_space
+from analysis.runs.replay_layers import replay_layers
 from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
+from analysis.runs.run_plots import clearance_panel, heard_bursts, time_panels
 from analysis.runs.scene import (
     Look,
+    bounds,
+    contact_point,
+    followed_sources,
     lightened,
     looks,
     moving_and_static,
@@ -37,7 +43,14 @@ from diagrams.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.sound.waveforms import SoundParameters
 
-__all__ = ["known_times", "record_run", "ring_at", "wheel_angles", "write_replay"]
+__all__ = [
+    "known_times",
+    "record_run",
+    "ring_at",
+    "time_charts",
+    "wheel_angles",
+    "write_replay",
+]
 
 #: Meshcat records at most so many frames a second.
 FRAMES_PER_S = 32.0
@@ -64,23 +77,34 @@ TRACKED_M = (0.1, 0.2, 0.4, 0.8)
 MOST_CELLS = 30_000_000
 
 
-def write_replay(result: RunResult, path: str | Path) -> None:
+def write_replay(
+    result: RunResult,
+    path: str | Path,
+    clearance: Mapping[str, ArrayLike] | None = None,
+) -> None:
     """Writes a self-contained page that plays the run.
 
     The robot with its microphone bar, wheels and cones (a cone is orange
-    while it has an echo), the obstacles, the source with a ring that grows
-    while it sounds, where the robot takes the source to be (a ball), and both
-    trails. Of a guarded robot also the floor that it knows to be free, dots where
+    while it has an echo), the obstacles, the sources, each with a ring that grows
+    while it sounds, where the robot takes its source to be (a ball), the forces of
+    its law and the way that it commands (arrows), the walls of the room, and
+    trails; what was hit turns red under a star. Of a guarded robot also the floor that
+    it knows to be free, dots where
     echoes came from, and a circle about the place where it could rest by now: the
     edge of what the guard keeps free, grey where it passed what the law commanded,
     orange where it gave less, red where it braked. Of the guarded law also a ring about
     each body that it takes to move, as wide as it is unsure of its place. Of searches
-    also the plume, and a lamp over each robot (``analysis.plumes.search_replay``). The
-    page needs a browser with WebGL, but no network.
+    also the plume, and a lamp over each robot (``analysis.plumes.search_replay``).
+
+    Round the scene: a clock that can be moved, a legend whose layers can be switched
+    off, and curves over time whose cursor follows the clock. ``#t=2.5`` behind the
+    address begins there. The page needs a browser with WebGL, but no network.
 
     Args:
         result: The run.
         path: The .html file.
+        clearance: (n,) distance of each robot to the nearest body at the ticks, m, by
+            its name, for a curve of it; none leaves it out.
 
     Raises:
         OSError: The file cannot be written.
@@ -94,11 +118,47 @@ def write_replay(result: RunResult, path: str | Path) -> None:
         meshcat.PublishRecording()
         page = meshcat.StaticHtml()
         del meshcat
-    title = html.escape(f"{run_title(result)} - replay")
-    page = re.sub(
-        "<title>.*?</title>", lambda _: f"<title>{title}</title>", page, count=1
+    Path(path).write_text(replay_page(page, _facts(result, clearance or {})), "utf-8")
+
+
+def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts:
+    scenario = result.full_scenario
+    paths = {name: robot_path(own, result) for name, own in result.robots.items()}
+    estimates = {name: estimate_path(path) for name, path in paths.items()}
+    sources = [(source_path(scenario, name), name) for name in scenario.all_sources]
+    obstacles = [(f"obstacles/{o.name}", o.name) for o in scenario.obstacles]
+    robots = [(path, name) for name, path in paths.items()]
+    return ReplayFacts(
+        run_title(result),
+        result.simulated_s,
+        bounds(result, margin=0.5),
+        replay_layers(result, paths, estimates),
+        time_charts(result, clearance),
+        [*robots, *sources, *obstacles],
+        robots,
     )
-    Path(path).write_text(page, encoding="utf-8")
+
+
+def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
+    """What ``plot_time_series`` shows of each robot, as data.
+
+    Panels without a curve, as of what a guard did, are left out.
+
+    Args:
+        result: The run.
+        clearance: As of ``write_replay``.
+
+    Returns:
+        Charts, robot after robot.
+    """
+    found = []
+    for name, own in result.robots.items():
+        panels, bursts = time_panels(own), heard_bursts(own)
+        if name in clearance:
+            panels.append(clearance_panel(clearance[name]))
+        robot = name if result.several else ""
+        found += [time_chart(panel, own, robot, bursts) for panel in panels]
+    return [chart for chart in found if chart.series]
 
 
 @contextmanager
@@ -115,14 +175,17 @@ def _quiet_drake() -> Iterator[None]:
 
 def _build_scene(meshcat: Meshcat, result: RunResult) -> None:
     scenario = result.full_scenario
-    replay_scene.add_floor(meshcat, result, run_title(result))
+    replay_scene.add_floor(meshcat, result)
+    replay_scene.add_room(meshcat, scenario)
     replay_scene.add_obstacles(meshcat, scenario)
+    followed = followed_sources(scenario)
     for name, source in scenario.all_sources.items():
-        replay_scene.add_source(meshcat, source, source_path(scenario, name))
+        role = "source" if name in followed else "interferer"
+        replay_scene.add_source(meshcat, source, source_path(scenario, name), role)
     for look in looks(result):
         path = robot_path(look.result, result)
         replay_scene.add_robot(meshcat, look, path, estimate_path(path))
-    replay_scene.set_stage(meshcat, result)
+    replay_scene.set_stage(meshcat)
 
 
 def source_path(scenario: Scenario, name: str) -> str:
@@ -165,7 +228,7 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
     """
     frames = np.arange(0.0, result.simulated_s + 0.5 / FRAMES_PER_S, 1.0 / FRAMES_PER_S)
     scenario = result.full_scenario
-    sounds = scenario.sounds()
+    sounds, m_per_n = scenario.sounds(), scale_m_n(result)
     for look in looks(result):
         own, path = look.result, robot_path(look.result, result)
         _record_robot(meshcat, own, path, frames)
@@ -180,18 +243,47 @@ def record_run(meshcat: Meshcat, result: RunResult) -> None:
         _record_known_space(meshcat, result, look, path)
         _record_guard(meshcat, own, f"guard/{path}", frames)
         _record_tracked_bodies(meshcat, own, f"tracked/{path}", frames)
+        record_arrows(meshcat, own, path, m_per_n)
+        _record_follow_distance(meshcat, own, path, frames)
+        _record_collision(meshcat, own, path)
     paths = {name: robot_path(own, result) for name, own in result.robots.items()}
     record_searches(meshcat, result, paths)
+    followed = followed_sources(scenario)
     for name, source in scenario.all_sources.items():
+        role = "source" if name in followed else "interferer"
         path = source_path(scenario, name)
         poses = source.path().poses(result.time)
         seen = frames if np.ptp(poses, axis=0).any() else frames[:1]
         _record_path(meshcat, path, seen, _at_frames(result, poses, seen))
         _record_rings(meshcat, result, path, sounds[name])
-        _record_trail(meshcat, result, f"trail/{path}", poses[:, :2], COLOURS["source"])
+        _record_trail(meshcat, result, f"trail/{path}", poses[:, :2], COLOURS[role])
     for obstacle in moving_and_static(scenario)[0]:
         path, height = f"obstacles/{obstacle.name}", 0.5 * OBSTACLE_HEIGHT_M
         _record_path(meshcat, path, frames, obstacle.path().poses(frames), height)
+
+
+def _record_follow_distance(
+    meshcat: Meshcat, own: RunResult, path: str, frames: NDArray[np.float64]
+) -> None:
+    """A ring about what is followed, on which P is to be."""
+    if own.scenario.searches is not None or not own.scenario.follow_distance_m:
+        return
+    ring, radius = f"follow/{path}", own.scenario.follow_distance_m
+    replay_scene.add_disc_edge(meshcat, ring, radius, "law")
+    seen = frames if own.target_moves else frames[:1]
+    _record_path(meshcat, ring, seen, _at_frames(own, own.poses("WS"), seen))
+
+
+def _record_collision(meshcat: Meshcat, own: RunResult, path: str) -> None:
+    """From the collision on a star over the place, and what was hit in red."""
+    if own.collision is None:
+        return
+    star, times = f"collision/{path}", (0.0, own.collision.time)
+    replay_scene.add_star(meshcat, star, contact_point(own))
+    record_switch(meshcat, star, times, (False, True))
+    hit = replay_scene.add_hit(meshcat, own.full_scenario, own.collision.object)
+    if hit is not None:
+        record_switch(meshcat, hit, times, (False, True))
 
 
 def _at_frames(

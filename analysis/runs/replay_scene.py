@@ -28,9 +28,12 @@ __all__ = [
     "add_floor",
     "add_floor_part",
     "add_gain_bar",
+    "add_hit",
     "add_obstacles",
     "add_robot",
+    "add_room",
     "add_source",
+    "add_star",
     "add_trail",
     "floor_rectangle",
     "set_stage",
@@ -103,13 +106,12 @@ def _ribbon(
     meshcat.SetTriangleMesh(path, _plain(vertices), triangles, rgba)
 
 
-def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
-    """A floor that holds the whole run, a line a metre, and a title.
+def add_floor(meshcat: Meshcat, result: RunResult) -> None:
+    """A floor that holds the whole run, and a line a metre.
 
     Args:
         meshcat: The scene.
         result: The run.
-        title: Stands in the far left corner.
     """
     x_low, x_high, y_low, y_high = floor_rectangle(result)
     x, y = (x_low + x_high) / 2.0, (y_low + y_high) / 2.0
@@ -120,7 +122,6 @@ def add_floor(meshcat: Meshcat, result: RunResult, title: str) -> None:
     starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
     ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
     _segments(meshcat, "floor/grid", starts, ends, Rgba(0.55, 0.55, 0.55))
-    _write(meshcat, "floor/title", title, (x_low + 0.1, y_high - 0.4), 0.28)
     for x in along[:-1]:
         _write(
             meshcat, f"floor/x {x:.0f}", f"{x:.0f} m", (x + 0.05, y_low + 0.06), 0.13
@@ -258,19 +259,33 @@ def add_gain_bar(meshcat: Meshcat, path: str, aside: float, colour: str) -> None
     meshcat.SetTransform(path, upright(0.0, aside, ROBOT_HEIGHT_M))
 
 
-def add_source(meshcat: Meshcat, source: SourceParameters, path: str) -> None:
+def add_source(
+    meshcat: Meshcat, source: SourceParameters, path: str, role: str = "source"
+) -> None:
     """The master robot about the origin of S, its loudspeaker and its rings.
 
     Args:
         meshcat: The scene.
         source: Size, and whether there is a body.
         path: Where it is in Meshcat's tree.
+        role: Key of its colour: ``source``, or ``interferer`` if nobody follows it.
     """
     if source.body:
         body = Box(source.length_m, source.width_m, SOURCE_HEIGHT_M)
         middle = 0.5 * SOURCE_HEIGHT_M
-        _put(meshcat, f"{path}/body", body, _colour("source"), 0.0, 0.0, middle)
-    _add_loudspeaker(meshcat, path, SOURCE_HEIGHT_M, COLOURS["source"])
+        _put(meshcat, f"{path}/body", body, _colour(role), 0.0, 0.0, middle)
+    else:
+        pole = Cylinder(0.02, SOURCE_HEIGHT_M)
+        _put(
+            meshcat,
+            f"{path}/pole",
+            pole,
+            _colour(role),
+            0.0,
+            0.0,
+            0.5 * SOURCE_HEIGHT_M,
+        )
+    _add_loudspeaker(meshcat, path, SOURCE_HEIGHT_M, COLOURS[role])
 
 
 def _add_loudspeaker(meshcat: Meshcat, path: str, height: float, colour: str) -> None:
@@ -297,6 +312,69 @@ def add_obstacles(meshcat: Meshcat, scenario: Scenario) -> None:
         x, y, theta = obstacle.path().pose(0.0)
         box = Box(*obstacle.size_m, height)
         _put(meshcat, path, box, _colour("obstacle"), x, y, 0.5 * height, theta)
+
+
+def add_hit(meshcat: Meshcat, scenario: Scenario, name: str) -> str | None:
+    """An obstacle in the colour of what was hit, over its grey.
+
+    Args:
+        meshcat: The scene.
+        scenario: Has the obstacles.
+        name: Of what was hit.
+
+    Returns:
+        Its path in Meshcat's tree; none where it is no obstacle.
+    """
+    for obstacle in scenario.obstacles:
+        if obstacle.name == name:
+            path = f"obstacles/{name}/hit"
+            length, width = obstacle.size_m
+            box = Box(length + 0.01, width + 0.01, OBSTACLE_HEIGHT_M + 0.01)
+            meshcat.SetObject(path, box, _colour("hit"))
+            return path
+    return None
+
+
+def add_star(
+    meshcat: Meshcat, path: str, place: ArrayLike, *, radius: float = 0.16
+) -> None:
+    """The edge of a star over a place: what lies under it stays visible.
+
+    Args:
+        meshcat: The scene.
+        path: Where it is in Meshcat's tree.
+        place: (2,) in W, m.
+        radius: To its tips, m.
+    """
+    turns = np.pi * (0.5 + np.arange(11) / 5.0)
+    reach = radius * np.where(np.arange(11) % 2, 0.45, 1.0)[:, None]
+    points = np.asarray(place) + reach * np.column_stack([np.cos(turns), np.sin(turns)])
+    height = OBSTACLE_HEIGHT_M + 0.05
+    _ribbon(meshcat, path, points, Rgba(0.0, 0.0, 0.0), height, 0.035)
+
+
+def add_room(meshcat: Meshcat, scenario: Scenario) -> None:
+    """The walls of the room, so low that one sees over them.
+
+    Args:
+        meshcat: The scene.
+        scenario: May have a room.
+    """
+    if scenario.room is None:
+        return
+    (x, y), (wide, deep, _) = scenario.room.corner, scenario.room.size_m
+    thick, height = 0.06, 0.25
+    for number, (size_x, size_y, at_x, at_y) in enumerate(
+        (
+            (wide + 2.0 * thick, thick, x + wide / 2.0, y - thick / 2.0),
+            (wide + 2.0 * thick, thick, x + wide / 2.0, y + deep + thick / 2.0),
+            (thick, deep, x - thick / 2.0, y + deep / 2.0),
+            (thick, deep, x + wide + thick / 2.0, y + deep / 2.0),
+        )
+    ):
+        wall = Box(size_x, size_y, height)
+        path = f"room/wall_{number}"
+        _put(meshcat, path, wall, _colour("wall"), at_x, at_y, 0.5 * height)
 
 
 def add_trail(
@@ -360,12 +438,11 @@ def add_disc_edge(meshcat: Meshcat, path: str, radius: float, colour: str) -> No
     _ribbon(meshcat, path, circle, _colour(colour), 0.012, 0.03)
 
 
-def set_stage(meshcat: Meshcat, result: RunResult) -> None:
-    """Even light, a plain background, and the whole run in view.
+def set_stage(meshcat: Meshcat) -> None:
+    """Even light and a plain background; the page chooses the view.
 
     Args:
         meshcat: The scene.
-        result: The run.
     """
     lamps = ("SpotLight", "PointLightNegativeX", "PointLightPositiveX")
     for path in ("/Grid", "/Axes", *(f"/Lights/{lamp}" for lamp in lamps)):
@@ -373,9 +450,4 @@ def set_stage(meshcat: Meshcat, result: RunResult) -> None:
     meshcat.SetProperty("/Lights/AmbientLight/<object>", "intensity", 2.6)
     meshcat.SetProperty("/Lights/FillLight/<object>", "intensity", 1.2)
     for end in ("top_color", "bottom_color"):
-        meshcat.SetProperty("/Background", end, [0.86, 0.89, 0.92])
-    x_low, x_high, y_low, y_high = bounds(result, margin=0.5)
-    middle = np.array([(x_low + x_high) / 2.0, (y_low + y_high) / 2.0 - 0.2, 0.0])
-    extent = max((x_high - x_low) / 1.3, y_high - y_low)
-    camera = middle + extent * np.array([0.0, -0.45, 0.6])
-    meshcat.SetCameraPose(_plain(camera), _plain(middle))
+        meshcat.SetProperty("/Background/<object>", end, [0.86, 0.89, 0.92])

@@ -25,13 +25,25 @@ from analysis.runs.trajectory_artists import (
     draw_known_space,
     draw_obstacles,
     draw_robot,
+    draw_room,
     draw_sources,
     times_apart,
 )
 from diagrams import RunResult
 from systems.framework.input_error import InputError
 
-__all__ = ["plot_time_series", "plot_trajectory"]
+__all__ = [
+    "Panel",
+    "clearance_panel",
+    "heard_bursts",
+    "map_axes",
+    "plot_time_series",
+    "plot_trajectory",
+    "time_panels",
+]
+
+#: Draws one quantity of one robot over time.
+Panel = Callable[[Axes, RunResult], None]
 
 #: Letters of a title that a picture has room for beside one another.
 LONGEST_LINE = 80
@@ -51,7 +63,7 @@ def plot_trajectory(result: RunResult) -> Figure:
     are drawn where a frame was heard, faint ones early, strong ones late. Of a
     guarded robot, what it knew of the floor at the end stands for the cones.
     """
-    figure, axes = _map(result)
+    figure, axes = map_axes(result)
     draw_grid(axes)
     axes.set_title(_title(result), fontsize=11)
     for look in looks(result):
@@ -61,6 +73,7 @@ def plot_trajectory(result: RunResult) -> Figure:
         else:
             # What the cones have seen: they would hide it.
             draw_known_space(axes, look, known)
+    draw_room(axes, result)
     draw_obstacles(axes, result)
     if result.full_scenario.odor is not None:
         _draw_odor(axes, result)
@@ -103,8 +116,17 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
     axes.plot(*place, "*", color="#772266", ms=12, ls="none", label="source of odour")
 
 
-def _bursts(result: RunResult) -> list[tuple[float, float]]:
-    """When what a robot hears sounds; what is called on from the call on."""
+def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
+    """When what a robot hears sounds; what is called on from the call on.
+
+    Args:
+        result: The run of one robot.
+
+    Returns:
+        From and to, s, of each burst; none of a robot that drives to a goal.
+    """
+    if result.scenario.has_goal:
+        return []
     sound, whole = result.scenario.sound, result.full_scenario
     caller = whole.all_robots.get(whole.target(result.name))
     if caller is not None and caller.searches == "odor":
@@ -115,11 +137,17 @@ def _bursts(result: RunResult) -> list[tuple[float, float]]:
     return sound_bursts(sound, result.simulated_s)
 
 
-def _map(result: RunResult) -> tuple[Figure, Axes]:
+def map_axes(result: RunResult) -> tuple[Figure, Axes]:
     """Axes to one scale that hold all bodies, with room below for the legend.
 
     The picture is never taller or flatter than can be read: instead, more of
     the floor is shown.
+
+    Args:
+        result: The run.
+
+    Returns:
+        The figure, and its axes in W, m.
     """
     x_low, x_high, y_low, y_high = bounds(result, margin=0.7)
     width = WIDTH_IN - LEFT_IN - RIGHT_IN
@@ -156,19 +184,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     Raises:
         InputError: ``clearance`` has not one value a tick.
     """
-    searches = result.scenario.searches
     hears = not result.scenario.has_goal
-    panels: list[Callable[[Axes, RunResult], None]]
-    panels = [_range, _bearing] if hears else [_goal]
-    if searches is not None:
-        panels = search_panels(result)
-    if "attraction_x" in result.columns:  # a law may tell no forces
-        panels.append(_forces)
-    if "stiffness" in result.columns:
-        panels.append(_gains)
-    panels += [_speeds, _turning]
-    if guarded_motion(result) is not None:
-        panels += [_guard_actions, _guard_distances]
+    panels = time_panels(result)
     distance = None if clearance is None else np.asarray(clearance, dtype=float)
     if distance is not None and distance.shape != result.time.shape:
         raise InputError(
@@ -176,14 +193,14 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
             f"{distance.shape} values for {result.time.shape} ticks; "
             "give the clearance of the same run (analysis.runs.proximity)",
         )
-    rows = len(panels) + (distance is not None)
+    if distance is not None:
+        panels.append(clearance_panel(distance))
+    rows = len(panels)
     figure = NotebookFigure(figsize=(WIDTH_IN, 1.0 + 1.55 * rows), layout="constrained")
     all_axes = np.atleast_1d(figure.subplots(rows, sharex=True))
-    for axes, panel in zip(all_axes, panels, strict=False):
+    for axes, panel in zip(all_axes, panels, strict=True):
         panel(axes, result)
-    if distance is not None:
-        _clearance(all_axes[-1], result, distance)
-    bursts = _bursts(result) if hears else []
+    bursts = heard_bursts(result)
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
@@ -202,6 +219,28 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     figure.suptitle(_title(result), fontsize=11)
     figure.align_ylabels(list(all_axes))
     return figure
+
+
+def time_panels(result: RunResult) -> list[Panel]:
+    """What is drawn of a run over time, beside its clearance.
+
+    Args:
+        result: The run of one robot.
+
+    Returns:
+        Panels, each called with its axes and the result.
+    """
+    panels: list[Panel] = [_goal] if result.scenario.has_goal else [_range, _bearing]
+    if result.scenario.searches is not None:
+        panels = search_panels(result)
+    if "attraction_x" in result.columns:  # a law may tell no forces
+        panels.append(_forces)
+    if "stiffness" in result.columns:
+        panels.append(_gains)
+    panels += [_speeds, _turning]
+    if guarded_motion(result) is not None:
+        panels += [_guard_actions, _guard_distances]
+    return panels
 
 
 def _title(result: RunResult) -> str:
@@ -330,10 +369,23 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
     axes.set_ylabel("guard's\ndistances (m)")
 
 
-def _clearance(axes: Axes, result: RunResult, clearance: NDArray[np.float64]) -> None:
-    time, colour = result.time, COLOURS["obstacle"]
-    axes.plot(time, clearance, color=colour, label="to nearest body")
-    at, least = time[np.argmin(clearance)], float(np.min(clearance))
-    axes.plot(at, least, "v", color="black", label=f"least: {least:.2f} m")
-    axes.set_ylabel("clearance\n(m)")
-    axes.set_ylim(bottom=min(0.0, 1.1 * least))
+def clearance_panel(clearance: ArrayLike) -> Panel:
+    """The panel of the distance to the nearest body, with its least.
+
+    Args:
+        clearance: (n,) at the ticks, m.
+
+    Returns:
+        As of ``time_panels``.
+    """
+    distance = np.asarray(clearance, dtype=float)
+
+    def panel(axes: Axes, result: RunResult) -> None:
+        time, colour = result.time, COLOURS["obstacle"]
+        axes.plot(time, distance, color=colour, label="to nearest body")
+        at, least = time[np.argmin(distance)], float(np.min(distance))
+        axes.plot(at, least, "v", color="black", label=f"least: {least:.2f} m")
+        axes.set_ylabel("clearance\n(m)")
+        axes.set_ylim(bottom=min(0.0, 1.1 * least))
+
+    return panel

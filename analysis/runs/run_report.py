@@ -7,6 +7,9 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.runs.guarded_motion import halts_of
@@ -16,7 +19,7 @@ from diagrams import RunResult, build_sound_follower, write_scenario
 from diagrams.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
-__all__ = ["run_summary", "summary_text", "write_run"]
+__all__ = ["run_summary", "summary_rows", "summary_text", "write_run"]
 
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
@@ -79,10 +82,11 @@ def write_run(
     """Writes everything about a run into a directory that exists.
 
     ``scenario.yaml`` (effective, can be run again) and ``scenario.schema.json``,
-    ``summary.json``, ``trajectory.parquet``, ``trajectory.png``, ``time_series.png``,
-    ``diagram.svg`` and ``replay.html``. Of several robots each has its own
-    ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows
-    how they are joined.
+    ``summary.json``, ``trajectory.parquet``, ``replay.html``, the pictures
+    ``trajectory.png``, ``time_series.png`` and ``diagram.svg``, and ``report.html``,
+    which shows all of them. Of several robots each has its own
+    ``time_series_<name>.png`` and ``diagram_<name>.svg``, and ``diagram.svg`` shows how
+    they are joined.
 
     Args:
         result: The run.
@@ -91,23 +95,31 @@ def write_run(
         pictures: Off: no PNG and no SVG.
     """
     from analysis.runs.replay import write_replay
+    from analysis.runs.run_page import run_page
 
     write_scenario(result.full_scenario, directory)
     write_json(summary, directory / "summary.json")
     result.trajectory.to_parquet(directory / "trajectory.parquet", index=False)
-    write_replay(result, directory / "replay.html")
+    clearance = {name: Proximity(o).clearance for name, o in result.robots.items()}
     if pictures:
-        _write_pictures(result, directory)
+        _write_pictures(result, clearance, directory)
+    write_replay(result, directory / "replay.html", clearance)
+    rows = summary_rows(result, summary)
+    (directory / "report.html").write_text(
+        run_page(result, rows, summary, directory), "utf-8"
+    )
 
 
-def _write_pictures(result: RunResult, directory: Path) -> None:
-    from analysis.runs.block_diagram import write_block_diagram
+def _write_pictures(
+    result: RunResult, clearance: dict[str, NDArray[np.float64]], directory: Path
+) -> None:
     from analysis.runs.run_plots import plot_time_series, plot_trajectory
+    from analysis.wiring.block_diagram import write_block_diagram
 
     plot_trajectory(result).savefig(directory / "trajectory.png", dpi=150)
     for name, own in result.robots.items():
         ending = f"_{name}" if result.several else ""
-        figure = plot_time_series(own, Proximity(own).clearance)
+        figure = plot_time_series(own, clearance[name])
         figure.savefig(directory / f"time_series{ending}.png", dpi=150)
     follower = build_sound_follower(result.full_scenario)
     write_block_diagram(
@@ -128,6 +140,22 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
     Returns:
         Lines without an end of line after the last one.
     """
+    return "\n".join(
+        f"{name.split('.')[-1]:<21} {value}"
+        for name, value in summary_rows(result, summary).items()
+    )
+
+
+def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
+    """What one screen tells of a run, as words by name.
+
+    Args:
+        result: The run.
+        summary: From ``run_summary``.
+
+    Returns:
+        Of several robots, what one did is named by it, a dot, and what it is.
+    """
     timing = summary["timing"]
     scenario = result.full_scenario
     alone = not result.several or result.cause in SUCCESSFUL
@@ -143,9 +171,7 @@ def summary_text(result: RunResult, summary: dict[str, Any]) -> str:
         rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.law}"}
         rows |= _robot_rows(own, summary["metrics"], f"{name}.")
     rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
-    return "\n".join(
-        f"{name.split('.')[-1]:<21} {value}" for name, value in rows.items()
-    )
+    return rows
 
 
 def _ended(result: RunResult) -> str:

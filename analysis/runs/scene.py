@@ -24,6 +24,7 @@ __all__ = [
     "bounds",
     "compose",
     "contact_point",
+    "followed_sources",
     "lightened",
     "looks",
     "moving_and_static",
@@ -187,10 +188,18 @@ def moving_and_static(
     return moving, [o for o in scenario.obstacles if not o.path().moves]
 
 
+def followed_sources(scenario: Scenario) -> set[str]:
+    """Names of the sources that a robot follows; the others interfere."""
+    return {scenario.target(name) for name in scenario.all_robots}.intersection(
+        scenario.all_sources
+    )
+
+
 def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float]:
     """Smallest x, largest x, smallest y, largest y of all bodies ever, m.
 
-    Estimates do not count: a wild one would shrink all else.
+    With the walls of the room, where there is one. Estimates do not count: a wild one
+    would shrink all else.
 
     Args:
         result: The run.
@@ -210,6 +219,10 @@ def bounds(result: RunResult, margin: float) -> tuple[float, float, float, float
     centres += [path.poses(times)[:, :2] for path in paths]
     points = np.concatenate(centres)
     low, high = points.min(axis=0) - margin, points.max(axis=0) + margin
+    if scenario.room is not None:
+        corner, wall = scenario.room.corner, 0.2
+        low = np.minimum(low, corner - wall)
+        high = np.maximum(high, corner + scenario.room.size_m[:2] + wall)
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb, to_rgba
-from matplotlib.patches import Polygon, Wedge
+from matplotlib.patches import Polygon, Rectangle, Wedge
 from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
@@ -18,6 +18,7 @@ from analysis.runs.scene import (
     Look,
     compose,
     contact_point,
+    followed_sources,
     moving_and_static,
     picture_times,
     sensor_pose,
@@ -35,6 +36,7 @@ __all__ = [
     "draw_known_space",
     "draw_obstacles",
     "draw_robot",
+    "draw_room",
     "draw_sources",
     "times_apart",
 ]
@@ -161,30 +163,41 @@ def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
         times: Of the dots, s.
     """
     sources = result.full_scenario.all_sources
+    followed = followed_sources(result.full_scenario)
     for name, source in sources.items():
         what = "the source" if len(sources) == 1 else name
-        _draw_source(axes, result, what, source, times)
+        if name not in followed:
+            what = f"{name} (not followed)"
+        role = "source" if name in followed else "interferer"
+        _draw_source(axes, result, (what, COLOURS[role]), source, times)
 
 
 def _draw_source(
     axes: Axes,
     result: RunResult,
-    what: str,
+    named: tuple[str, str],
     source: SourceParameters,
     times: list[float],
 ) -> None:
-    colour, path = COLOURS["source"], source.path().poses(result.time)
-    label = f"path of {what}"
-    axes.plot(*path[:, :2].T, "--", color=colour, label=label, zorder=3)
-    ends = (0, len(path) - 1) if np.ptp(path[:, :2], axis=0).any() else (0,)
-    for index in ends:
+    (what, colour), path = named, source.path().poses(result.time)
+    moves = bool(np.ptp(path[:, :2], axis=0).any())
+    if moves:
+        label = f"path of {what}"
+        axes.plot(*path[:, :2].T, "--", color=colour, label=label, zorder=3)
+    if not source.body:
+        # A loudspeaker alone, which nothing can hit.
+        place = path[-1, :2]
+        axes.plot(*place, "D", color=colour, label=what, ls="none", ms=6, zorder=4)
+        return
+    seen = "first and last" if moves else "at rest"
+    for index in (0, len(path) - 1) if moves else (0,):
         _draw_body(
             axes,
             [*path[index], source.length_m, source.width_m],
             gid="source",
             facecolor=(*to_rgb(colour), 0.25 if index == 0 else 0.6),
             edgecolor=colour,
-            label=f"{what.removeprefix('the ')}, first and last" if not index else None,
+            label=f"{what.removeprefix('the ')}, {seen}" if not index else None,
             zorder=2.5,
         )
     last = -math.inf
@@ -343,8 +356,32 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
 _CONE_LABELS = {True: "ultrasonic cone with an echo", False: "cone without an echo"}
 
 
+def draw_room(axes: Axes, result: RunResult) -> None:
+    """The walls of the room.
+
+    Args:
+        axes: Where to draw, in W, m.
+        result: The run.
+    """
+    room = result.full_scenario.room
+    if room is None:
+        return
+    axes.add_patch(
+        Rectangle(
+            (float(room.corner[0]), float(room.corner[1])),
+            *room.size_m[:2],
+            gid="room",
+            fill=False,
+            edgecolor=COLOURS["wall"],
+            linewidth=4.0,
+            label="walls of the room",
+            zorder=1.2,
+        )
+    )
+
+
 def draw_collision(axes: Axes, result: RunResult) -> None:
-    """A star where the robot touched something.
+    """What the robot touched, as it was then, and a star that leaves it in sight.
 
     Args:
         axes: Where to draw, in W, m.
@@ -352,11 +389,25 @@ def draw_collision(axes: Axes, result: RunResult) -> None:
     """
     if result.collision is None:
         return
+    own, hit = result.robots[result.name], result.collision
+    _draw_body(
+        axes,
+        own.surroundings.bodies[hit.object].rectangle(hit.time),
+        gid="hit",
+        facecolor=COLOURS["hit"],
+        edgecolor="white",
+        linewidth=0.8,
+        label=f"{hit.object}, which was touched",
+        zorder=8,
+    )
     axes.plot(
         *contact_point(result),
         "*",
-        color="black",
-        markersize=15,
-        label=f"collision with {result.collision.object}",
-        zorder=8,
+        markerfacecolor="none",
+        markeredgecolor="black",
+        markeredgewidth=1.4,
+        markersize=19,
+        label="where they touched",
+        linestyle="none",
+        zorder=9,
     )

@@ -203,6 +203,7 @@ def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[s
             f"{name}-map",
             "Largest certified speed of P over the floor. White: not even rest is "
             "certified.",
+            scale=True,
         ),
         fact_table(facts["trials"], caption="Simulated starts, certificate's model"),
         figure_html(

@@ -342,10 +342,14 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
             plot_poles_against_period(data.period),
             f"{name}-period",
             "Poles against the sample period.",
+            scale=True,
         ),
         *(
             figure_html(
-                plot_chart(chart), f"{name}-chart{k}", f"Growth: {chart.title}."
+                plot_chart(chart),
+                f"{name}-chart{k}",
+                f"Growth: {chart.title}.",
+                scale=True,
             )
             for k, chart in enumerate(data.charts)
         ),

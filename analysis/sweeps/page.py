@@ -163,7 +163,8 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
         figure_html(
             plot_heat_maps(plan, results, x, y, rest),
             f"map{k}",
-            f"Every figure over `{x}` and `{y}`: {cell_label(rest)}.",
+            f"Every figure over `{x}` and `{y}`, lighter is more: {cell_label(rest)}.",
+            scale=True,
         )
         for k, rest in enumerate(cases[:MOST_MAPS])
     ]

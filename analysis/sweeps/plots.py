@@ -10,9 +10,10 @@ import numpy as np
 import pandas as pd
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import PercentFormatter
 
 from analysis.reporting.intervals import Estimate
-from analysis.reporting.palette import draw_grid
+from analysis.reporting.palette import draw_grid, luminance
 from analysis.sweeps.estimates import (
     Quantity,
     by_cell,
@@ -27,6 +28,8 @@ from analysis.sweeps.plan import SweepPlan
 __all__ = ["plot_heat_maps", "plot_line", "plot_marginal"]
 
 WIDTH_IN = 9.0
+#: Cells beside one another that have room for their numbers, and values for names.
+MOST_NUMBERS, MOST_TICKS = 8, 20
 #: Okabe and Ito's colours, which the colour-blind can tell apart.
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
 
@@ -49,7 +52,8 @@ def plot_heat_maps(
         rest: Values of the grid's other fields.
 
     Returns:
-        The picture, a panel for each quantity.
+        The picture, a panel for each quantity: lighter is more, and what nobody knows
+        is hatched.
     """
     runs, cells = by_cell(plan, ended(results)), plan.cells()
     chosen = [
@@ -59,13 +63,28 @@ def plot_heat_maps(
         ]
         for y_value in plan.grid[y]
     ]
-    figure, panels = _panels(results, 3.5)
+    rows = len(plan.grid[y])
+    figure, panels = _panels(results, min(max(3.5, 1.4 + 0.26 * rows), 12.0))
     for axes, quantity in panels:
         values = [[quantity.estimate(each).value for each in row] for row in chosen]
-        _heat_map(axes, quantity, np.array(values))
+        # Of all cells, so that a colour means the same on every map of a sweep.
+        _heat_map(axes, quantity, np.array(values), _limits(quantity, runs))
         _ticks(axes, "x", x, plan.grid[x])
         _ticks(axes, "y", y, plan.grid[y])
     return figure
+
+
+def _limits(quantity: Quantity, runs: Sequence[pd.DataFrame]) -> tuple[float, float]:
+    """Least and greatest value that a map has a colour for."""
+    if quantity.rate:
+        return 0.0, 1.0
+    values = np.array([quantity.estimate(each).value for each in runs])
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return 0.0, 1.0
+    low, high = float(known.min()), float(known.max())
+    spare = 0.5 * max(abs(low), 1e-9) if low == high else 0.0
+    return low - spare, high + spare
 
 
 def _panels(
@@ -81,31 +100,46 @@ def _panels(
     return figure, list(zip(all_axes, shown, strict=False))
 
 
-def _heat_map(axes: Axes, quantity: Quantity, values: np.ndarray) -> None:
-    top = 1.0 if quantity.rate else None
-    bottom = 0.0 if quantity.rate else None
+def _heat_map(
+    axes: Axes, quantity: Quantity, values: np.ndarray, limits: tuple[float, float]
+) -> None:
+    axes.set_facecolor("#E5E5E5")
+    axes.patch.set(hatch="////", edgecolor="#B0B0B0")
     image = axes.imshow(
-        values, origin="lower", aspect="auto", cmap="cividis", vmin=bottom, vmax=top
+        values,
+        origin="lower",
+        aspect="auto",
+        cmap="cividis",
+        vmin=limits[0],
+        vmax=limits[1],
     )
     axes.set_title(quantity.title, fontsize=10)
-    middle = 0.5 * sum(image.get_clim())
-    if values.shape[1] > 8:  # no room for numbers
-        axes.figure.colorbar(image, ax=axes)
+    bar = axes.figure.colorbar(image, ax=axes, pad=0.02)
+    bar.ax.tick_params(labelsize=8)
+    if quantity.rate:
+        bar.ax.yaxis.set_major_formatter(PercentFormatter(1.0))
+    rows, columns = values.shape
+    if columns > MOST_NUMBERS or rows > 2 * MOST_NUMBERS:
         return
+    size = 9 if columns <= 4 else 7
     for (row, column), value in np.ndenumerate(values):
         text = "-" if math.isnan(value) else f"{100 * value:.0f} %"
         if not quantity.rate and not math.isnan(value):
             text = f"{value:.3g}"
-        colour = "white" if value < middle else "black"
-        axes.text(column, row, text, ha="center", va="center", color=colour, fontsize=9)
+        dark = not math.isnan(value) and luminance(image.to_rgba(value)) < 0.18
+        colour = "white" if dark else "black"
+        axes.text(
+            column, row, text, ha="center", va="center", color=colour, fontsize=size
+        )
 
 
 def _ticks(axes: Axes, side: str, path: str, values: Sequence[Any]) -> None:
-    labels = [short(value, 16) for value in values]
-    turned = side == "x" and max(map(len, labels)) * len(labels) > 40
+    every = math.ceil(len(values) / MOST_TICKS)
+    labels = [short(value, 16) for value in values[::every]]
+    turned = side == "x" and max(map(len, labels)) * len(labels) > 32
     axis = axes.xaxis if side == "x" else axes.yaxis
     axis.set_ticks(
-        range(len(labels)),
+        range(0, len(values), every),
         labels,
         fontsize=8,
         rotation=30 if turned else 0,

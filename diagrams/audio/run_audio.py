@@ -235,6 +235,11 @@ class RunAudio:
         """Names of what plays."""
         return [*self._played]
 
+    @property
+    def first_heard(self) -> Path:
+        """The file of the first robot that listens."""
+        return next(iter(self._heard.values())).writer.path
+
     def hear(self, robot: str, tick: int, frame: AudioFrame | None) -> None:
         """Appends the frame that ends at a tick.
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,11 +14,8 @@ from analysis.comparison.compare import (
     comparison_plans,
     prepare_comparison,
 )
-from analysis.comparison.report import (
-    compare_summary,
-    compare_text,
-    write_comparison,
-)
+from analysis.comparison.report import compare_summary, write_comparison
+from analysis.comparison.report_text import compare_text
 from analysis.comparison.words import EXPERIMENTS, library_layouts
 from analysis.sweeps.plan import load_sweep
 from diagrams import load_scenario, simulate
@@ -168,8 +167,9 @@ def test_a_comparison_from_end_to_end(tmp_path):
     comparisons, pooled = prepared.run(seen.append)
     assert seen[-1] == prepared.runs == 4
     summary = compare_summary(prepared, comparisons, pooled)
-    write_comparison(prepared, comparisons, summary)
+    write_comparison(prepared, comparisons, pooled, summary)
     assert summary == json.loads((tmp_path / "out" / "summary.json").read_text())
+    page = html.unescape((tmp_path / "out" / "report.html").read_text())
     cells = summary["cells"]
     assert [(c["scenario"], c["law"], c["runs"]) for c in cells] == [
         ("two_static_obstacles", "none", 2),
@@ -183,9 +183,14 @@ def test_a_comparison_from_end_to_end(tmp_path):
             assert simulate(again).cause == example["cause"]
             text = compare_text(summary, comparisons, pooled)
             assert example["command"] in text
+            assert example["command"] in page
+            replay = Path(example["scenario_file"]).with_suffix(".html")
+            assert (str(replay) in page) == (example["kind"] == "typical")
+            assert (tmp_path / "out" / replay).exists() == (str(replay) in page)
     assert {p.name for p in (tmp_path / "out").iterdir()} == {
         "summary.json",
         "rates.png",
+        "report.html",
         "two_static_obstacles.png",
         "two_static_obstacles",
         "examples",

@@ -53,7 +53,7 @@ class Tags(HTMLParser):
         for name in ("href", "xlink:href"):
             if (values.get(name) or "").startswith("#"):
                 self.links.append(str(values[name])[1:])
-        if tag in {"script", "img", "iframe"} or "src" in values:
+        if tag in {"img", "iframe"} or "src" in values:
             self.loads.append(tag)
 
     def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:

@@ -212,7 +212,7 @@ def test_the_page_is_whole_small_and_told_nobody(ideal_run, tmp_path, capfd):
     page = path.read_text()
     assert "<title>default, law active: completed - replay</title>" in page
     assert len(page) < 4e6
-    fetched = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=", page)
+    fetched = re.findall(r"<(?:script|link|img)[^>]+(?:src|href)=\"(?!data:)", page)
     assert fetched == []
 
 
@@ -237,7 +237,7 @@ def test_a_run_of_one_tick_has_a_replay(shortest_run):
     recorder = Recorder()
     record_run(cast("Any", recorder), shortest_run)
     assert len(recorder.transforms["robot"]) == 1
-    assert recorder.meshes == {}
+    assert not [path for path in recorder.meshes if path.startswith("trail")]
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -147,8 +148,41 @@ def test_the_contact_lies_on_the_face_that_was_hit(collision_run):
     # The box fills 0.85 < x < 1.15, -0.05 < y < 0.25; a tick is at most 18 mm.
     assert x == pytest.approx(0.85, abs=0.02)
     assert -0.05 - 1e-9 <= y <= 0.25 + 1e-9
-    star = _line(plot_trajectory(collision_run).axes[0], "collision with box")
+    star = _line(plot_trajectory(collision_run).axes[0], "where they touched")
     assert star.get_xdata()[0] == x
+
+
+def test_what_was_hit_is_drawn_where_it_was_and_the_star_does_not_hide_it(
+    collision_run,
+):
+    figure = plot_trajectory(collision_run)
+    (hit,) = _patches(figure, Polygon, "hit")
+    assert _corners(hit).mean(axis=0) == pytest.approx([1.0, 0.1])
+    assert hit.get_facecolor()[:3] == pytest.approx(to_rgb(COLOURS["hit"]))
+    star = _line(figure.axes[0], "where they touched")
+    assert star.get_markerfacecolor() == "none"
+
+
+def test_a_room_has_its_walls_and_an_interferer_its_colour(ideal_run):
+    overrides = [
+        "obstacle_sensing=ideal",
+        "room={size_m: [8.0, 9.0, 3.0], corner_m: [-1.5, -2.5]}",
+        "sources={leader: {}, radio: {body: false, waypoints_m: [[3, 3]]}}",
+    ]
+    scenario = load_scenario("default", overrides)
+    figure = plot_trajectory(replace(ideal_run, scenario=scenario))
+    (walls,) = _patches(figure, Rectangle, "room")
+    assert walls.get_bbox().extents == pytest.approx([-1.5, -2.5, 6.5, 6.5])
+    axes = figure.axes[0]
+    (x_low, x_high), (y_low, y_high) = axes.get_xlim(), axes.get_ylim()
+    assert x_low < -1.5
+    assert x_high > 6.5
+    assert y_low < -2.5
+    assert y_high > 6.5
+    radio = _line(axes, "radio (not followed)")
+    assert radio.get_color() == COLOURS["interferer"]
+    assert radio.get_xydata()[0] == pytest.approx([3.0, 3.0])
+    assert _line(axes, "path of leader").get_color() == COLOURS["source"]
 
 
 def test_a_run_without_collision_has_no_contact(ideal_run):
@@ -309,3 +343,10 @@ def test_robots_know_each_its_own_floor():
         known = known_space(own, own.simulated_s)
         assert known is not None
         assert layer.get_extent() == pytest.approx(known.extent)
+
+
+def test_a_robot_on_a_route_which_hears_nothing_has_its_goal_and_target():
+    result = simulate(load_scenario("robots_2", ["duration_s=1"]))
+    labels = plot_trajectory(result).axes[0].get_legend_handles_labels()[1]
+    assert {"goals", "paths of the targets"} <= set(labels)
+    assert not [label for label in labels if "estimates" in label]

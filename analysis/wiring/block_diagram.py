@@ -15,7 +15,7 @@ from typing import Any
 
 from pydrake.systems.framework import Diagram
 
-from analysis.runs.wires import Wire, blocks, wires
+from analysis.wiring.wires import Wire, blocks, wires
 from systems.framework.block_facts import STAGES, Stage, block_facts
 
 __all__ = ["block_svg", "write_block_diagram"]

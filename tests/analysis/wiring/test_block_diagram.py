@@ -9,8 +9,8 @@ import pytest
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import Gain, LogVectorOutput
 
-from analysis.runs.block_diagram import block_svg, write_block_diagram
-from analysis.runs.wires import Wire, wires
+from analysis.wiring.block_diagram import block_svg, write_block_diagram
+from analysis.wiring.wires import Wire, wires
 from diagrams import build_sound_follower, load_scenario
 
 SVG = "{http://www.w3.org/2000/svg}"

@@ -1,0 +1,154 @@
+"""The tables of a comparison for a terminal, and how their figures are written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Any, NamedTuple
+
+from analysis.comparison.cells import LawCell, Mean
+from analysis.comparison.laws_in_pairs import Comparison, Pair
+from analysis.comparison.paired_statistics import PairedMedian, PairedRate
+from analysis.reporting.intervals import with_interval
+
+__all__ = [
+    "PAIRED",
+    "Column",
+    "compare_text",
+    "counts_text",
+    "difference_text",
+    "median_columns",
+    "median_text",
+    "points_text",
+    "rate_text",
+]
+
+
+class Column(NamedTuple):
+    """A median of the printed table."""
+
+    heading: str
+    metric: str
+    factor: float
+    """From the metric's unit to that of the heading."""
+    form: str
+    """Of the number."""
+
+
+_COLUMNS = (
+    Column("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
+    Column("jerk m/s^3", "jerk_rms_m_s3", 1.0, ".2f"),
+    Column("SPARC", "sparc", 1.0, ".2f"),
+    Column("reacts m", "reaction_distance_m", 1.0, ".2f"),
+    Column("error m", "following_error_rms_m", 1.0, ".2f"),
+    Column("off the way m", "route_deviation_max_m", 1.0, ".2f"),
+    Column("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
+)
+#: Metrics whose paired differences are printed.
+PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
+
+
+def compare_text(
+    summary: dict[str, Any], comparisons: dict[str, Comparison], pooled: Sequence[Pair]
+) -> str:
+    """Tables for a terminal.
+
+    Args:
+        summary: From ``compare_summary``.
+        comparisons: Cells and pairs by scenario.
+        pooled: Pairs of laws over all scenarios together.
+
+    Returns:
+        Lines without an end of line after the last one.
+    """
+    lines = [
+        f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
+        "In brackets: 95 % intervals.",
+        "Clearance, reaction, way, ripple: medians of all runs; the rest of successes.",
+    ]
+    for name, comparison in comparisons.items():
+        lines += ["", name, *_cell_lines(comparison.cells)]
+        lines += ["", *(line for pair in comparison.pairs for line in _pair_line(pair))]
+    if len(comparisons) > 1:
+        lines += ["", "all together", *(line for p in pooled for line in _pair_line(p))]
+    lines += ["", "Runs to look at:"]
+    for cell in summary["cells"]:
+        lines += [
+            f"  {example['command']}   ({example['cause']})"
+            for example in cell["examples"]
+        ]
+    return "\n".join(lines)
+
+
+def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
+    width = max(len("law"), *(len(cell.label) for cell in cells))
+    columns = median_columns(cells)
+    headings = "".join(f"{column.heading:>21}" for column in columns)
+    yield f"{'law':<{width}}{'success %':>17}{'collision %':>17}{headings}"
+    for cell in cells:
+        row = f"{cell.label:<{width}}{rate_text(cell.success):>17}"
+        row += f"{rate_text(cell.collision):>17}"
+        for column in columns:
+            row += f"{median_text(cell, column):>21}"
+        yield row
+    for cell in cells:
+        yield f"  {cell.label}: {counts_text(cell.causes)}"
+        if cell.mechanisms:
+            yield f"      failures: {counts_text(cell.mechanisms)}"
+
+
+def median_columns(cells: Sequence[LawCell]) -> list[Column]:
+    """The columns that one of the laws has at least."""
+    return [
+        column for column in _COLUMNS if any(column.metric in c.metrics for c in cells)
+    ]
+
+
+def counts_text(counts: Mapping[str, int]) -> str:
+    """Names with how many there are of each."""
+    return ", ".join(f"{name} {count}" for name, count in counts.items())
+
+
+def rate_text(rate: Mean) -> str:
+    """A rate in percent, with its interval."""
+    return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
+
+
+def median_text(cell: LawCell, column: Column) -> str:
+    """A median of a law with its interval; a dash where it has none."""
+    median, factor = cell.metrics.get(column.metric), column.factor
+    if median is None:
+        return "-"
+    figures = median.median, median.low, median.high
+    return with_interval(*figures, column.form, factor=factor)
+
+
+def points_text(rate: PairedRate) -> str:
+    """A difference of rates in points, with its interval."""
+    figures = rate.difference, rate.low, rate.high
+    return with_interval(*figures, "+.0f", factor=100.0)
+
+
+def difference_text(median: PairedMedian | None) -> str:
+    """The median of paired differences with its interval; a dash where none is."""
+    if median is None or median.difference is None:
+        return "-"
+    return f"{median.difference:+.3f} ({median.low:+.3f}, {median.high:+.3f})"
+
+
+def _pair_line(pair: Pair) -> Iterator[str]:
+    """First less second: rates in points, then medians of paired differences."""
+    common = "".join(f", {value}" for value in pair.fields.values())
+    text = f"{pair.first} less {pair.second}{common}:"
+    for name, rate in (("success", pair.success), ("collision", pair.collision)):
+        text += f" {name} {points_text(rate)} p {rate.p_value:.2g};"
+    yield text
+    parts = []
+    for metric in PAIRED:
+        median = pair.metrics.get(metric)
+        if median is not None and median.difference is not None:
+            parts.append(
+                f"{metric} {difference_text(median)} p {median.p_value:.2g}, "
+                f"{median.pairs} pairs"
+            )
+    if parts:
+        yield "    " + "; ".join(parts)

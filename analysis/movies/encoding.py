@@ -1,0 +1,182 @@
+"""Film files that appear whole or not at all: GIF by Pillow, MP4 by ffmpeg."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from analysis.run_error import RunError
+from systems.framework.input_error import InputError
+
+__all__ = ["MovieFile"]
+
+#: Pictures a second by the file's ending: a GIF counts time in hundredths of a second.
+FRAMES_PER_S = {".gif": 10.0, ".mp4": 25.0}
+#: What an MP4 needs of ffmpeg.
+_CODECS = ("libx264", "aac")
+
+
+class MovieFile:
+    """Where a film goes; what can be known to fail is refused here.
+
+    Args:
+        path: Ends in .gif or .mp4; nothing is there yet, but its directory is.
+
+    Raises:
+        InputError: The file cannot be made, or nothing is installed to encode it.
+    """
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path).expanduser()
+        ending = self.path.suffix.lower()
+        if ending not in FRAMES_PER_S:
+            raise _refused(f"{path} is neither .gif nor .mp4; name a file of one kind")
+        if self.path.exists():
+            raise _refused(f"{path} is there already; name another file")
+        folder = self.path.parent
+        if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
+            raise _refused(f"{folder} is no directory that can be written; make it")
+        self.frames_per_s = FRAMES_PER_S[ending]
+        self._ffmpeg = _find_ffmpeg() if ending == ".mp4" else ""
+
+    @property
+    def has_sound(self) -> bool:
+        """Whether it can have a track of sound."""
+        return bool(self._ffmpeg)
+
+    def write(
+        self,
+        frames: Iterable[NDArray[np.uint8]],
+        sound: Path | None = None,
+    ) -> None:
+        """Encodes pictures of the same size.
+
+        Args:
+            frames: (rows, columns, 3) each, red, green and blue.
+            sound: Sound file of a channel each microphone, the leftmost first; the
+                outer ones become left and right. None: silent.
+
+        Raises:
+            RunError: The encoder fails, or the disk does.
+        """
+        handle, partial = tempfile.mkstemp(
+            prefix=f".{self.path.stem}.", suffix=self.path.suffix, dir=self.path.parent
+        )
+        os.close(handle)
+        try:
+            if self.has_sound:
+                self._write_mp4(frames, sound, Path(partial))
+            else:
+                self._write_gif(frames, Path(partial))
+            Path(partial).chmod(0o644)
+            Path(partial).rename(self.path)
+        except OSError as error:
+            reason = error.strerror
+            raise RunError(f"{self.path} cannot be written ({reason})") from None
+        finally:
+            with suppress(FileNotFoundError):
+                Path(partial).unlink()
+
+    def _write_gif(self, frames: Iterable[NDArray[np.uint8]], path: Path) -> None:
+        from PIL import Image
+
+        images = (Image.fromarray(frame).quantize(128) for frame in frames)
+        first = next(images)
+        first.save(
+            path,
+            save_all=True,
+            append_images=images,
+            duration=round(1000.0 / self.frames_per_s),
+            loop=0,
+        )
+
+    def _write_mp4(
+        self, frames: Iterable[NDArray[np.uint8]], sound: Path | None, path: Path
+    ) -> None:
+        pictures = iter(frames)
+        first = next(pictures)
+        rows, columns, _ = first.shape
+        words = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{columns}x{rows}"]
+        words += ["-r", f"{self.frames_per_s:g}", "-i", "-"]
+        if sound is not None:
+            words += ["-i", str(sound), "-af", _stereo(sound), "-c:a", "aac"]
+        # Even sizes and this format are what every player takes.
+        words += ["-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white"]
+        words += ["-c:v", "libx264", "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+        with tempfile.TemporaryFile() as log:
+            process = subprocess.Popen(
+                [self._ffmpeg, "-v", "error", "-y", *words, str(path)],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.DEVNULL,
+                stderr=log,
+            )
+            assert process.stdin is not None
+            try:
+                with process.stdin as pipe:
+                    pipe.write(first.tobytes())
+                    for frame in pictures:
+                        pipe.write(frame.tobytes())
+            except BrokenPipeError:
+                pass  # its complaint says more
+            except BaseException:
+                process.kill()
+                process.wait()
+                raise
+            if process.wait():
+                log.seek(0)
+                said = log.read().decode(errors="replace").strip().splitlines()
+                reason = said[-1] if said else "it does not say why"
+                raise RunError(f"ffmpeg failed: {reason}")
+
+
+def _stereo(sound: Path) -> str:
+    """The filter that makes left and right of the outer microphones, loud enough."""
+    import soundfile
+
+    last = soundfile.info(sound).channels - 1
+    pan = f"pan=stereo|c0=c0|c1=c{last}"
+    samples, _ = soundfile.read(sound, dtype="float32")
+    loudest = float(np.max(np.abs(samples), initial=0.0))
+    gain = min(0.9 / loudest, 1e4) if loudest > 0.0 else 1.0
+    # Rates of converters that AAC does not know.
+    return f"{pan},volume={gain:.6g},aresample=48000"
+
+
+def _find_ffmpeg() -> str:
+    """The program that encodes an MP4.
+
+    Raises:
+        InputError: There is none, or it lacks a codec.
+    """
+    program = shutil.which("ffmpeg")
+    if importlib.util.find_spec("imageio_ffmpeg") is not None:
+        import imageio_ffmpeg
+
+        with suppress(RuntimeError):
+            program = imageio_ffmpeg.get_ffmpeg_exe()
+    remedy = "pip install 'phonotaxis[movie]', or ffmpeg, or write a .gif"
+    if program is None:
+        raise _refused(f"an .mp4 needs ffmpeg, which is not installed: {remedy}")
+    done = subprocess.run(
+        [program, "-hide_banner", "-encoders"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    for codec in _CODECS:
+        if f" {codec} " not in done.stdout:
+            raise _refused(f"{program} cannot encode {codec}: {remedy}")
+    return program
+
+
+def _refused(why: str) -> InputError:
+    return InputError("movie", why)

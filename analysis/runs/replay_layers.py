@@ -1,0 +1,160 @@
+"""What a replay shows, for its legend, and what of it can be switched off."""
+
+from __future__ import annotations
+
+from analysis.replays.arrows import arrow_path, arrows, scale_m_n
+from analysis.replays.replay_page import Layer
+from analysis.reporting.palette import COLOURS
+from analysis.runs.known_space import has_known_space
+from analysis.runs.scene import followed_sources, lightened, looks
+from diagrams import RunResult
+
+__all__ = ["replay_layers"]
+
+
+def replay_layers(
+    result: RunResult, paths: dict[str, str], estimates: dict[str, str]
+) -> list[Layer]:
+    """The legend of a replay.
+
+    Args:
+        result: The run.
+        paths: Of the robots in Meshcat's tree, by name.
+        estimates: Likewise of the balls where they take the source to be.
+
+    Returns:
+        What has no switch first.
+    """
+    return [
+        *_bodies(result),
+        *_of_sensors(result, paths, estimates),
+        *_of_laws(result, paths),
+        *_of_guards(result, paths),
+        *_of_world(result, paths),
+    ]
+
+
+def _bodies(result: RunResult) -> list[Layer]:
+    scenario, followed = result.full_scenario, followed_sources(result.full_scenario)
+    found = [
+        Layer(look.result.name, f"law {look.result.scenario.law}", (look.colour,))
+        for look in looks(result)
+    ]
+    for name in scenario.all_sources:
+        if name in followed:
+            found.append(Layer(name, "what is followed", (COLOURS["source"],)))
+        else:
+            text = "sounds, and is not followed"
+            found.append(Layer(name, text, (COLOURS["interferer"],)))
+    if scenario.obstacles:
+        found.append(Layer("obstacles", "", (COLOURS["obstacle"],)))
+    if any(own.collision for own in result.robots.values()):
+        found.append(Layer("what was hit", "from then on", (COLOURS["hit"],)))
+    return found
+
+
+def _of_sensors(
+    result: RunResult, paths: dict[str, str], estimates: dict[str, str]
+) -> list[Layer]:
+    found = []
+    cones = [
+        f"{paths[name]}/cone_{number}"
+        for name, own in result.robots.items()
+        if own.scenario.searches is None
+        for number in range(1, own.scenario.ultrasonic.count + 1)
+        if f"echo_{number}" in own.columns
+    ]
+    if cones:
+        text = "of ultrasound; with an echo, without"
+        both = COLOURS["echo"], COLOURS["empty"]
+        found.append(Layer("cones", text, both, tuple(cones)))
+    balls = [
+        estimates[name]
+        for name, own in result.robots.items()
+        if own.scenario.searches is None
+        and ("p_WS_estimated_x" in own.columns or own.scenario.route is not None)
+    ]
+    if balls:
+        colours = tuple(look.estimates for look in looks(result))
+        routes = any(own.scenario.route for own in result.robots.values())
+        text = "the target on the way" if routes else "where the source is taken to be"
+        label = "targets" if routes else "estimates"
+        found.append(Layer(label, text, colours, tuple(balls)))
+    return found
+
+
+def _of_laws(result: RunResult, paths: dict[str, str]) -> list[Layer]:
+    m_per_n, found = scale_m_n(result), []
+    forces = [
+        arrow_path(paths[name], arrow.name)
+        for name, own in result.robots.items()
+        for arrow in arrows(own, m_per_n)
+        if arrow.name != "law"
+    ]
+    if forces:
+        text = f"attraction, repulsion; 1 N is {m_per_n:g} m long"
+        colours = COLOURS["attraction"], COLOURS["repulsion"]
+        found.append(Layer("forces", text, colours, tuple(forces)))
+    laws = tuple(arrow_path(path, "law") for path in paths.values())
+    if any(
+        own.scenario.follow_distance_m and own.scenario.searches is None
+        for own in result.robots.values()
+    ):
+        text, laws = "way commanded for 1 s; follow distance", (*laws, "follow")
+    else:
+        text = "way commanded for 1 s"
+    return [*found, Layer("law", text, (COLOURS["law"],), laws)]
+
+
+def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
+    guarded = {
+        name: own
+        for name, own in result.robots.items()
+        if own.scenario.own_guard is not None
+    }
+    if not guarded:
+        return []
+    circles = tuple(f"guard/{paths[name]}" for name in guarded)
+    colours = COLOURS["empty"], COLOURS["echo"], COLOURS["source"]
+    found = [Layer("guard", "passed on, gave less, braked", colours, circles)]
+    if any(has_known_space(own) for own in guarded.values()):
+        own_looks = [look for look in looks(result) if look.result.name in guarded]
+        shades = tuple(lightened(look.seen, 0.35) for look in own_looks)
+        floors = tuple(f"known/{paths[name]}" for name in guarded)
+        found.append(Layer("known floor", "seen free; dots: echoes", shades, floors))
+    if any(own.scenario.law == "guarded" for own in guarded.values()):
+        rings = tuple(f"tracked/{paths[name]}" for name in guarded)
+        text = "bodies taken to move"
+        found.append(Layer("tracked", text, (COLOURS["tracked"],), rings))
+    return found
+
+
+def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
+    scenario = result.full_scenario
+    colours = tuple(look.colour for look in looks(result))
+    found = [Layer("trails", "where they have been", colours, ("trail",))]
+    if scenario.room is not None:
+        found.append(Layer("walls", "of the room", (COLOURS["wall"],), ("room",)))
+    if scenario.odor is not None:
+        found.append(Layer("odour", "the plume", (COLOURS["odor"],), ("odor",)))
+    lamps = [
+        path
+        for name, robot in paths.items()
+        if result.robots[name].scenario.searches is not None
+        for path in (f"{robot}/lamp", f"{robot}/radio")
+    ]
+    if lamps:
+        text = "grey rests, yellow senses, blue moves, green found, orange gave up"
+        found.append(Layer("lamps", text, (COLOURS["sound"],), tuple(lamps)))
+    adaptive = [
+        f"{paths[name]}/{gain}"
+        for name, own in result.robots.items()
+        if own.scenario.route is not None
+        for gain in ("stiffness", "damping", "contact_stiffness")
+        if gain in own.columns
+    ]
+    if adaptive:
+        colours = COLOURS["source"], COLOURS["robot"], COLOURS["obstacle"]
+        text = "K, D, K_e; as high as at first: 15 cm"
+        found.append(Layer("gains", text, colours, tuple(adaptive)))
+    return found

@@ -1,0 +1,77 @@
+"""Curves of a replay are the columns, thinned."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+from analysis.replays.time_charts import MOST_POINTS
+from analysis.runs.proximity import Proximity
+from analysis.runs.replay import time_charts
+from diagrams import load_scenario, simulate
+
+
+@pytest.fixture(scope="module")
+def charts(crossing_run):
+    clearance = {"robot": Proximity(crossing_run).clearance}
+    return {chart.title: chart for chart in time_charts(crossing_run, clearance)}
+
+
+def _series(chart, label):
+    return next(each for each in chart.series if each["label"] == label)
+
+
+def test_there_is_a_chart_for_each_panel_with_curves(charts):
+    assert list(charts) == [
+        "range of source (m)",
+        "bearing of source (deg)",
+        "force on P (N)",
+        "speed (m/s)",
+        "turn rate (deg/s)",
+        "clearance (m)",
+    ]
+
+
+def test_a_curve_is_its_column(crossing_run, charts):
+    true = _series(charts["range of source (m)"], "true")
+    assert len(true["t"]) <= MOST_POINTS
+    column = np.interp(
+        true["t"], crossing_run.time, crossing_run.columns["source_range_true"]
+    )
+    np.testing.assert_allclose(true["values"], column, atol=1e-3)
+    assert true["style"] == "line"
+
+
+def test_estimates_are_dots_where_something_was_heard(crossing_run, charts):
+    heard = _series(charts["range of source (m)"], "estimated")
+    assert heard["style"] == "dots"
+    count = np.count_nonzero(np.isfinite(crossing_run.columns["source_range"]))
+    assert len(heard["t"]) == count
+
+
+def test_a_threshold_goes_from_side_to_side(crossing_run, charts):
+    follow = _series(charts["range of source (m)"], "follow distance")
+    assert follow["t"] == pytest.approx([0.0, crossing_run.simulated_s])
+    assert follow["values"] == pytest.approx([1.2, 1.2])
+    assert follow["style"] == "dashes"
+
+
+def test_the_charts_are_plain_json(charts):
+    text = json.dumps([chart._asdict() for chart in charts.values()], allow_nan=False)
+    assert "null" not in json.loads(text)[0]["title"]
+
+
+def test_phases_of_a_search_keep_their_names():
+    result = simulate(
+        load_scenario("odor_search", ["duration_s=3", "search.rules=song2011"])
+    )
+    charts = {chart.title: chart for chart in time_charts(result, {})}
+    phase = next(chart for chart in charts.values() if chart.ticks)
+    assert [text for _, text in phase.ticks or []] == [
+        "1 initial",
+        "2 upwind",
+        "3 gradient",
+        "4 local",
+    ]
