@@ -155,7 +155,8 @@ class LiveHearing:
             k, first = np.argwhere(wild)[0]
             self._name(
                 f"channel {k + 1}: a sample is {channels[k, first]:g}, of a full scale "
-                "of 1; such blocks count as silence; check --format and the sender"
+                "of 1; such blocks count as silence; check --format and the sender",
+                ("wild", int(k)),
             )
             return np.zeros_like(channels)
         return self._signs * channels

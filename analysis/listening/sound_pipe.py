@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import select
 import struct
 import time
@@ -45,8 +46,9 @@ _MOST_HEADER, _MOST_CHUNKS = 2**16, 64
 # and unsigned numbers.
 _UNKNOWN = 0x7FFF_0000
 
-# What stands in another WAV, and so many bytes after its begin.
-_AGAIN, _AGAIN_AT = b"WAVEfmt ", 8
+# How another WAV begins, its bytes, and what may be a part of that.
+_BEGIN, _BEGIN_SIZE = re.compile(rb"RIFF.{4}WAVEfmt ", re.DOTALL), 16
+_BEGIN_AT_END = re.compile(rb"RIFF|RIF$|RI$|R$")
 
 # First bytes of files that are neither WAV nor raw.
 _OTHERS = {
@@ -284,7 +286,7 @@ def _chunks(
     source: _Source, form: _Format, length: int | None
 ) -> Iterator[bytes | None]:
     """Whole samples, but for the last ones; None where nothing has come for a while."""
-    most, tail = form.width * max(1, round(BLOCK_S * form.sample_rate_hz)), b""
+    most = form.width * max(1, round(BLOCK_S * form.sample_rate_hz))
     while True:
         data = b""
         size = most if length is None else min(most, length - length % form.width)
@@ -297,16 +299,15 @@ def _chunks(
             if more is None:
                 yield None
             data += more or b""
-        joined = tail + data
-        again = joined.find(_AGAIN) - _AGAIN_AT
-        if length is None and again >= 0:
-            before = max(0, again - len(tail))
-            yield data[: before - before % form.width]
-            source.unread(joined[again + 4 :])
-            length, tail = _another(source, form), b""
-            continue
+        if length is None:
+            if _BEGIN_AT_END.search(data[1 - _BEGIN_SIZE :]):
+                data += source.read(form.width * -(-_BEGIN_SIZE // form.width))
+            if again := _BEGIN.search(data):
+                yield data[: again.start() - again.start() % form.width]
+                source.unread(data[again.start() + 4 :])
+                length = _another(source, form)
+                continue
         yield data
-        tail = data[1 - _AGAIN_AT - len(_AGAIN) :]
         if length is None:
             continue
         length -= len(data)
@@ -314,7 +315,7 @@ def _chunks(
             source.read(length + length % 2)
             if not _reaches_another(source):
                 return
-            length, tail = _another(source, form), b""
+            length = _another(source, form)
 
 
 def _reaches_another(source: _Source) -> bool:

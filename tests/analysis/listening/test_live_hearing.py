@@ -160,6 +160,7 @@ def test_clipping_is_named_once():
 def test_what_is_no_sample_counts_as_silence_and_is_named(value):
     samples = FRIENDS.copy()
     samples[2, 2 * RATE : 2 * RATE + 2_000 : 400] = value
+    samples[2, 3 * RATE] = -1e30
     heard, told, named = hear(samples)
     assert len(named) == 1
     assert named[0][1].startswith(f"channel 3: a sample is {np.float32(value):g}, of a")

@@ -90,7 +90,7 @@ def test_what_follows_the_samples_is_no_sound(tmp_path):
 
 
 @pytest.mark.parametrize("length", [None, 0])
-@pytest.mark.parametrize("first", [320, 777])
+@pytest.mark.parametrize("first", [318, 319, 320, 777])
 def test_wav_after_wav_goes_on(tmp_path, length, first):
     """Its header of 44 bytes would exchange all channels if it were sound."""
     parts = SAMPLES[:, :first], SAMPLES[:, first:]

@@ -55,6 +55,9 @@ def test_a_drift_is_told_with_its_channels(around, sign):
         np.tile([0.0, 0.01, 0.0], (TIMES.size, 1)),
         # Peaks of noise.
         np.random.default_rng(5).uniform(-0.05, 0.05, (TIMES.size, 3)),
+        # And such as happen to grow.
+        np.random.default_rng(6).uniform(-0.02, 0.02, (TIMES.size, 3))
+        + 1e-3 * TIMES[:, None],
         np.full((TIMES.size, 3), np.nan),
     ],
 )
