@@ -44,8 +44,7 @@ def by_file(
 
     def bearings(recording: Recording) -> list[float]:
         search = _search(name, places, len(recording.bearings_deg))
-        search.locate_sources(_spectra(recording), freq_range=BAND_HZ)
-        return _degrees(search.azimuth_recon)
+        return _degrees(_located(search, _spectra(recording)))
 
     return bearings
 
@@ -86,8 +85,7 @@ def by_votes(
         power = np.array([np.sum(np.abs(block) ** 2) for block in blocks])
         azimuth = []
         for k in np.flatnonzero(power > np.quantile(power, _WEAKEST)):
-            search.locate_sources(blocks[k], freq_range=BAND_HZ)
-            azimuth += np.atleast_1d(search.azimuth_recon).tolist()
+            azimuth += _located(search, blocks[k]).tolist()
         return [math.degrees(s.bearing) for s in gather_sources(_votes(azimuth))]
 
     return bearings
@@ -97,6 +95,17 @@ def _search(name: str, places: NDArray[np.float64], number: int) -> pra.doa.DOA:
     return pra.doa.algorithms[name](
         places[:, :2].T.copy(), RATE, N_FFT, c=C, num_src=number, n_grid=GRID
     )
+
+
+def _located(
+    search: pra.doa.DOA, spectra: NDArray[np.complex128]
+) -> NDArray[np.float64]:
+    """Azimuths, rad; none where CSSM or WAVES meets a matrix that has no inverse."""
+    try:
+        search.locate_sources(spectra, freq_range=BAND_HZ)
+    except np.linalg.LinAlgError:
+        return np.empty(0)
+    return np.atleast_1d(search.azimuth_recon)
 
 
 def _spectra(recording: Recording) -> NDArray[np.complex128]:

@@ -38,6 +38,12 @@ def test_where_both_kinds_of_votes_agree_is_a_source():
     assert found == pytest.approx([-50.0, 40.0], abs=1.5)
 
 
+def test_where_no_single_bin_votes_is_no_source():
+    rng = np.random.default_rng(2)
+    (source,) = gather_sources(votes_at(around(20.0, 40, rng), around(-20.0, 40, rng)))
+    assert math.degrees(source.bearing) == pytest.approx(20.0, abs=1.5)
+
+
 def test_any_votes_can_be_gathered():
     rng = np.random.default_rng(2)
     for _ in range(300):
