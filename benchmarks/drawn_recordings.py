@@ -15,6 +15,7 @@ from analysis.recordings.array_geometry import ArrayGeometry
 
 __all__ = [
     "RATE",
+    "SHORT_COUNT",
     "Cell",
     "DrawnArray",
     "bearing_bound",
@@ -26,6 +27,8 @@ __all__ = [
 
 RATE = 48_000
 C, SPEED_STD, DELAY_STD, GAIN_STD_DB = 343.0, 3.43, 2e-6, 2.0
+#: Short sounds of a recording; of long ones there is one.
+SHORT_COUNT = 3
 ROOM_M = np.array([11.0, 9.0, 4.5])
 _FROM_WALLS_M = 0.5
 _RANGES_M, _APERTURES_M = (0.5, 6.0), (0.05, 2.0)
@@ -291,7 +294,7 @@ def record(
 ) -> NDArray[np.float64]:
     """(n, samples) at 48 kHz: sounds with their echoes, 20 to 40 dB over the noise."""
     one = _sound(cell.seconds, rng)
-    count = 1 if cell.seconds > 0.5 else 3
+    count = 1 if cell.seconds > 0.5 else SHORT_COUNT
     pause = np.zeros(round((0.25 + cell.t60) * RATE))
     played = np.concatenate([pause, *[one, pause] * count])
     heard = convolved(drawn, cell.t60, played)

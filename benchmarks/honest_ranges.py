@@ -23,6 +23,7 @@ from analysis.reporting.intervals import wilson_interval
 from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.drawn_recordings import (
     RATE,
+    SHORT_COUNT,
     Cell,
     DrawnArray,
     bearing_bound,
@@ -75,8 +76,8 @@ class Trial:
     bearing_off: float
     """rad."""
     bearing_std: float
-    scatter_m: float
-    """Of the ranges of single estimates."""
+    ranges_m: tuple[float, ...]
+    """Of single estimates; NaN where none is given."""
 
     @property
     def heard(self) -> bool:
@@ -95,7 +96,7 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
     try:
         heard = hear(samples, RATE, drawn.geometry, "recording")
     except InputError as error:
-        return Trial(cell, drawn, str(error), (), (), *(math.nan,) * 5)
+        return Trial(cell, drawn, str(error), (), (), *(math.nan,) * 4, ())
     known = drawn.geometry.known
     found = LocateResult(
         {},
@@ -114,7 +115,6 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
             math.radians(found["bearing_deg"]) - drawn.bearing, 2.0 * math.pi
         )
         std = math.radians(found["bearing_std_deg"])
-    ranges = [e.range_m for e in heard.estimates if e.range_m is not None]
     return Trial(
         cell=cell,
         drawn=drawn,
@@ -125,7 +125,7 @@ def try_array(cell: Cell, drawn: DrawnArray, rng: np.random.Generator) -> Trial:
         range_std_m=math.nan if found["range_m"] is None else found["range_std_m"],
         bearing_off=off,
         bearing_std=std,
-        scatter_m=float(np.std(ranges)) if ranges else math.nan,
+        ranges_m=tuple(e.range_m or math.nan for e in heard.estimates),
     )
 
 
@@ -270,30 +270,31 @@ def _of_chirps(task: tuple[int, int]) -> Trial:
 def print_chirps(trials: Sequence[Trial]) -> None:
     """Prints a table of chirps 5 m away, by an array that is known exactly."""
     headings = (
-        "sources", "ranges", "largest bias", "median bias", "largest scatter, m",
-        "median scatter, m", "within 1, 2 deviations",
+        "sources", "ranges", "largest, median bias", "largest, median scatter",
+        "chirps", "with a range", "farthest off", "within 1, 2 deviations",
     )  # fmt: skip
     ranged = [t for t in trials if t.ranged]
-    bias = np.abs([t.range_m / t.drawn.range_m - 1.0 for t in ranged])
+    bias = 100.0 * np.abs([t.range_m / t.drawn.range_m - 1.0 for t in ranged])
     off = np.array([(t.range_m - t.drawn.range_m) / t.range_std_m for t in ranged])
-    scatter = np.array([t.scatter_m for t in ranged])
-    print("\n" + markdown_head(headings))
+    scatter = [np.nanstd(t.ranges_m) for t in ranged]
+    each = np.array([r - t.drawn.range_m for t in trials for r in t.ranges_m])
     row = (
         str(len(trials)),
         str(len(ranged)),
-        f"{100 * bias.max():.1f} %",
-        f"{100 * np.median(bias):.1f} %",
-        f"{scatter.max():.3f}",
-        f"{np.median(scatter):.3f}",
+        f"{bias.max():.1f} %, {np.median(bias):.1f} %",
+        f"{np.max(scatter):.3f} m, {np.median(scatter):.3f} m",
+        str(SHORT_COUNT * len(trials)),
+        str(np.isfinite(each).sum()),
+        f"{np.nanmax(np.abs(each)):.3f} m",
         f"{_within(off, 1.0)}, {_within(off, 2.0)}",
     )
-    print(markdown_row(row), flush=True)
+    print(f"\n{markdown_head(headings)}\n{markdown_row(row)}", flush=True)
 
 
 def main() -> None:
     """Reads the number of draws."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--draws", type=int, default=12, help="of each cell (12)")
+    parser.add_argument("--draws", type=int, default=15, help="of each cell (15)")
     parser.add_argument("--chirps", type=int, default=20, help="sources (20)")
     parser.add_argument("--seed", type=int, default=3)
     parser.add_argument("--processes", type=int, default=1)

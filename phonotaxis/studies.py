@@ -68,7 +68,7 @@ class ComparisonResult:
 
     def __str__(self) -> str:
         """Tables on one screen."""
-        from analysis.comparison.report import compare_text
+        from analysis.comparison.report_text import compare_text
 
         return compare_text(self.summary, self.comparisons, self.pooled)
 
@@ -191,12 +191,9 @@ def compare(
         InputError: Something of that is no good; says what, and the remedy.
         RunError: Every run failed.
     """
-    from analysis.comparison.compare import (
-        EXPERIMENTS,
-        comparison_plan,
-        prepare_comparison,
-    )
+    from analysis.comparison.compare import comparison_plan, prepare_comparison
     from analysis.comparison.report import compare_summary, write_comparison
+    from analysis.comparison.words import EXPERIMENTS
 
     chosen = None if laws is None else list(laws)
     plans = {
@@ -215,7 +212,7 @@ def compare(
     prepared = prepare_comparison(plans, out, workers=workers, resume=resume)
     comparisons, pooled = prepared.run(progress)
     summary = compare_summary(prepared, comparisons, pooled)
-    write_comparison(prepared, comparisons, summary)
+    write_comparison(prepared, comparisons, pooled, summary)
     return ComparisonResult(comparisons, pooled, summary, prepared.out)
 
 

@@ -253,7 +253,8 @@ def _inverted(
             "negative; exchange the wires of its microphone, or the sign of its "
             "samples",
         )
-        for k in np.flatnonzero((signs < 0.0) & alive)
+        # Channels that share nothing with the rest have any sign.
+        for k in np.flatnonzero((signs < 0.0) & alive & (table @ alive < 0.0))
     ]
 
 

@@ -81,6 +81,16 @@ def test_short_sounds_between_long_echoes_are_shared():
     assert ("dead", (2,)) in faults(samples, SQUARE)
 
 
+def test_channels_that_share_no_sound_are_not_inverted():
+    """Two hear one sound, and two another: no pair is upside down."""
+    for seed in range(6):
+        rng = np.random.default_rng(seed)
+        one, other = rng.standard_normal((2, round(SECONDS * FS)))
+        samples = np.array([one, one, other, other])[rng.permutation(4)]
+        samples += 0.3 * rng.standard_normal(samples.shape)
+        assert not [kind for kind, _ in faults(samples, SQUARE) if kind == "inverted"]
+
+
 def test_silence_noise_and_tones_are_no_faults():
     generator = np.random.default_rng(1)
     noise = 1e-3 * generator.standard_normal((5, 2 * FS))

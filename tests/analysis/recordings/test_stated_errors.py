@@ -34,6 +34,12 @@ def delays(places, source, c=C, late=0.0, own_s=1e-8):
     return AlignedDelays(arrivals[1:] - arrivals[0], own, 1.0)
 
 
+def placed_at(measured, known):
+    placed = place_source(measured, known)
+    assert placed is not None
+    return placed
+
+
 @pytest.mark.parametrize(
     "errors",
     [
@@ -44,9 +50,7 @@ def delays(places, source, c=C, late=0.0, own_s=1e-8):
 )
 def test_bearing_ahead_of_a_row_by_errors_of_arrivals(errors):
     """Arrivals off by s each turn a row's normal by c s over the root of sum y^2."""
-    placed = place_source(
-        delays(np.array(ROW), [2.0, 0.0]), geometry(ROW, **errors).known
-    )
+    placed = placed_at(delays(np.array(ROW), [2.0, 0.0]), geometry(ROW, **errors).known)
     expected = C * 4e-6 / math.sqrt(2 * 0.3**2)
     assert placed.fix.bearing_std == pytest.approx(expected, rel=0.02)
     assert placed.systematic.bearing_std == pytest.approx(expected, rel=0.02)
@@ -54,7 +58,7 @@ def test_bearing_ahead_of_a_row_by_errors_of_arrivals(errors):
 
 def test_errors_across_the_rays_do_nothing():
     across = geometry(ROW, position_covariance_m2=[[0.0, 0.0], [0.0, 1e-6]]).known
-    placed = place_source(delays(np.array(ROW), [20.0, 0.0]), across)
+    placed = placed_at(delays(np.array(ROW), [20.0, 0.0]), across)
     # By 1 mm at 0.3 m, seen by a ray that is off the normal by 0.3 of 20.
     assert placed.systematic.bearing_std < 0.02 * 1e-3 / 0.3
 
@@ -64,7 +68,7 @@ def test_speed_of_sound_turns_a_row_by_its_tangent():
     bearing = math.radians(50.0)
     source = 20.0 * np.array([math.cos(bearing), math.sin(bearing)])
     known = geometry(ROW, sound_speed_std=0.01 * C).known
-    fix = place_source(delays(np.array(ROW), source), known).fix
+    fix = placed_at(delays(np.array(ROW), source), known).fix
     assert fix.bearing_std == pytest.approx(0.01 * math.tan(bearing), rel=0.02)
 
 
@@ -101,18 +105,18 @@ def test_two_of_three_places_are_within_what_is_stated(places, place_std):
             ranges.append((fix.range - np.linalg.norm(source - centre)) / fix.range_std)
     assert len(bearings) > 140
     assert len(ranges) > 40
-    for off in (ranges, bearings):
+    for all_off in (ranges, bearings):
         # 0.68 and 0.95 of a normal one, give or take three of their own deviations.
         for limit, share in ((1.0, 0.683), (2.0, 0.954)):
-            slack = 3.0 * math.sqrt(share * (1.0 - share) / len(off))
-            assert abs(np.mean(np.abs(off) < limit) - share) < slack
+            slack = 3.0 * math.sqrt(share * (1.0 - share) / len(all_off))
+            assert abs(np.mean(np.abs(all_off) < limit) - share) < slack
 
 
 def test_sources_beyond_what_is_looked_at_have_no_range():
     """However well the array is known; 30 m is the farthest."""
     known = geometry(ROW, sound_speed_std=0.1).known
     for distance, told in ((20.0, True), (29.99, False), (35.0, False), (300.0, False)):
-        placed = place_source(delays(np.array(ROW), [distance, 0.0]), known)
+        placed = placed_at(delays(np.array(ROW), [distance, 0.0]), known)
         assert placed.fix.range_valid == told
         assert abs(placed.fix.bearing) < 1e-4
 
