@@ -10,7 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
-from scipy.signal import find_peaks
 
 __all__ = ["consistent_lags"]
 
@@ -70,6 +69,8 @@ def consistent_lags(
 
 def _peaks(correlation: NDArray[np.float32], reach: int) -> NDArray[np.int64]:
     """Lags of the highest peaks within reach, its ends included."""
+    from scipy.signal import find_peaks
+
     middle = correlation.size // 2
     inside = correlation[middle - reach : middle + reach + 1]
     peaks = find_peaks(np.pad(inside, 1, constant_values=-np.inf))[0] - 1

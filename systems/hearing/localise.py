@@ -67,8 +67,7 @@ _SHARED_CHANCE = 1e-3
 _QUIET = 2.33
 
 # Sets of delays that are followed up where sounds overlap, and the least correlation
-# of one: of what remains beside two sounds a twentieth is higher
-# (docs/localization.md).
+# of one: of what chance leaves beside two sounds of 0.5-8 kHz a twentieth is higher.
 _SETS = 4
 _SET_CORRELATION = 0.1
 
