@@ -1,4 +1,4 @@
-"""docs/extending.md is true: a law is its own file and a place in the list.
+"""docs/extending.md is true: a law is its own file, a place in the list, and a schema.
 
 A tree of links to ours, in which the page's law is added, answers for every list.
 """
@@ -35,6 +35,11 @@ from analysis.stability.law_analysis import analyse_law, chosen_laws
 from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_page import stability_page
 from diagrams import build_sound_follower, load_scenario
+from diagrams.fields import SCHEMA_FILE
+from diagrams.scenario_schema import make_schema, schema_file_text
+
+# As docs.tables.schemas does.
+SCHEMA_FILE.write_text(schema_file_text(make_schema()), "utf-8")
 
 
 def printed(*words):
@@ -79,12 +84,15 @@ def page_code() -> str:
 
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
-    (tree / "systems").mkdir(parents=True)
-    for name in ("analysis", "diagrams", "phonotaxis"):
+    tree.mkdir()
+    for name in ("analysis", "phonotaxis"):
         (tree / name).symlink_to(ROOT / name)
-    for part in (ROOT / "systems").iterdir():
-        if part.name not in {"laws", "__pycache__"}:
-            (tree / "systems" / part.name).symlink_to(part)
+    own = {"laws", "__pycache__", "scenario.schema.json"}
+    for package in ("systems", "diagrams"):
+        (tree / package).mkdir()
+        for part in (ROOT / package).iterdir():
+            if part.name not in own:
+                (tree / package / part.name).symlink_to(part)
     laws = tree / "systems/laws"
     shutil.copytree(
         ROOT / "systems/laws", laws, ignore=shutil.ignore_patterns("__pycache__")
