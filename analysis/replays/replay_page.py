@@ -157,11 +157,16 @@ def _entry(layer: Layer) -> str:
     return f"<li><label>{box}{swatch}<span>{label}</span>{small}</label></li>"
 
 
+def _whose(chart: Chart) -> str:
+    return f"{chart.robot}: {chart.title}" if chart.robot else chart.title
+
+
 def _quantities(facts: ReplayFacts) -> str:
     options = []
     for robot, charts in groupby(enumerate(facts.charts), lambda pair: pair[1].robot):
         inner = "".join(
-            f'<option value="{k}">{html.escape(chart.title)}</option>'
+            # The group is not seen once one is chosen.
+            f'<option value="{k}">{html.escape(_whose(chart))}</option>'
             for k, chart in charts
         )
         label = html.escape(robot)
