@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from scipy import fft
 
 from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
-from systems.delays.consistent_lags import consistent_lags
 from analysis.recordings.recording_spectra import RecordingSpectra
+from systems.delays.consistent_lags import consistent_lags
 from systems.hearing.steered_response import (
     LAG_DENSITY,
     SearchGrid,

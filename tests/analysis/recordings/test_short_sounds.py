@@ -9,9 +9,9 @@ import pyroomacoustics
 import pytest
 import soundfile
 
-from systems.delays.consistent_lags import consistent_lags
 from analysis.recordings.locate import ArrayGeometry, locate
 from analysis.recordings.onset_spectra import OnsetSpectra
+from systems.delays.consistent_lags import consistent_lags
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 48_000, 343.0
