@@ -190,7 +190,7 @@ class SourceChoice:
             own[0] = _NOWHERE - 1.0
         counts = others[:, 1] >= _TIMES
         # Beside a sound that goes on there are its side peaks.
-        beside = counts & (others[:, 0] <= _GAP_S)
+        beside = counts & (others[:, 0] <= _SILENCE_S)
         own[own > costs.min(axis=1, initial=math.inf, where=beside)] = math.inf
         sure = np.array([c.sure for c in candidates])
         if belief.age > _SILENCE_S:
