@@ -72,7 +72,7 @@ def test_short_sounds_between_long_echoes_are_shared():
     rng = np.random.default_rng(1)
     count, length = round(SECONDS * FS), round(0.005 * FS)
     samples = 0.01 * rng.standard_normal((4, count))
-    samples[3] *= 2.0
+    samples[3] *= 4.0
     for begin in np.arange(0.2, 3.0, 0.5):
         k = round(begin * FS)
         samples[:, k : k + length] += rng.standard_normal(length)

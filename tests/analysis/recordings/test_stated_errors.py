@@ -146,17 +146,17 @@ def free_field(places, source, sounds, rng):
 
 @pytest.mark.parametrize("length", [0.01, 0.6])
 def test_side_lobes_are_no_delays_where_microphones_stand_elsewhere(length):
-    """Off by 2 cm, 60 us; the period of the middle of the band is 190 us."""
+    """Off by 3 cm, 90 us; the period of the middle of the band is 190 us."""
     rng = np.random.default_rng(4)
     stated = np.array(TWIST, dtype=float)
-    known = geometry(TWIST, position_std_m=0.02)
+    known = geometry(TWIST, position_std_m=0.03)
     source = stated.mean(axis=0) + np.array([1.0, 0.5, 0.2])
-    for _ in range(3):
-        places = stated + 0.02 * rng.standard_normal(stated.shape)
-        sounds = [(0.4 + k * (0.5 + length), length) for k in range(2)]
+    for _ in range(5):
+        places = stated + 0.03 * rng.standard_normal(stated.shape)
+        sounds = [(0.4, length)]
         heard = hear(free_field(places, source, sounds, rng), RATE, known, "noise")
         true = delays(places, source).tau
-        assert len(heard.sightings) >= 2
+        assert heard.sightings
         off = np.array([np.abs(s.tau - true).max() for s in heard.sightings])
         assert np.median(off) < 2e-6
         assert np.mean(off < 5e-6) > 0.9
