@@ -122,7 +122,7 @@ def _example(axes: Axes, result: RunResult) -> None:
     draw_sources(axes, result, [end])
     for look in looks(result):
         draw_robot(axes, look, [0.0, end])
-    draw_collision(axes, result)
+    draw_collision(axes, result, star=9.0)
     for obstacle in result.scenario.obstacles:
         path = obstacle.path()
         if path.moves:

@@ -114,7 +114,15 @@ def rate_text(rate: Mean) -> str:
 
 
 def median_text(cell: LawCell, column: Column) -> str:
-    """A median of a law with its interval; a dash where it has none."""
+    """A median of a law with its interval; a dash where it has none.
+
+    Args:
+        cell: Of the law.
+        column: Says which median, and how it is written.
+
+    Returns:
+        A few words.
+    """
     median, factor = cell.metrics.get(column.metric), column.factor
     if median is None:
         return "-"

@@ -68,7 +68,7 @@ def arrows(own: RunResult, m_per_n: float | None) -> list[Arrow]:
 
     Args:
         own: The run of that robot.
-        m_per_n: From ``scale_m_n`` of the whole run.
+        m_per_n: Length of 1 N, m, from ``scale_m_n`` of the whole run.
 
     Returns:
         One to three.
@@ -101,7 +101,7 @@ def record_arrows(
         own: The run of that robot.
         path: Of the robot in Meshcat's tree; arrows are at ``forces/`` and ``law/``
             and this.
-        m_per_n: From ``scale_m_n`` of the whole run.
+        m_per_n: Length of 1 N, m, from ``scale_m_n`` of the whole run.
     """
     end = own.simulated_s
     times = np.unique([*np.arange(0.0, end, 1.0 / ARROWS_PER_S), end])
@@ -128,7 +128,15 @@ def record_arrows(
 
 
 def arrow_path(robot: str, name: str) -> str:
-    """Where an arrow of a robot is in Meshcat's tree."""
+    """Where an arrow of a robot is in Meshcat's tree.
+
+    Args:
+        robot: Path of the robot there.
+        name: Of the arrow.
+
+    Returns:
+        Path without a slash in front.
+    """
     return f"law/{robot}" if name == "law" else f"forces/{robot}/{name}"
 
 

@@ -380,12 +380,13 @@ def draw_room(axes: Axes, result: RunResult) -> None:
     )
 
 
-def draw_collision(axes: Axes, result: RunResult) -> None:
+def draw_collision(axes: Axes, result: RunResult, star: float = 19.0) -> None:
     """What the robot touched, as it was then, and a star that leaves it in sight.
 
     Args:
         axes: Where to draw, in W, m.
         result: The run.
+        star: Its size, in points.
     """
     if result.collision is None:
         return
@@ -405,8 +406,8 @@ def draw_collision(axes: Axes, result: RunResult) -> None:
         "*",
         markerfacecolor="none",
         markeredgecolor="black",
-        markeredgewidth=1.4,
-        markersize=19,
+        markeredgewidth=1.4 if star > 12.0 else 0.9,
+        markersize=star,
         label="where they touched",
         linestyle="none",
         zorder=9,
