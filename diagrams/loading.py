@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 from pydantic_core import ValidationError
 
 from diagrams.fields import (
-    SCHEMA_FILE,
     begins_anew,
     check_fields,
     did_you_mean,
     explain,
     scenario_schema,
 )
+from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file

@@ -37,7 +37,7 @@ def test_every_library_that_is_imported_is_declared() -> None:
     project = PROJECT["project"]
     extras = [
         each
-        for name in ("export", "live", "sweep")
+        for name in ("export", "live", "movie", "sweep")
         for each in project["optional-dependencies"][name]
     ]
     declared = {plain(each) for each in (*project["dependencies"], *extras)}

@@ -12,7 +12,7 @@ from analysis.reporting.intervals import with_interval
 
 __all__ = [
     "PAIRED",
-    "Column",
+    "MedianColumn",
     "compare_text",
     "counts_text",
     "difference_text",
@@ -23,7 +23,7 @@ __all__ = [
 ]
 
 
-class Column(NamedTuple):
+class MedianColumn(NamedTuple):
     """A median of the printed table."""
 
     heading: str
@@ -35,13 +35,13 @@ class Column(NamedTuple):
 
 
 _COLUMNS = (
-    Column("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
-    Column("jerk m/s^3", "jerk_rms_m_s3", 1.0, ".2f"),
-    Column("SPARC", "sparc", 1.0, ".2f"),
-    Column("reacts m", "reaction_distance_m", 1.0, ".2f"),
-    Column("error m", "following_error_rms_m", 1.0, ".2f"),
-    Column("off the way m", "route_deviation_max_m", 1.0, ".2f"),
-    Column("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
+    MedianColumn("clearance cm", "minimum_obstacle_clearance_m", 100.0, ".1f"),
+    MedianColumn("jerk m/s^3", "jerk_rms_m_s3", 1.0, ".2f"),
+    MedianColumn("SPARC", "sparc", 1.0, ".2f"),
+    MedianColumn("reacts m", "reaction_distance_m", 1.0, ".2f"),
+    MedianColumn("error m", "following_error_rms_m", 1.0, ".2f"),
+    MedianColumn("off the way m", "route_deviation_max_m", 1.0, ".2f"),
+    MedianColumn("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
 )
 #: Metrics whose paired differences are printed.
 PAIRED = ("minimum_obstacle_clearance_m", "jerk_rms_m_s3", "sparc")
@@ -96,7 +96,7 @@ def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
             yield f"      failures: {counts_text(cell.mechanisms)}"
 
 
-def median_columns(cells: Sequence[LawCell]) -> list[Column]:
+def median_columns(cells: Sequence[LawCell]) -> list[MedianColumn]:
     """The columns that one of the laws has at least."""
     return [
         column for column in _COLUMNS if any(column.metric in c.metrics for c in cells)
@@ -113,7 +113,7 @@ def rate_text(rate: Mean) -> str:
     return with_interval(rate.estimate, rate.low, rate.high, ".0f", factor=100.0)
 
 
-def median_text(cell: LawCell, column: Column) -> str:
+def median_text(cell: LawCell, column: MedianColumn) -> str:
     """A median of a law with its interval; a dash where it has none.
 
     Args:

@@ -84,7 +84,15 @@ def place_source(delays: AlignedDelays, array: KnownArray) -> PlacedSource | Non
 
 
 def has_place(delays: AlignedDelays, array: KnownArray) -> bool:
-    """Whether some place fits the delays, be its bearing ever so uncertain."""
+    """Whether some place fits the delays, be its bearing ever so uncertain.
+
+    Args:
+        delays: Of the channels, with their errors.
+        array: The microphones and their budget.
+
+    Returns:
+        False where the delays belong to no place at all.
+    """
     return _placed(delays, array) is not None
 
 

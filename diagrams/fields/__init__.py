@@ -7,16 +7,10 @@ from diagrams.fields.explain import explain
 from diagrams.fields.field_list import Field, find_fields, list_fields
 from diagrams.fields.joining import begins_anew, joined
 from diagrams.fields.near_miss import did_you_mean, near_field, unknown_law
-from diagrams.fields.shipped import (
-    SCHEMA_FILE,
-    known_laws,
-    scenario_schema,
-    schema_text,
-)
+from diagrams.fields.shipped import known_laws, scenario_schema, schema_text
 from diagrams.fields.structure import check_fields, check_structure
 
 __all__ = [
-    "SCHEMA_FILE",
     "Field",
     "begins_anew",
     "check_fields",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from analysis.sweeps.sweep_file import SWEEP_SCHEMA_FILE
 from analysis.sweeps.sweep_schema import make_sweep_schema
-from diagrams.fields import SCHEMA_FILE
+from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.scenario_schema import make_schema, schema_file_text
 
 __all__ = ["main"]

@@ -46,5 +46,9 @@ def _prepare(options: Namespace, take: Take) -> Job[list[Column]]:
 
 
 COMMAND = Command(
-    "columns", "units and meanings of a run's columns", _add_arguments, _prepare
+    "columns",
+    "units and meanings of a run's columns",
+    _add_arguments,
+    _prepare,
+    examples=("columns", "columns clearance", "columns --json"),
 )

@@ -74,5 +74,9 @@ def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
 
 
 COMMAND = Command(
-    "export", "MCAP and CSV of a run that is done", _add_arguments, _prepare
+    "export",
+    "MCAP and CSV of a run that is done",
+    _add_arguments,
+    _prepare,
+    examples=("export results/0001 --mcap", "export results/0001 --csv --out tables"),
 )

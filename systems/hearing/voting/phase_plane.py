@@ -30,6 +30,8 @@ _LEAST_IN_SPACE = 0.85
 _BEYOND, _APART, _ALMOST = 1.3, 0.6, 0.2
 # Guesses are so near to each other, in phase along the array, rad.
 _GUESS_STEP_RAD = 1.0
+# Wide arrays with short pairs would need more: they end where phases wrap.
+_MOST_GUESSES = 4_000
 
 # Largest phase by which pairs may be off the plane wave, RMS over all pairs, rad.
 _LARGEST_RESIDUAL_RAD = 0.6
@@ -61,7 +63,8 @@ class PhasePlane:
     wraps_hz: float
     """Where sound along the longest of them turns by half a period, Hz."""
     guesses: NDArray[np.float64]
-    """(g, r) directions, along ``shape.span``, to begin with above that."""
+    """(g, r) directions, along ``shape.span``, to begin with above that; none: the
+    array is not used there."""
     to_slowness: NDArray[np.float64]
     """(r, s) along ``shape.span``, from the paths between short pairs."""
     refine: NDArray[np.float64]
@@ -104,7 +107,7 @@ class PhasePlane:
     @property
     def highest_hz(self) -> float:
         """Up to which waves can be fitted, Hz."""
-        return _BEYOND * self.wraps_hz
+        return _BEYOND * self.wraps_hz if len(self.guesses) else self.wraps_hz
 
     def fit(
         self, pattern: NDArray[np.complex128], frequency_hz: NDArray[np.float64]
@@ -124,9 +127,10 @@ class PhasePlane:
         slowness = phase[:, self.short] @ self.to_slowness.T / number
         wrapped = frequency_hz > self.wraps_hz
         clear = np.ones(len(phase), dtype=bool)
-        slowness[wrapped], clear[wrapped] = self._guessed(
-            phase[wrapped], number[wrapped, 0]
-        )
+        if wrapped.any():
+            slowness[wrapped], clear[wrapped] = self._guessed(
+                phase[wrapped], number[wrapped, 0]
+            )
         # The long pairs' phases are taken as near as they can be to the short ones'.
         left = _wrapped(phase - number * (slowness @ self.paths.T))
         turn = left @ self.refine.T / number
@@ -185,6 +189,8 @@ def _guesses(shape: ArrayShape, wavelength_m: float) -> NDArray[np.float64]:
     """(g, r) slownesses side by side, all that sound from afar may have."""
     step = _GUESS_STEP_RAD * wavelength_m / (2.0 * np.pi * shape.aperture_m)
     count = int(np.ceil(2.0 / step)) + 1
+    if count ** len(shape.span) > _MOST_GUESSES:
+        return np.empty((0, len(shape.span)))
     axes = [np.linspace(-1.0, 1.0, count)] * len(shape.span)
     grid = np.stack(np.meshgrid(*axes), axis=-1).reshape(-1, len(axes))
     length = np.linalg.norm(grid, axis=1)

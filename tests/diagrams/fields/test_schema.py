@@ -11,7 +11,7 @@ import pytest
 
 from analysis.sweeps.sweep_file import SWEEP_SCHEMA_FILE
 from analysis.sweeps.sweep_schema import make_sweep_schema
-from diagrams.fields import SCHEMA_FILE
+from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.loading import read_mapping
 from diagrams.scenario_schema import make_schema
 

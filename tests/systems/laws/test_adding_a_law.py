@@ -35,7 +35,7 @@ from analysis.stability.law_analysis import analyse_law, chosen_laws
 from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_page import stability_page
 from diagrams import build_sound_follower, load_scenario
-from diagrams.fields import SCHEMA_FILE
+from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.scenario_schema import make_schema, schema_file_text
 
 # As docs.tables.schemas does.
