@@ -18,7 +18,7 @@ _COMMANDS = (
     "scenarios",
     "laws",
     "locate",
-    "localization",
+    "accuracy",
     "compare",
     "stability",
     "sweep",
@@ -245,7 +245,7 @@ def _words(draw: random.Random) -> Made:
         if draw.random() < 0.6:
             words.append(_value(draw))
     # What is right by chance must not take minutes.
-    if command in ("localization", "compare", "stability", "design", "simulate"):
+    if command in ("accuracy", "compare", "stability", "design", "simulate"):
         words.append(draw.choice(["--no-such", "--seed=-1", "--out=full"]))
     if command == "sweep":
         words.insert(1, "nothing.yaml")
@@ -419,12 +419,10 @@ def _law(draw: random.Random) -> Made:
 
 
 def _out(draw: random.Random) -> Made:
-    command = draw.choice(
-        ["simulate", "localization", "stability", "design", "compare"]
-    )
+    command = draw.choice(["simulate", "accuracy", "stability", "design", "compare"])
     words = [command, "--out", draw.choice(_NAMES)]
     # What is right runs nowhere: the law, or the number of trials, is not.
-    if command == "localization":
+    if command == "accuracy":
         words += ["--trials", "0"]
     elif command == "compare":
         words += ["--laws", "nothing"]

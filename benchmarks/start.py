@@ -42,7 +42,7 @@ REFUSALS = (
     ("locate", "missing.wav"),
     ("calibrate", "missing.yaml"),
     ("listen", "missing.wav"),
-    ("localization", "--seed", "x"),
+    ("accuracy", "--seed", "x"),
     ("fields", "reverberatoin_time_s"),
 )
 #: It takes several fields to see what is wrong: the models are loaded.

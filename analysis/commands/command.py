@@ -72,3 +72,5 @@ class Command:
     """Loads and checks the input."""
     examples: tuple[str, ...] = ()
     """Words after the program's name, for the help."""
+    was: str = ""
+    """A name that it had, by which it still can be called."""

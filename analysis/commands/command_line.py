@@ -15,11 +15,11 @@ from types import MappingProxyType
 from typing import NoReturn
 
 from analysis.commands import (
+    accuracy,
     calibrate,
     compare,
     design,
     listen,
-    localization,
     locate,
     simulate,
     stability,
@@ -47,7 +47,7 @@ COMMANDS: dict[str, Command] = {
         locate,
         listen,
         calibrate,
-        localization,
+        accuracy,
         compare,
         stability,
         sweep,
@@ -112,7 +112,7 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
     """
     _prepare_process()
     try:
-        options = make_parser().parse_args(words)
+        options = make_parser().parse_args(_by_new_names(words))
         carry_out(COMMANDS[options.command], options, interrupts)
     except BrokenPipeError:
         # The reader of our output has left; Python must not complain at exit.
@@ -121,6 +121,18 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
     except Exception as error:  # noqa: BLE001  # bad input, a failed run, or a bug
         return _report(error, words)
     return DONE
+
+
+def _by_new_names(words: Sequence[str]) -> Sequence[str]:
+    """The same words, but for a command that is called by a name that it had."""
+    for command in COMMANDS.values():
+        if words and command.was and words[0] == command.was:
+            print(
+                f"phonotaxis: the command {command.was} is called {command.name} now",
+                file=sys.stderr,
+            )
+            return [command.name, *words[1:]]
+    return words
 
 
 def _prepare_process() -> None:

@@ -1,4 +1,4 @@
-"""``phonotaxis localization``, as a user meets it."""
+"""``phonotaxis accuracy``, as a user meets it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from diagrams import load_scenario
 
 def test_json_and_files(capsys, tmp_path):
     out = tmp_path / "out"
-    words = ["localization", "--trials", "2", "--tolerances", "--json", "--out"]
+    words = ["accuracy", "--trials", "2", "--tolerances", "--json", "--out"]
     assert phonotaxis.main([*words, str(out)]) == 0
     printed = capsys.readouterr()
     document = json.loads(printed.out)
@@ -32,7 +32,7 @@ def test_json_and_files(capsys, tmp_path):
 
 def test_tables_on_the_terminal(capsys, tmp_path):
     out = tmp_path / "out"
-    words = ["localization", "--trials", "2", "--seed", "5", "--out", str(out)]
+    words = ["accuracy", "--trials", "2", "--seed", "5", "--out", str(out)]
     assert phonotaxis.main(words) == 0
     text = capsys.readouterr().out
     assert text.count("  4 m    60 deg") == 4
@@ -50,9 +50,16 @@ def test_tables_on_the_terminal(capsys, tmp_path):
     ],
 )
 def test_bad_input_is_one_line_and_status_2(capsys, words, field, hint):
-    assert phonotaxis.main(["localization", *words]) == 2
+    assert phonotaxis.main(["accuracy", *words]) == 2
     printed = capsys.readouterr()
     assert printed.out == ""
     assert len(printed.err.splitlines()) == 1
     assert f"phonotaxis: {field}" in printed.err
     assert hint in printed.err
+
+
+def test_its_old_name_still_does_with_a_notice(capsys):
+    assert phonotaxis.main(["localization", "--trials", "0"]) == 2
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "phonotaxis: the command localization is called accuracy now"
+    assert "trials" in said[1]

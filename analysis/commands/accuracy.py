@@ -1,4 +1,4 @@
-"""``phonotaxis localization``: the papers' localisation tables, ours, and the bound."""
+"""``phonotaxis accuracy``: the papers' localisation tables, ours, and the bound."""
 
 from __future__ import annotations
 
@@ -65,12 +65,13 @@ def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
 
 
 COMMAND = Command(
-    "localization",
-    "the papers' localisation tables, ours, and the bound",
+    "accuracy",
+    "how well the robot hears: the papers' tables, ours, and the bound",
     _add_arguments,
     _prepare,
     examples=(
-        "localization",
-        "localization --trials 20 --tolerances",
+        "accuracy",
+        "accuracy --trials 20 --tolerances",
     ),
+    was="localization",
 )
