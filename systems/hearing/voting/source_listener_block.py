@@ -99,13 +99,15 @@ class SourceListener(LeafSystem):
         )
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             period_sec=microphones.frame_s,
-            offset_sec=microphones.frame_s,
+            offset_sec=0.0,
             update=self._hear,
         )
 
     def _hear(self, context: Any, state: Any) -> None:
         audio = read_audio(context, self._audio, "SourceListener")
         check_rate(audio, self._plan.sample_rate_hz, "SourceListener")
+        if context.get_time() == 0.0:
+            return  # of before the start
         before: _Heard = context.get_abstract_state(0).get_value()
         steps, memory = hear_sources(
             audio.counts, before.memory, self._plan, self._parameters

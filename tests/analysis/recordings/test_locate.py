@@ -330,7 +330,7 @@ def test_clipped_channel_is_named(tmp_path):
     limit = [1, 1, 1, 1, 1, 0.02]
     result = locate(altered(path, lambda x: np.clip(x, -1, limit)), array(places))
     assert [f.kind for f in result.faults] == ["clipped"]
-    assert "channel 6: clipped" in locate_text(result)
+    assert "channel 6: clipped" in result.faults[0].message
     assert result.summary()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
 
 
