@@ -24,7 +24,11 @@ _KERNEL_RAD = math.radians(4.5)
 
 # Of a peak, as a share of the highest one, and above the higher of the valleys beside
 # it, as a share of its own height.
-_LEAST_HEIGHT, _LEAST_PROMINENCE = 0.22, 0.12
+_LEAST_HEIGHT, _LEAST_PROMINENCE = 0.18, 0.12
+
+# Of a source's share of the votes, as a share of the largest one: the votes of a strong
+# echo are few but agree, so that its peak is narrow and high.
+_LEAST_SHARE = 0.17
 
 # Exponent of the single bins' density in the mean, and what either one has everywhere,
 # as a share of all: a source that one of them hardly hears is not lost.
@@ -106,6 +110,8 @@ def gather_sources(
             height = float(density[peak] / density.max())
             sure = min(1.0, source.votes / (3.0 * least))
             found.append(source._replace(confidence=math.sqrt(height) * sure))
+    most = max((source.share for source in found), default=0.0)
+    found = [source for source in found if source.share >= _LEAST_SHARE * most]
     return sorted(found, key=lambda source: -source.share)
 
 

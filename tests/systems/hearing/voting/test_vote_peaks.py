@@ -53,3 +53,14 @@ def test_any_votes_can_be_gathered():
         for source in gather_sources(votes_at(single, steered)):
             assert math.isfinite(source.bearing_std)
             assert 0.0 <= source.confidence <= 1.0
+
+
+@pytest.mark.parametrize(("votes", "sources"), [(40, 1), (90, 2)])
+def test_few_votes_that_agree_are_an_echo(votes, sources):
+    rng = np.random.default_rng(3)
+    talker = 6.0 * rng.standard_normal(300)
+    narrow = 80.0 + 0.5 * rng.standard_normal(votes)
+    steered = np.append(talker[:40], narrow[:4])
+    found = gather_sources(votes_at(np.append(talker, narrow), steered))
+    assert len(found) == sources
+    assert math.degrees(found[0].bearing) == pytest.approx(0.0, abs=1.5)
