@@ -51,7 +51,7 @@ def hearing_table(summary: dict[str, Any]) -> str:
     clearance = pair["metrics"][_CLEARANCE]
     rates = (
         f"{100.0 * rate['difference']:+z.1f} points "
-        f"({100.0 * rate['low']:+z.1f}, {100.0 * rate['high']:+.1f})"
+        f"({100.0 * rate['low']:+z.1f}, {100.0 * rate['high']:+z.1f})"
         for rate in (pair["success"], pair["collision"])
     )
     bounds = ", ".join(f"{100.0 * clearance[end]:+z.2f}" for end in ("low", "high"))
