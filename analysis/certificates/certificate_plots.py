@@ -117,7 +117,9 @@ def plot_certificate_trials(trials: CertificateTrials) -> Figure:
     draw_bodies(axes, certificate.model)
     axes.set_xlim(certificate.x_m[0], certificate.x_m[-1])
     axes.set_ylim(certificate.y_m[0], certificate.y_m[-1])
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside right upper")
+    figure.legend(
+        *axes.get_legend_handles_labels(), loc="outside lower center", ncols=3
+    )
     axes.set_title(
         f"{certificate.model.law.name}: {len(trials.inside.starts)} starts inside and "
         f"{len(trials.outside.starts)} outside, certified / safe = {trials.ratio:.3f}",

@@ -140,7 +140,7 @@ def difference_text(median: PairedMedian | None) -> str:
     """The median of paired differences with its interval; a dash where none is."""
     if median is None or median.difference is None:
         return "-"
-    return f"{median.difference:+.3f} ({median.low:+.3f}, {median.high:+.3f})"
+    return f"{median.difference:+z.3f} ({median.low:+z.3f}, {median.high:+z.3f})"
 
 
 def _pair_line(pair: Pair) -> Iterator[str]:

@@ -155,7 +155,7 @@ def _pair(mean: float | None, std: float | None, lost: int) -> str:
     if mean is None:
         return f"none{missing}"
     spread = "-" if std is None else f"{std:.4f}"
-    return f"{mean:.3f} {spread}{missing}"
+    return f"{mean:z.3f} {spread}{missing}"
 
 
 def _sensitivity_lines(rows: list[dict[str, Any]]) -> list[str]:

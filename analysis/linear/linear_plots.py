@@ -129,8 +129,18 @@ _CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 _NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
 #: Phases below this are beyond all that a Bode diagram is read for, deg.
 _LOWEST_PHASE_DEG = -720.0
-#: Closed-loop gains whose contours a Nichols chart shows, dB.
-_CONTOURS_DB = (-12.0, -6.0, -3.0, 0.0, 1.0, 3.0, 6.0, 12.0)
+#: Closed-loop sizes, dB, and about where each is written: phase, deg, and size, dB.
+#: Left of -180 deg, where few loops pass.
+_CONTOURS_DB = {
+    -12.0: (-330.0, -9.8),
+    -6.0: (-330.0, -0.6),
+    -3.0: (-330.0, 6.8),
+    0.0: (-265.0, 15.2),
+    1.0: (-243.0, 6.9),
+    3.0: (-225.0, 3.0),
+    6.0: (-210.0, 1.3),
+    12.0: (-184.0, 2.4),
+}
 
 
 def plot_bode(loops: Sequence[LoopMargins]) -> Figure:
@@ -261,12 +271,13 @@ def _contours(axes: Axes) -> None:
         phase,
         size,
         20.0 * np.log10(np.abs(L / (1.0 + L))),
-        levels=_CONTOURS_DB,
+        levels=list(_CONTOURS_DB),
         colors="#BBBBBB",
         linewidths=0.6,
         linestyles="solid",
     )
-    axes.clabel(drawn, fmt="%g dB", fontsize=7)
+    places = list(_CONTOURS_DB.values())
+    axes.clabel(drawn, fmt="%g dB", fontsize=7, colors="#767676", manual=places)
 
 
 def plot_gang_of_four(gang: GangOfFour) -> Figure:

@@ -48,7 +48,7 @@ def with_interval(
         value: The figure.
         low: Lower end of its interval.
         high: Upper end.
-        form: As ``format`` takes it.
+        form: Sign and decimals, as ``format`` takes them. A zero gets no minus.
         unit: Stands behind the figure, with a space in front.
         factor: What all are multiplied by.
 
@@ -56,6 +56,7 @@ def with_interval(
         Text as '12.5 % (3.1, 22.0)'.
     """
     value, low, high = (factor * each for each in (value, low, high))
+    form = form.replace(".", "z.")
     return f"{value:{form}}{unit} ({low:{form}}, {high:{form}})"
 
 

@@ -384,7 +384,7 @@ def clearance_panel(clearance: ArrayLike) -> Panel:
         time, colour = result.time, COLOURS["obstacle"]
         axes.plot(time, distance, color=colour, label="to nearest body")
         at, least = time[np.argmin(distance)], float(np.min(distance))
-        axes.plot(at, least, "v", color="black", label=f"least: {least:.2f} m")
+        axes.plot(at, least, "v", color="black", label=f"least: {least:z.2f} m")
         axes.set_ylabel("clearance\n(m)")
         axes.set_ylim(bottom=min(0.0, 1.1 * least))
 

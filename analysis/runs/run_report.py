@@ -167,10 +167,10 @@ def summary_rows(result: RunResult, summary: dict[str, Any]) -> dict[str, str]:
     }
     if not result.several:
         rows |= _robot_rows(result, summary["metrics"], "")
+    rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
     for name, own in result.several.items():
         rows |= {f"{name}": f"{_ended(own)}, law {own.scenario.law}"}
         rows |= _robot_rows(own, summary["metrics"], f"{name}.")
-    rows["speed"] = f"{timing['real_time_factor']:.0f} times real time"
     return rows
 
 

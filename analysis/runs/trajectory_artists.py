@@ -102,7 +102,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
         if scenario.route is None and scenario.searches != "odor":
             bar = microphones_W(pose, scenario.robot).T
             axes.plot(*bar, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
-        _write_time(axes, pose, -0.42, time, colour)
+        _write_time(axes, pose, -0.5 * scenario.robot.width_m, time, colour)
 
 
 def _draw_target(axes: Axes, look: Look) -> None:
@@ -157,6 +157,8 @@ def _write_time(
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
     """The path of each source, its body at both ends, dots at some times, s.
 
+    What rests has no times beside it.
+
     Args:
         axes: Where to draw, in W, m.
         result: The run.
@@ -207,7 +209,8 @@ def _draw_source(
         last = time
         pose = path[tick_at(result, time)]
         axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
-        _write_time(axes, pose, -0.5 * source.width_m, time, colour)
+        if moves:
+            _write_time(axes, pose, -0.5 * source.width_m, time, colour)
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:

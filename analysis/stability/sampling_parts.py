@@ -318,7 +318,10 @@ def _render_loci(data: Sequence[RootLocus], name: str) -> list[str]:
         ),
         table(["gain", "loop", "current", "stability ends at"], rows),
         figure_html(
-            plot_root_loci(data), name, "Root loci; the current poles are marked."
+            plot_root_loci(data),
+            name,
+            "Root loci; the current poles are marked.",
+            scale=True,
         ),
     ]
 

@@ -50,16 +50,16 @@ def hearing_table(summary: dict[str, Any]) -> str:
     pair = _pooled(summary)
     clearance = pair["metrics"][_CLEARANCE]
     rates = (
-        f"{100.0 * rate['difference']:+.1f} points "
-        f"({100.0 * rate['low']:+.1f}, {100.0 * rate['high']:+.1f})"
+        f"{100.0 * rate['difference']:+z.1f} points "
+        f"({100.0 * rate['low']:+z.1f}, {100.0 * rate['high']:+z.1f})"
         for rate in (pair["success"], pair["collision"])
     )
-    bounds = ", ".join(f"{100.0 * clearance[end]:+.2f}" for end in ("low", "high"))
+    bounds = ", ".join(f"{100.0 * clearance[end]:+z.2f}" for end in ("low", "high"))
     rows.append(
         (
             f"all {pair['success']['pairs']} pairs, audio less ideal",
             *rates,
-            f"{100.0 * clearance['difference']:+.2f} cm ({bounds})",
+            f"{100.0 * clearance['difference']:+z.2f} cm ({bounds})",
             _apart(pair),
         )
     )
@@ -87,7 +87,7 @@ def _row(summary: dict[str, Any], pair: dict[str, Any]) -> tuple[str, ...]:
         for name in ("success", "collision")
     )
     clearances = " / ".join(
-        f"{100.0 * cell['metrics'][_CLEARANCE]['median']:.1f}"
+        f"{100.0 * cell['metrics'][_CLEARANCE]['median']:z.1f}"
         for cell in (audio, ideal)
     )
     law = pair["fields"]["law"]

@@ -160,7 +160,7 @@ def _steps() -> Iterator[Sequence[str]]:
             for one in (check.predicted, check.ideal, check.full)
             if one is not None
         ]
-        errors = f"{check.frequency_error:+.2%}, {check.damping_error:+.2%}"
+        errors = f"{check.frequency_error:+z.2%}, {check.damping_error:+z.2%}"
         yield law, *cells, errors
 
 

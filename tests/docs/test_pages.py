@@ -65,7 +65,7 @@ def test_tutorial_reads_what_the_default_run_prints() -> None:
     assert found
     result = simulate(load_scenario("default"), engine="compiled")
     printed = summary_text(result, run_summary(result, None)).splitlines()
-    changing = ("speed", "results")
+    changing = ("speed", "results", "replay")
     told = [line for line in found[1].splitlines() if not line.startswith(changing)]
     assert told == [line for line in printed if not line.startswith(changing)]
 

@@ -8,6 +8,7 @@ from analysis.reporting.intervals import (
     bootstrap_interval,
     median_interval,
     wilson_interval,
+    with_interval,
 )
 
 
@@ -71,3 +72,8 @@ def test_median_interval_covers():
     covered = (intervals[:, 0] <= np.log(2.0)) & (np.log(2.0) <= intervals[:, 1])
     # Exactly 1 - 2 P(Binomial(40, 1/2) <= 13) = 0.9615.
     assert covered.mean() == pytest.approx(0.9615, abs=0.015)
+
+
+def test_zero_has_no_minus():
+    text = with_interval(-1e-9, -0.02, 1e-9, "+.3f", unit=" m")
+    assert text == "+0.000 m (-0.020, +0.000)"
