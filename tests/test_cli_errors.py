@@ -56,7 +56,7 @@ def fail(*_args, **_options):
         (["design"], "analysis.design.design_study.study_design"),
         (["simulate", *SHORT], "diagrams.simulate"),
         (["stability"], "analysis.stability.law_analysis.analyse_law"),
-        (["localization"], "analysis.hearing.localization.prepare_localization"),
+        (["accuracy"], "analysis.hearing.localization.prepare_localization"),
         (["locate", __file__], "analysis.recordings.locate.locate"),
         (["scenarios"], "diagrams.library_scenarios"),
         (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
