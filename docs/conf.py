@@ -48,6 +48,8 @@ nb_merge_streams = True
 KernelManager.transport_encryption.default_value = "auto"
 logging.getLogger("traitlets").setLevel(logging.WARNING)
 
+# Several classes have a ``range``; Python's own, in signatures, is none of them.
+suppress_warnings = ["ref.python"]
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
