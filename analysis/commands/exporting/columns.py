@@ -50,5 +50,5 @@ COMMAND = Command(
     "units and meanings of a run's columns",
     _add_arguments,
     _prepare,
-    examples=("columns", "columns clearance", "columns --json"),
+    examples=("columns", "columns p_WB", "columns --json"),
 )
