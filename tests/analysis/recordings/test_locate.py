@@ -331,6 +331,8 @@ def test_clipped_channel_is_named(tmp_path):
     result = locate(altered(path, lambda x: np.clip(x, -1, limit)), array(places))
     assert [f.kind for f in result.faults] == ["clipped"]
     assert "channel 6: clipped" in result.faults[0].message
+    # The command names faults on standard error, once.
+    assert "clipped" not in locate_text(result)
     assert result.summary()["bearing_deg"] == pytest.approx(60.0, abs=1.0)
 
 
