@@ -23,7 +23,7 @@ from analysis.hearing.free_field import (
 from analysis.hearing.paper_tables import PAPER_CELLS
 from analysis.reporting.markdown import markdown_head, markdown_row
 from systems.base.robot import RobotParameters
-from systems.hearing.localise import TDOAParameters
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -25,10 +25,10 @@ from analysis.reporting.palette import COLOURS, SERIES_COLOURS, draw_grid
 from analysis.safety.guarantees import clear_way, seen_angle_deg
 from benchmarks.guard_drivers import drive_at_a_wall
 from diagrams import Scenario
+from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS
-from systems.ranging.ultrasonic_array import UltrasonicParameters
 from systems.safety.braking import PASSED
-from systems.safety.motion_guard import GuardParameters
+from systems.safety.parameters import GuardParameters
 
 __all__ = ["draw_chart", "needed_distance", "passed_distance"]
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from diagrams import RunResult, Scenario, simulate
+from systems.base.robot import body_radius
 from systems.framework.block_facts import BlockFacts
 from systems.framework.step_block import RunFacts, Step, StepBlock
-from systems.safety.free_space_map import body_radius
 from systems.world.geometry import beyond_rectangle, rectangle_clearance
 
 __all__ = [

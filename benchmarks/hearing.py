@@ -27,7 +27,8 @@ from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from systems.base.robot import RobotParameters
 from systems.framework.signals import FRAME_SAMPLES
-from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

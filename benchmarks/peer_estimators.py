@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from analysis.hearing.free_field import frame_estimator
 from systems.base.robot import RobotParameters
 from systems.framework.signals import SAMPLE_RATE_HZ
-from systems.hearing.localise import TDOAParameters
 from systems.hearing.multilateration import locate_source
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from diagrams import Scenario
 from diagrams.robot import block_seed
 from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
+from systems.base.robot import microphones_B
 from systems.base.wheel_odometry import advance_pose, encoder_angle
 from systems.base.wheel_speed_command import (
     hand_position_twist,
@@ -25,7 +26,7 @@ from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_gener
 from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
-from systems.hearing.tracker_model import Measurement, Track, TrackerModel
+from systems.hearing.tracking.tracker_model import Measurement, Track, TrackerModel
 from systems.laws.active_impedance_controller import active_force
 from systems.laws.impedance import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points
@@ -35,7 +36,7 @@ from systems.ranging.ultrasonic_array import (
     world_rectangles,
 )
 from systems.sound.array_tolerances import draw_tolerances, real_array
-from systems.sound.recorder import microphones_B, record_frame
+from systems.sound.recorder import record_frame
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.sound.waveforms import make_waveform
 from systems.world.geometry import control_point, rotate

@@ -14,9 +14,8 @@ import numpy as np
 from analysis.hearing.room_trials import RoomResult, draw_layouts, locate_bursts
 from analysis.reporting.markdown import markdown_head, markdown_row
 from benchmarks.figures import Figure, print_figures
-from systems.hearing.tdoa_estimator import TDOAParameters
-from systems.sound.room import RoomParameters
-from systems.sound.waveforms import SoundParameters
+from systems.hearing.parameters import TDOAParameters
+from systems.sound.parameters import RoomParameters, SoundParameters
 
 __all__ = ["ROOMS", "SOUNDS", "RoomTask", "run_task"]
 

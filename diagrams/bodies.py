@@ -10,9 +10,8 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from systems.base.robot import RobotParameters
-from systems.sound.recorder import microphones_B
-from systems.world.geometry import rotate
+from systems.base.robot import RobotParameters, microphones_B
+from systems.world.plane import rotate
 
 __all__ = [
     "Body",

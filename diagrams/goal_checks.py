@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams.participants import FollowerParameters
+from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
-from systems.safety.free_space_map import body_radius
-from systems.world.geometry import beyond_rectangle, control_point
+from systems.world.plane import beyond_rectangle, control_point
 
 __all__ = ["check_goals", "start_note"]
 

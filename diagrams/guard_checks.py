@@ -9,11 +9,11 @@ import numpy as np
 
 from diagrams.bodies import Body
 from diagrams.participants import FollowerParameters
+from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
-from systems.safety.free_space import lasting
-from systems.safety.free_space_map import body_radius, sensor_sectors
-from systems.safety.motion_guard import GuardParameters, stopping_way
-from systems.world.geometry import beyond_rectangle
+from systems.safety.parameters import GuardParameters
+from systems.safety.views import lasting, sensor_sectors, stopping_way
+from systems.world.plane import beyond_rectangle
 
 __all__ = ["check_guard", "guard_note", "top_speed"]
 

@@ -7,36 +7,37 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, model_validator
 
-from systems.base.diff_drive_plant import PlantParameters
+from systems.base.carrier_parameters import SourceRobotParameters
+from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.source_robot import SourceRobotParameters
-from systems.base.wheel_odometry import OdometryParameters
 from systems.framework.parameters import Angle, Parameters, Point
-from systems.heading.compass import CompassParameters
-from systems.heading.heading_controller import HeadingControlParameters
-from systems.heading.motor_driver import MotorDriverParameters
-from systems.hearing.cross_power_estimator import CrossPowerParameters
-from systems.hearing.ideal_source_sensor import IdealHearingParameters
-from systems.hearing.tdoa_estimator import TDOAParameters
-from systems.hearing.tracker_model import TrackerParameters
+from systems.heading.parameters import (
+    CompassParameters,
+    HeadingControlParameters,
+    MotorDriverParameters,
+)
+from systems.hearing.parameters import (
+    CrossPowerParameters,
+    IdealHearingParameters,
+    TDOAParameters,
+    TrackerParameters,
+)
 from systems.laws.catalogue import LAWS
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
-from systems.odor.airflow_sensors import AirflowParameters
-from systems.odor.gas_sensor_array import GasSensorParameters
-from systems.planning.following import FollowingParameters
-from systems.ranging.collision_vector import CollisionVectorParameters
-from systems.ranging.contact_switches import ContactParameters
-from systems.ranging.ideal_object_sensor import ObjectSensorParameters
-from systems.ranging.object_detector import ObjectDetectorParameters
-from systems.ranging.ultrasonic_array import UltrasonicParameters
-from systems.routes.global_planner import RouteParameters
-from systems.safety.free_space_map import FreeSpaceParameters
-from systems.safety.motion_guard import GuardParameters
-from systems.search.plume_search import PlumeSearchParameters
-from systems.search.sound_search import SoundSearchParameters
-from systems.sound.adc import MicArrayParameters, channel_skew
-from systems.sound.waveforms import SoundParameters
+from systems.odor.parameters import AirflowParameters, GasSensorParameters
+from systems.planning.parameters import FollowingParameters
+from systems.ranging.parameters import (
+    CollisionVectorParameters,
+    ContactParameters,
+    ObjectDetectorParameters,
+    ObjectSensorParameters,
+    UltrasonicParameters,
+)
+from systems.routes.parameters import RouteParameters
+from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
+from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
 
 __all__ = [
     "FollowerParameters",

@@ -34,7 +34,7 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.laws.impedance import ImpedanceLoop
 from systems.sound.mic_array import microphone_reach
-from systems.sound.waveforms import SoundParameters
+from systems.sound.parameters import SoundParameters
 
 __all__ = [
     "OUTSIDE",

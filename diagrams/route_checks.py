@@ -6,7 +6,10 @@ import math
 
 from diagrams.participants import FollowerParameters
 from systems.laws.catalogue import LAWS
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
@@ -14,8 +17,7 @@ from systems.laws.trajectory.sampled_bounds import (
     rate_bound,
     stiffness_bound,
 )
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
-from systems.ranging.objects import OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SLOTS
 
 __all__ = ["route_notes"]
 

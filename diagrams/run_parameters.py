@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, Strict, StringConstraints
 
-from systems.base.source_robot import SourceRobotParameters
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.parameters import (
     Duration,
     Fraction,
@@ -18,13 +18,11 @@ from systems.framework.parameters import (
     Speed,
 )
 from systems.framework.signals import TICK_S
-from systems.odor.odor_plume import OdorParameters
-from systems.odor.wind import WindParameters
-from systems.radio.radio_channel import RadioParameters
+from systems.odor.parameters import OdorParameters, WindParameters
+from systems.radio.parameters import RadioParameters
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.room import RoomParameters
-from systems.sound.waveforms import SoundParameters
-from systems.world.obstacles import ObstacleParameters
+from systems.sound.parameters import RoomParameters, SoundParameters
+from systems.world.parameters import ObstacleParameters
 
 __all__ = [
     "MANY_RUNS",

@@ -30,14 +30,14 @@ from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
 from diagrams.search_checks import check_searches
-from systems.base.source_robot import SourceRobotParameters
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters
 from systems.framework.signals import SAMPLE_RATE_HZ, whole
 from systems.laws.catalogue import LAWS
-from systems.sound.waveforms import SoundParameters
-from systems.world.geometry import rectangle_clearance
+from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
+from systems.world.plane import rectangle_clearance
 
 __all__ = ["GOAL", "ODOR", "ROBOT", "SOURCE", "WORLD", "Scenario"]
 

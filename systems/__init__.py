@@ -29,8 +29,8 @@ if TYPE_CHECKING:
         IdealSourceSensor,
         IdealSourceSensor_,
     )
-    from systems.hearing.source_tracker import SourceTracker, SourceTracker_
     from systems.hearing.tdoa_estimator import TDOAEstimator
+    from systems.hearing.tracking.source_tracker import SourceTracker, SourceTracker_
     from systems.hearing.voting.source_listener_block import SourceListener
     from systems.laws.active_impedance_2017_controller import (
         ActiveImpedance2017Controller,

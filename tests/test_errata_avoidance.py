@@ -15,20 +15,17 @@ from hypothesis import strategies as st
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.laws.active_impedance_2017_controller import (
-    Active2017Parameters,
-    active_2017_force,
-)
-from systems.laws.active_impedance_controller import ActiveParameters, active_force
-from systems.laws.conventional_impedance_2017_controller import (
-    Conventional2017Parameters,
-    conventional_2017_force,
-)
-from systems.laws.conventional_impedance_controller import (
-    ConventionalParameters,
-    conventional_force,
-)
+from systems.laws.active_impedance_2017_controller import active_2017_force
+from systems.laws.active_impedance_controller import active_force
+from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
+from systems.laws.conventional_impedance_controller import conventional_force
 from systems.laws.impedance import repulsion_force
+from systems.laws.parameters import (
+    Active2017Parameters,
+    ActiveParameters,
+    Conventional2017Parameters,
+    ConventionalParameters,
+)
 from systems.ranging.collision_vector import echo_point, foot_on_segment
 from systems.world.geometry import rotate
 

@@ -16,8 +16,9 @@ from systems.hearing.spherical_interpolation import interpolate_sphere
 from systems.odor.steady_plume import steady_concentration
 from systems.radio.codec import Frame, decode_frame, encode_frame
 from systems.radio.radio_range import radio_distance, radio_level
+from systems.search.parameters import SongRuleParameters
 from systems.search.search_ending import UNDECIDED
-from systems.search.song_rules import SongRuleParameters, song2011_turn
+from systems.search.song_rules import song2011_turn
 
 MENDED, PRINTED, ELSE_ONLY = range(len(PULSE_WIDTHS))
 Y_ARM = 0.15

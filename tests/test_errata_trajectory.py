@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from systems.laws.trajectory.impedance_sensitivity import penalty_gradient
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import (
     Contact,
-    TrajectoryImpedanceParameters,
     contact_force,
     contact_numbers,
     contacts_of_objects,

@@ -12,7 +12,7 @@ from pydrake.systems.framework import LeafSystem, PortDataType
 from ruamel.yaml import YAML
 
 import systems
-from systems.base.wheel_odometry import OdometryParameters
+from systems.base.parameters import OdometryParameters
 
 BLOCKS = {
     "ActiveImpedance2017Controller",

@@ -19,7 +19,7 @@ from analysis.models.ideal_scenarios import changed, ideal_scenario
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulate
 from systems.framework.input_error import InputError
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import AttractionParameters
 
 __all__ = [
     "attraction_damping_ratio",

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from analysis.exports.ros2_values import WORLD_FRAME, Message, pose, stamped, vector
 from analysis.reporting.palette import COLOURS
 from diagrams import Scenario
-from systems.sound.room import RoomParameters
+from systems.sound.parameters import RoomParameters
 
 __all__ = ["body_markers"]
 

@@ -11,7 +11,8 @@ import numpy as np
 from analysis.hearing.free_field import Loudspeaker
 from systems.framework.noise import tick_generator
 from systems.framework.signals import FRAME_SAMPLES, TICK_S
-from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 __all__ = ["DetectionPoint", "FalseAlarms", "detection_curve", "false_alarms"]

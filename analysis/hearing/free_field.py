@@ -28,12 +28,14 @@ from analysis.hearing.estimation_errors import (
 )
 from analysis.reporting.intervals import Estimate
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S, Emission
-from systems.hearing.localise import Localiser, TDOAParameters
+from systems.hearing.localise import Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import SourceFix
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import convert
 from systems.sound.array_shape import ArrayShape
+from systems.sound.parameters import EDGE_S, MicArrayParameters, SoundParameters
 from systems.sound.propagation import propagate
-from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
+from systems.sound.waveforms import make_waveform
 
 __all__ = [
     "FreeFieldCell",

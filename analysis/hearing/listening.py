@@ -13,11 +13,11 @@ from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position
 from diagrams import Scenario, build_sound_follower, make_simulator
 from diagrams.robot import block_seed
 from systems import MicArray
+from systems.base.robot import microphones_B
 from systems.framework.noise import tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.array_shape import ArrayShape
 from systems.sound.array_tolerances import draw_tolerances
-from systems.sound.recorder import microphones_B
 from systems.sound.sound_emitter import emitted_samples
 from systems.sound.waveforms import make_waveform
 

@@ -22,12 +22,14 @@ from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S
 from systems.hearing.localise import Localiser
-from systems.hearing.tdoa_estimator import TDOAParameters, port_values, robot_localiser
-from systems.hearing.tracker_model import Measurement, TrackerModel, TrackerParameters
+from systems.hearing.parameters import TDOAParameters, TrackerParameters
+from systems.hearing.tdoa_estimator import port_values, robot_localiser
+from systems.hearing.tracking.tracker_model import Measurement, TrackerModel
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, convert
-from systems.sound.room import RoomParameters, room_images, room_impulse_responses
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.adc import convert
+from systems.sound.parameters import MicArrayParameters, RoomParameters, SoundParameters
+from systems.sound.room import room_images, room_impulse_responses
+from systems.sound.waveforms import make_waveform
 from systems.world.geometry import rotate
 
 __all__ = ["Layout", "RoomResult", "draw_layouts", "locate_bursts"]

@@ -29,7 +29,7 @@ from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
 from diagrams.scenario import Scenario
 from systems import DiffDrivePlant
-from systems.base.diff_drive_plant import PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelSpeedCommand_
 

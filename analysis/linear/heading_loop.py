@@ -10,8 +10,7 @@ import numpy as np
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.heading.heading_controller import HeadingControlParameters
-from systems.heading.motor_driver import MotorDriverParameters
+from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
 
 __all__ = ["HeadingLoopMargins", "heading_loop", "heading_loop_margins"]
 

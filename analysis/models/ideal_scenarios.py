@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from diagrams.scenario import Scenario
-from systems.base.diff_drive_plant import PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
 
 __all__ = [

@@ -41,7 +41,7 @@ from analysis.runs.tracked_bodies import tracked_bodies
 from diagrams import RunResult, Scenario
 from diagrams.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
-from systems.sound.waveforms import SoundParameters
+from systems.sound.parameters import SoundParameters
 
 __all__ = [
     "known_times",

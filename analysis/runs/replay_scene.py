@@ -20,7 +20,7 @@ from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import Look, bounds, sensor_pose
 from diagrams import RunResult, Scenario
 from diagrams.participants import SourceParameters
-from systems.sound.recorder import microphones_B
+from systems.base.robot import microphones_B
 
 __all__ = [
     "RINGS",

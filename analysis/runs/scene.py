@@ -15,9 +15,9 @@ from diagrams import RunResult, Scenario
 from diagrams.bodies import Path, robot_rectangle
 from diagrams.stop_rules import SUCCESSFUL
 from systems.framework.input_error import InputError
-from systems.sound.waveforms import SoundParameters
+from systems.sound.parameters import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
-from systems.world.obstacles import ObstacleParameters
+from systems.world.parameters import ObstacleParameters
 
 __all__ = [
     "Look",

@@ -10,10 +10,11 @@ import numpy as np
 from diagrams import Scenario
 from diagrams.bodies import Body
 from diagrams.guard_checks import top_speed
+from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError
-from systems.ranging.ultrasonic_array import UltrasonicParameters
-from systems.safety.free_space_map import body_radius, sensor_sectors
+from systems.ranging.parameters import UltrasonicParameters
+from systems.safety.views import sensor_sectors
 from systems.world.geometry import beyond_rectangle
 
 __all__ = ["Assumption", "Guarantees", "clear_way", "guarantees", "seen_angle_deg"]

@@ -11,19 +11,20 @@ from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import AudioFrame, Emission
-from systems.hearing.cross_power_estimator import (
-    ArrayListener,
-    CrossPowerParameters,
-    Direction,
-)
+from systems.hearing.cross_power_estimator import ArrayListener, Direction
 from systems.hearing.cross_powers import CrossPowers, gather_frame
+from systems.hearing.parameters import CrossPowerParameters
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, MicrophoneFaultParameters
 from systems.sound.mic_array import microphone_reach
+from systems.sound.parameters import (
+    MicArrayParameters,
+    MicrophoneFaultParameters,
+    RoomParameters,
+    SoundParameters,
+)
 from systems.sound.recorder import Recorder
-from systems.sound.room import RoomParameters
 from systems.sound.sound_emitter import emissions_along, history_ticks
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.waveforms import make_waveform
 
 __all__ = ["FAN_M", "BearingTrial", "hear_once"]
 

@@ -11,7 +11,7 @@ from analysis.stability.verdict_readings import Reading
 from analysis.stability.verdicts import Criterion
 from analysis.trajectory.frozen_gains import WELL_DAMPED
 from analysis.trajectory.route_loop import route_law
-from systems.ranging.objects import OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SLOTS
 
 __all__ = ["ROUTE_CRITERIA"]
 

@@ -13,12 +13,14 @@ from analysis.trajectory.point_run import PointLoop, run_point
 from analysis.trajectory.route_loop import route_law
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
 from systems.laws.trajectory.impedance_sensitivity import sensitivity_sources
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    AdaptiveTrajectoryParameters,
+)
 from systems.laws.trajectory.reference_model import held_matrices
 from systems.laws.trajectory.sampled_bounds import pull_through_m
 from systems.laws.trajectory.trajectory_impedance import target_force
-from systems.laws.trajectory.trajectory_laws import AdaptiveTrajectoryParameters
 
 __all__ = [
     "AdaptationStability",

@@ -28,16 +28,8 @@ from systems.laws.trajectory.trajectory_impedance import (
     contacts_of_objects,
     target_force,
 )
-from systems.ranging.objects import (
-    KNOWN,
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
-    RADIUS,
-    ROBOT,
-    THERE,
-    VX,
-    X,
-)
+from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, X
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 __all__ = ["BrakedChain", "ChainRun", "brake_chain", "run_chain", "shake_chain"]
 

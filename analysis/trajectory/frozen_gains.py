@@ -23,15 +23,13 @@ from analysis.trajectory.route_loop import (
     route_points,
 )
 from diagrams.scenario import Scenario
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
     stiffness_bound,
 )
-from systems.laws.trajectory.trajectory_impedance import (
-    TrajectoryImpedanceParameters,
-    contact_numbers,
-)
+from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
 __all__ = [
     "WELL_DAMPED",

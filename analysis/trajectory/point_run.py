@@ -13,9 +13,12 @@ from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.laws.trajectory.impedance_adaptation import (
     AdaptationNumbers,
-    AdaptationParameters,
     adaptation_numbers,
     adaptation_step,
+)
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
 )
 from systems.laws.trajectory.reference_model import (
     ReferenceNumbers,
@@ -23,21 +26,12 @@ from systems.laws.trajectory.reference_model import (
     reference_step,
 )
 from systems.laws.trajectory.trajectory_impedance import (
-    TrajectoryImpedanceParameters,
     contact_force,
     contacts_of_objects,
     target_force,
 )
-from systems.ranging.objects import (
-    KNOWN,
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
-    THERE,
-    VX,
-    VY,
-    X,
-    Y,
-)
+from systems.ranging.objects import KNOWN, THERE, VX, VY, X, Y
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 __all__ = ["PointLoop", "PointRun", "run_point"]
 

@@ -16,19 +16,19 @@ from analysis.models.model_reduction import minimal_model
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulator_config
 from systems import DiffDrivePlant
-from systems.base.wheel_odometry import OdometryParameters, WheelOdometry_
+from systems.base.parameters import OdometryParameters
+from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelSpeedCommand_
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
-from systems.laws.trajectory.trajectory_impedance import (
-    TrajectoryImpedanceParameters,
-    contact_numbers,
-)
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.laws.trajectory.trajectory_impedance import contact_numbers
 from systems.laws.trajectory.trajectory_impedance_controller import (
     TrajectoryImpedanceController_,
 )
-from systems.ranging.objects import KNOWN, OBJECT_SIZE, OBJECT_SLOTS, THERE, X
+from systems.ranging.objects import KNOWN, THERE, X
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 __all__ = [
     "AXES",

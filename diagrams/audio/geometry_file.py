@@ -6,9 +6,9 @@ import numpy as np
 
 from diagrams.scenario import Scenario
 from diagrams.yaml_text import dump_yaml
+from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
-from systems.sound.adc import MicArrayParameters
-from systems.sound.recorder import microphones_B
+from systems.sound.parameters import MicArrayParameters
 
 __all__ = ["geometry_text"]
 

@@ -16,7 +16,7 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ, AudioFrame, Emission
 from systems.hearing.audio_port import check_rate
-from systems.sound.adc import MicArrayParameters
+from systems.sound.parameters import MicArrayParameters
 from systems.sound.wav_writer import (
     LARGEST_WAV_BYTES,
     WavWriter,

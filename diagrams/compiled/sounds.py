@@ -13,8 +13,9 @@ from diagrams.scenario import Scenario
 from systems.framework.host_step import HostFunction
 from systems.framework.signals import Emission
 from systems.sound.mic_array import microphone_reach
+from systems.sound.parameters import SoundParameters
 from systems.sound.sound_emitter import emissions_along, history_ticks
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.waveforms import make_waveform
 
 __all__ = ["Sounds", "sounds_of_a_run"]
 

@@ -17,7 +17,7 @@ from systems import (
     TrajectoryImpedanceController,
     UltrasonicArray,
 )
-from systems.laws.trajectory.trajectory_laws import (
+from systems.laws.trajectory.parameters import (
     AdaptiveTrajectoryParameters,
     FilteredTrajectoryParameters,
 )

@@ -24,9 +24,8 @@ from analysis.reporting.markdown import markdown_table
 from analysis.runs.search_metrics import ARMS_M
 from analysis.searching import SearchOutcomes, search_outcomes, search_runs
 from analysis.searching.bearing_trials import FAN_M, BearingTrial, hear_once
-from systems.hearing.cross_power_estimator import CrossPowerParameters
-from systems.sound.room import RoomParameters
-from systems.sound.waveforms import SoundParameters
+from systems.hearing.parameters import CrossPowerParameters
+from systems.sound.parameters import RoomParameters, SoundParameters
 
 __all__ = ["bearings_table", "mission_table", "odor_table", "sound_table"]
 

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
-from pydantic import Field, Strict
 from pydrake.systems.framework import BasicVector_, LeafSystem_
 
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.tyre_grip import GripNumbers, grip_accelerations
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, check_port
-from systems.framework.parameters import Duration, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
@@ -25,26 +24,10 @@ __all__ = [
     "DiffDrivePlant",
     "DiffDrivePlant_",
     "PlantNumbers",
-    "PlantParameters",
     "body_twist",
     "plant_derivatives",
     "slipping_derivatives",
 ]
-
-_Slip = Annotated[float, Field(gt=-1.0, lt=1.0)]
-
-
-class PlantParameters(Parameters):
-    """Motors and contact of the wheels."""
-
-    motor_lag_s: Duration = 0.05
-    """Time constant of each wheel's speed loop, s; not printed, ours."""
-    slip: Annotated[tuple[_Slip, _Slip], Strict(False)] = (0.0, 0.0)
-    """Part of the left and right rim speed that is lost, unseen by the encoders;
-    negative: the wheel is larger than ``wheel_radius_m`` by this share."""
-    friction: Annotated[float, Field(ge=1e-3, le=100.0)] | None = None
-    """Coefficient of friction between tyres and floor: the wheels slip where motion
-    would need more force than this share of the weight. None: they never do."""
 
 
 @register_jitable

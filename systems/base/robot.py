@@ -7,6 +7,8 @@ from functools import cached_property
 from itertools import combinations
 from typing import Annotated, Any
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field, Strict, model_validator
 
 from systems.base.robot_presets import ROBOT_PRESETS, RobotPreset
@@ -20,7 +22,12 @@ from systems.framework.parameters import (
     with_preset,
 )
 
-__all__ = ["LEAST_SPACING_M", "RobotParameters"]
+__all__ = [
+    "LEAST_SPACING_M",
+    "RobotParameters",
+    "body_radius",
+    "microphones_B",
+]
 
 #: Microphones nearer to one another than this are one, m.
 LEAST_SPACING_M = 1e-3
@@ -79,3 +86,13 @@ class RobotParameters(Parameters):
     def top_wheel_speed(self) -> float:
         """Largest wheel speed, rad/s."""
         return self.top_speed_m_s / self.wheel_radius_m
+
+
+def body_radius(robot: RobotParameters) -> float:
+    """Radius of the disc about the axle that holds the body at any heading, m."""
+    return 0.5 * math.hypot(robot.length_m, robot.width_m)
+
+
+def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
+    """(n, 2) microphones in B, m, in the order of the channels."""
+    return np.add(robot.microphones_m, [robot.control_point_m, 0.0])

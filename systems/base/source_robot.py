@@ -2,33 +2,17 @@
 
 from __future__ import annotations
 
-import math
-
 from pydrake.systems.framework import LeafSystem_
 
-from systems.base.carrier import CarrierParameters
+from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Angle, Length
 from systems.framework.scalar_types import define_for_scalars
 from systems.world.paths import seconds
 
-__all__ = ["SourceRobot", "SourceRobotParameters", "SourceRobot_"]
-
-
-class SourceRobotParameters(CarrierParameters):
-    """Path, drive and size of the master robot (Han 2019, 5.3 and table 5)."""
-
-    heading_deg: Angle = 0.0
-    """Heading of a source at rest, deg CCW from the x axis of W."""
-    length_m: Length = 0.326
-    """Extent of the body along its direction of travel, m."""
-    width_m: Length = 0.352
-    """Extent of the body across its direction of travel, m."""
-
-    @property
-    def rest_heading(self) -> float:
-        """Heading where there is one waypoint, rad."""
-        return math.radians(self.heading_deg)
+__all__ = [
+    "SourceRobot",
+    "SourceRobot_",
+]
 
 
 @define_for_scalars("SourceRobot_", __name__)

@@ -6,38 +6,25 @@ import math
 from typing import NamedTuple
 
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.diff_drive_plant import body_twist
+from systems.base.parameters import OdometryParameters
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Duration, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 
 __all__ = [
-    "OdometryParameters",
     "WheelOdometry",
     "WheelOdometry_",
     "advance_pose",
     "encoder_angle",
 ]
-
-
-class OdometryParameters(Parameters):
-    """Wheel encoders (Han 2019, 4.1)."""
-
-    pulses_per_revolution: int = Field(default=2600, gt=0, le=10_000_000)
-    """Encoder pulses a wheel revolution."""
-    rounding: bool = True
-    """Angles in whole pulses; off: exact angles, as linearisation needs."""
-    lost_at_s: Duration | None = None
-    """A fault: then it begins anew, at (0, 0, 0), s; none: never."""
 
 
 @register_jitable

@@ -1,11 +1,6 @@
-"""Elementary functions of floats, and of AutoDiffXd where there are derivatives.
+"""``systems.framework.elementary``, which compiled code may call from here.
 
-Compiled code may call them, and those of ``pydrake.math``, too: of floats they are
-those of ``math``.
-
-They are those of ``pydrake.math``, and sine and cosine of arrays those of numpy; for
-floats ``math`` has the same ones in a third of the time, but raises where they are
-infinite or not a number.
+So it may call the functions of ``pydrake.math``: of floats all are those of ``math``.
 """
 
 from __future__ import annotations
@@ -14,57 +9,18 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numpy as np
 import pydrake.math
 from numba import types
 from numba.extending import overload, register_jitable
 
-__all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
+from systems.framework.elementary import cos, exp, float_of, sin, sqrt
 
-# From some way above this exponent on a float is infinite.
-_LARGEST_EXPONENT = 709.0
+__all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
 
 
 @register_jitable
 def _as_it_is(x: Any) -> Any:
     return x
-
-
-def float_of(x: Any) -> float:
-    """Value of a float or an AutoDiffXd."""
-    return x if isinstance(x, float) else x.value()
-
-
-def cos(x: Any) -> Any:
-    """Cosine of x in rad."""
-    if type(x) is float and math.isfinite(x):
-        return math.cos(x)
-    if isinstance(x, np.ndarray):
-        return np.cos(x)
-    return pydrake.math.cos(x)
-
-
-def sin(x: Any) -> Any:
-    """Sine of x in rad."""
-    if type(x) is float and math.isfinite(x):
-        return math.sin(x)
-    if isinstance(x, np.ndarray):
-        return np.sin(x)
-    return pydrake.math.sin(x)
-
-
-def exp(x: Any) -> Any:
-    """e to the power of x."""
-    if type(x) is float and x < _LARGEST_EXPONENT:
-        return math.exp(x)
-    return pydrake.math.exp(x)
-
-
-def sqrt(x: Any) -> Any:
-    """Square root of x."""
-    if type(x) is float and x >= 0.0:
-        return math.sqrt(x)
-    return pydrake.math.sqrt(x)
 
 
 def _compile_as(function: Callable[..., Any], compiled: Callable[..., Any]) -> None:

@@ -3,44 +3,25 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from pydantic import Field, Strict
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
-from systems.framework.parameters import Angle, Parameters
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
+from systems.heading.parameters import CompassParameters
 
 __all__ = [
-    "CompassParameters",
     "MagneticHeading",
     "field_in_body",
     "heading_of_field",
     "magnetic_heading_step",
     "wrapped_deg",
 ]
-
-_Part = Annotated[float, Field(ge=-0.9, le=0.9)]
-_Gain = Annotated[float, Field(ge=0.1, le=10.0)]
-
-
-class CompassParameters(Parameters):
-    """Where north is, and what bends the field; nothing of it is printed."""
-
-    north_deg: Angle = 90.0
-    """Direction of magnetic north in W, deg CCW from its x axis."""
-    hard_iron: Annotated[tuple[_Part, _Part], Strict(False)] = (0.0, 0.0)
-    """Field of the robot itself along x and y of B, as a share of the earth's level
-    one: 0.02, 0.05, 0.1 turn the heading by up to 1.1, 2.9, 5.7 deg."""
-    soft_iron: Annotated[tuple[_Gain, _Gain], Strict(False)] = (1.0, 1.0)
-    """By what the components along x and y of B are multiplied."""
-    noise_deg: float = Field(default=0.5, ge=0.0, le=90.0)
-    """Standard deviation of the heading, deg."""
 
 
 @register_jitable

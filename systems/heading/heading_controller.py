@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import NonNegative, Parameters, Positive
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.heading.compass import wrapped_deg
+from systems.heading.parameters import HeadingControlParameters
 
 __all__ = [
     "PULSE_WIDTHS",
-    "HeadingControlParameters",
     "HeadingController",
     "heading_controller_step",
     "heading_error",
@@ -25,31 +24,6 @@ __all__ = [
 #: How an error becomes duties: mended, as printed, and with the missing ``else`` alone.
 PULSE_WIDTHS = ("mended", "printed", "else_only")
 _MENDED, _PRINTED, _ELSE_ONLY = range(len(PULSE_WIDTHS))
-
-
-class HeadingControlParameters(Parameters):
-    """Gains and limits (Song 2011, 2.3.2 and tables 1 and 2)."""
-
-    proportional: NonNegative = 2.0
-    """K_P."""
-    integral: NonNegative = 0.5
-    """K_I, 1/s."""
-    differential: NonNegative = 0.01
-    """K_D, s."""
-    integral_within_deg: NonNegative = 20.0
-    """The integral grows where the deviation is smaller, deg; else it is 0."""
-    largest_integral_deg: NonNegative = 30.0
-    """Limit of the integral part, deg."""
-    largest_differential_deg: NonNegative = 20.0
-    """Limit of the differential part, deg."""
-    largest_error_deg: Positive = 100.0
-    """Limit of the output, deg: in the text, not in table 1."""
-    turning_beyond_deg: Positive = 50.0
-    """L: beyond, the wheels turn against one another, deg."""
-    pulse_widths: Literal["mended", "printed", "else_only"] = "mended"
-    """``mended``: duties go from full ahead to turning on the spot without a jump;
-    ``printed``: table 2, which drives backwards; ``else_only``: with its missing
-    ``else`` alone."""
 
 
 @register_jitable

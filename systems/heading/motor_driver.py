@@ -9,19 +9,15 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Parameters, Speed
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs
 from systems.framework.step_block import Step
+from systems.heading.parameters import MotorDriverParameters
 
-__all__ = ["MotorDriver", "MotorDriverParameters", "motor_driver_step"]
-
-
-class MotorDriverParameters(Parameters):
-    """What a full duty gives."""
-
-    full_speed_m_s: Speed = 0.2
-    """Rim speed of a wheel at full duty, m/s (Song 2011, 2.3.2: 10 to 20 cm/s)."""
+__all__ = [
+    "MotorDriver",
+    "motor_driver_step",
+]
 
 
 class MotorNumbers(NamedTuple):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,6 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Fraction, Frequency, Parameters
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts, Step
 from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
@@ -28,6 +27,7 @@ from systems.hearing.cross_powers import (
     gather_frame,
     signal_powers,
 )
+from systems.hearing.parameters import CrossPowerParameters
 from systems.hearing.spherical_interpolation import (
     interpolate_sphere,
     near_or_far,
@@ -35,12 +35,11 @@ from systems.hearing.spherical_interpolation import (
 )
 from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
+from systems.sound.parameters import MicArrayParameters
 
 __all__ = [
     "ArrayListener",
     "CrossPowerEstimator",
-    "CrossPowerParameters",
     "Direction",
 ]
 
@@ -56,23 +55,6 @@ _COHERENT = 0.15
 _CHANCE = 5.5
 #: Fewer frames than this are no estimate.
 _LEAST_FRAMES = 4
-
-
-class CrossPowerParameters(Parameters):
-    """How gathered spectra become a bearing."""
-
-    method: Literal["srp_near", "gcc_plane", "gcc_si"] = "srp_near"
-    """``srp_near``: steers all pairs at places near and far; ``gcc_plane``: delays of
-    all pairs between samples, a place where one can be believed, else a plane wave;
-    ``gcc_si``: whole samples, three pairs and spherical interpolation, as printed."""
-    low_hz: Frequency = 200.0
-    """Lower edge of what is heard, Hz (Song 2011, 4.3)."""
-    high_hz: Frequency = 8_000.0
-    """Upper edge, Hz (4.3)."""
-    noise_cross_power: bool = True
-    """Whether the cross powers of the noise before are subtracted (4.3)."""
-    ambiguous_share: Fraction = 0.9
-    """Another direction whose response is this share of the strongest is as good."""
 
 
 class Direction(NamedTuple):

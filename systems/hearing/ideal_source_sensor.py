@@ -16,33 +16,19 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
 from systems.framework.input_error import InputError
 from systems.framework.noise import tick_generator
-from systems.framework.parameters import Length, NonNegative, Parameters
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step
-from systems.sound.waveforms import SoundParameters
+from systems.hearing.parameters import IdealHearingParameters
+from systems.sound.parameters import SoundParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
 __all__ = [
-    "IdealHearingParameters",
     "IdealSourceSensor",
     "IdealSourceSensor_",
     "relative_position",
 ]
-
-
-class IdealHearingParameters(Parameters):
-    """What is left of imperfection when hearing is ideal."""
-
-    burst_gaps: bool = True
-    """Hears only while the source sounds; off: at every tick."""
-    bearing_noise_deg: NonNegative = 0.0
-    """Standard deviation of a bearing, deg."""
-    range_noise_fraction: NonNegative = 0.0
-    """Standard deviation of a range over the range."""
-    maximum_range_m: Length = 30.0
-    """A source beyond it is not heard, m."""
 
 
 @register_jitable

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import math
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
 
 from systems.delays.copied_channels import frame_repeats
 from systems.delays.delay_plan import DelayPlan
@@ -19,23 +18,19 @@ from systems.delays.frame_energy import frame_energy
 from systems.delays.half_band import PASSED, halve_rate
 from systems.delays.precedence import EchoMemory, keep_first_wave_front
 from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Angle,
-    Duration,
-    Fraction,
-    Frequency,
-    Parameters,
-    Positive,
-    SoundSpeed,
-)
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
 from systems.hearing.coherent import arrival_delays, refine_source
 from systems.hearing.multilateration import locate_source
+from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["Candidate", "HearingMemory", "Localiser", "TDOAParameters"]
+__all__ = [
+    "Candidate",
+    "HearingMemory",
+    "Localiser",
+]
 
 # From this correlation on, a frame holds hardly anything but the direct sound; and
 # where the noise was not heard alone yet, so that it may be the rest.
@@ -86,62 +81,6 @@ _ALIKE_M = 1e-3
 # A sound begins within a frame whose energy is spread over less than this share
 # of it.
 _WHOLE_FRAME = 0.8
-
-
-class TDOAParameters(Parameters):
-    """How delays are measured, and when they are believed."""
-
-    method: Literal["gcc", "gcc_phat", "ml", "amdf"] = "gcc"
-    """Cross-correlation, the same with whitened spectrum, maximum likelihood
-    that starts from it, or the papers' AMDF."""
-    low_hz: Frequency = 300.0
-    """Lower end of the band, Hz."""
-    high_hz: float = Field(default=15_000.0, ge=1.0, le=SAMPLE_RATE_HZ / 2)
-    """Upper end of the band, Hz."""
-    band: Literal["set", "found"] = "set"
-    """Use the band as it is set, or what of it each frame's sound occupies."""
-    sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
-    false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
-    """Share of frames of steady noise in which a sound is heard, at most."""
-    suppress_echoes: bool = True
-    """Weigh frames with echoes by the precedence of the first wave front."""
-    maximum_closure_s: Duration = 5e-6
-    """Largest disagreement of a pair's own delay with those of all pairs, s."""
-    maximum_misfit: Fraction = 0.05
-    """Largest disagreement of a delay with that of the place beyond
-    ``maximum_closure_s``, as a share of the longest that sound can take across the
-    array. It shows with four microphones or more."""
-    maximum_ambiguity: Fraction = 0.8
-    """Largest second peak over the first one."""
-    maximum_bearing_std_deg: Positive = 3.0
-    """Largest standard deviation of a bearing, deg."""
-    maximum_relative_range_std: Positive = 0.25
-    """A range is valid where its standard deviation is below this share."""
-    schedule_known: bool = False
-    """Hear nothing in frames that cannot hold the source's sound by its schedule:
-    sources that take turns are told apart so, and a robot's own loudspeaker."""
-    choose: Literal["loudest", "followed"] = "loudest"
-    """Of sounds that overlap, hear the one that outweighs the others, or the one that
-    has been followed until now."""
-    first_bearing_deg: Angle | None = None
-    """Of the source to be followed, from the microphones' centroid as the robot stands
-    before it has heard it, deg CCW; unset: the first one heard alone. For ``choose:
-    followed``."""
-
-    @model_validator(mode="after")
-    def _check(self) -> TDOAParameters:
-        if self.low_hz >= self.high_hz:
-            raise InputError(
-                "low_hz", f"{self.low_hz:g} must be below high_hz = {self.high_hz:g}"
-            )
-        if self.first_bearing_deg is not None and self.choose == "loudest":
-            raise InputError(
-                "first_bearing_deg",
-                "is of no use to choose: loudest; set choose to followed, or leave "
-                "the bearing out",
-            )
-        return self
 
 
 class HearingMemory(NamedTuple):

@@ -20,7 +20,7 @@ from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from systems.hearing.localise import Candidate
-from systems.hearing.target_filter import NEVER_HEARD_S
+from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.array_shape import ArrayShape
 
 __all__ = ["Belief", "ChoiceMemory", "SourceChoice"]

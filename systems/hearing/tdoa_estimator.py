@@ -17,18 +17,14 @@ from systems.framework.host_step import host_step
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts, Step
 from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
-from systems.hearing.localise import (
-    HearingMemory,
-    Localiser,
-    TDOAParameters,
-)
+from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
 from systems.hearing.source_fix import SourceFix
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_shape import ArrayShape
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
-from systems.sound.waveforms import SoundParameters
 
 __all__ = [
     "TDOAEstimator",

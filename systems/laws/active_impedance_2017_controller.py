@@ -2,38 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from systems.framework.parameters import Damping, Length, Parameters, Positive, Speed
-from systems.laws.law import Equation, Law, Tuning
 from systems.laws.law_controller import define_law_controller
+from systems.laws.parameters import Active2017Parameters
+from systems.laws.records import ACTIVE_2017
 
 __all__ = [
-    "ACTIVE_2017",
-    "Active2017Parameters",
     "ActiveImpedance2017Controller",
     "ActiveImpedance2017Controller_",
     "active_2017_force",
 ]
-
-
-class Active2017Parameters(Parameters):
-    """Push that grows with nearness and saturates (Kim 2017, eq. 21, fig. 6).
-
-    Kim 2017 prints neither gain.
-    """
-
-    distance_gain_j: Positive = 1.22
-    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
-    saturation_distance_m: Length = 0.1
-    """rho_1: nearer than this the push stays at K_0/rho_1, m (Kim 2017, 5)."""
-    damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
-    saturation_speed_m_s: Speed = 0.72
-    """mu_1: faster than this the velocity term stays at D_0 mu_1, m/s. Kim 2017, 5
-    chooses it by trial so that the robot stays below 720 mm/s, and prints no
-    value; ours is that speed."""
 
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
@@ -59,38 +38,11 @@ def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
     return spring + gains.damping_n_s_m * (s if s < fast else fast + 0.0 * s)
 
 
-_LAW = Law(
-    name="active2017",
-    title="Active law of 2017",
-    label="active 2017",
-    equations=(
-        Equation(
-            "Active law of 2017 (Kim 2017, eq. 21)",
-            r"f = \frac{K_a(c)}{c}+D_a(s)\,s,\quad K_a = K_0\min(1,\,c/\rho_1),"
-            r"\quad D_a = D_0\min(1,\,\mu_1/s)",
-            "f = K_a(c)/c + D_a(s) s, K_a = K_0 min(1, c/rho_1), "
-            "D_a = D_0 min(1, mu_1/s)",
-        ),
-    ),
-    force=active_2017_force,
-    gains=Active2017Parameters,
-    loop_gains=("distance_gain_j", "damping_n_s_m"),
-    tuning=Tuning(
-        rule="barrier",
-        # K_0/c^2 just outside of rho_1.
-        stiffest=lambda gains, least_range_m: (
-            gains.distance_gain_j / gains.saturation_distance_m**2
-        ),
-    ),
-)
-
 ActiveImpedance2017Controller_ = define_law_controller(
     "ActiveImpedance2017Controller",
     __name__,
-    _LAW,
+    ACTIVE_2017,
     about="pushes off by inverse distance, up to a limit",
     reference="Kim 2017, eq. 19 (F_m), 21 and figure 6 in words",
 )
 ActiveImpedance2017Controller = ActiveImpedance2017Controller_[None]
-
-ACTIVE_2017 = replace(_LAW, controller=ActiveImpedance2017Controller)

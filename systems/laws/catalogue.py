@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from systems.laws.active_impedance_2017_controller import ACTIVE_2017
-from systems.laws.active_impedance_controller import ACTIVE
-from systems.laws.baselines.dynamic_window import DWA
-from systems.laws.baselines.path_integral import MPPI
-from systems.laws.baselines.reciprocal_avoidance import ORCA
-from systems.laws.baselines.stop_when_near import STOP_WHEN_NEAR
-from systems.laws.baselines.vector_field_histogram import VFH_PLUS
-from systems.laws.conventional_impedance_2017_controller import CONVENTIONAL_2017
-from systems.laws.conventional_impedance_controller import CONVENTIONAL
-from systems.laws.guarded_controller import GUARDED
+from systems.laws.baselines.records import DWA, MPPI, ORCA, STOP_WHEN_NEAR, VFH_PLUS
 from systems.laws.law import Law
-from systems.laws.no_avoidance import NONE
-from systems.laws.search_laws import PLUME_SEARCH, SOUND_SEARCH
+from systems.laws.records import (
+    ACTIVE,
+    ACTIVE_2017,
+    CONVENTIONAL,
+    CONVENTIONAL_2017,
+    GUARDED,
+    NONE,
+    PLUME_SEARCH,
+    SOUND_SEARCH,
+)
 from systems.laws.trajectory.trajectory_laws import (
     TRAJECTORY_ADAPTIVE,
     TRAJECTORY_CONVENTIONAL,

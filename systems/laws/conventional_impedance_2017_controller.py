@@ -2,32 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from systems.framework.parameters import Damping, Parameters, Positive
-from systems.laws.law import Equation, Law, Tuning
 from systems.laws.law_controller import define_law_controller
+from systems.laws.parameters import Conventional2017Parameters
+from systems.laws.records import CONVENTIONAL_2017
 
 __all__ = [
-    "CONVENTIONAL_2017",
-    "Conventional2017Parameters",
     "ConventionalImpedance2017Controller",
     "ConventionalImpedance2017Controller_",
     "conventional_2017_force",
 ]
-
-
-class Conventional2017Parameters(Parameters):
-    """Push that grows with nearness without a bound (Kim 2017, eq. 20).
-
-    Kim 2017 prints neither gain.
-    """
-
-    distance_gain_j: Positive = 0.917
-    """K_0, J: the push is K_0/c. Not the K_0 of Han's laws."""
-    damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
 
 
 def conventional_2017_force(
@@ -52,35 +37,11 @@ def conventional_2017_force(
     return gains.distance_gain_j / nearest + gains.damping_n_s_m * s
 
 
-_LAW = Law(
-    name="conventional2017",
-    title="Conventional law of 2017",
-    label="conventional 2017",
-    equations=(
-        Equation(
-            "Conventional law of 2017 (Kim 2017, eq. 20)",
-            r"f = \frac{K_0}{\max(c,\,c_{min})}+D_0\,s",
-            "f = K_0/max(c, c_min) + D_0 s, c_min the sensors' least range",
-        ),
-    ),
-    force=conventional_2017_force,
-    least_range=True,
-    gains=Conventional2017Parameters,
-    loop_gains=("distance_gain_j", "damping_n_s_m"),
-    tuning=Tuning(
-        rule="barrier",
-        # K_0/c^2 just outside of the least range.
-        stiffest=lambda gains, least_range_m: gains.distance_gain_j / least_range_m**2,
-    ),
-)
-
 ConventionalImpedance2017Controller_ = define_law_controller(
     "ConventionalImpedance2017Controller",
     __name__,
-    _LAW,
+    CONVENTIONAL_2017,
     about="pushes off by inverse distance",
     reference="Kim 2017, eq. 19 (F_m) and 20",
 )
 ConventionalImpedance2017Controller = ConventionalImpedance2017Controller_[None]
-
-CONVENTIONAL_2017 = replace(_LAW, controller=ConventionalImpedance2017Controller)

@@ -2,31 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any
 
-from systems.framework.parameters import Damping, Length, Parameters, Stiffness
-from systems.laws.law import Equation, Law, Tuning
 from systems.laws.law_controller import define_law_controller
+from systems.laws.parameters import ConventionalParameters
+from systems.laws.records import CONVENTIONAL
 
 __all__ = [
-    "CONVENTIONAL",
     "ConventionalImpedanceController",
     "ConventionalImpedanceController_",
-    "ConventionalParameters",
     "conventional_force",
 ]
-
-
-class ConventionalParameters(Parameters):
-    """Spring and damper within a reach (Han 2019, eq. 19-a)."""
-
-    stiffness_n_m: Stiffness = 12.3
-    """K_0, N/m."""
-    damping_n_s_m: Damping = 0.8
-    """D_0, N s/m."""
-    reach_m: Length = 0.8
-    """rho_0: the law acts below this distance, m (Han 2019, 5.2)."""
 
 
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
@@ -45,35 +31,11 @@ def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
     return 0.0 * c
 
 
-_LAW = Law(
-    name="conventional",
-    title="Conventional law",
-    label="conventional",
-    equations=(
-        Equation(
-            "Conventional law (Han 2019, eq. 19-a)",
-            r"f = K_0\,(\rho_0-c)+D_0\,s\quad (c<\rho_0),"
-            r"\quad f = 0\quad (c\geq\rho_0)",
-            "f = K_0 (rho_0 - c) + D_0 s for c < rho_0, else 0",
-        ),
-    ),
-    force=conventional_force,
-    gains=ConventionalParameters,
-    loop_gains=("stiffness_n_m", "damping_n_s_m"),
-    tuning=Tuning(
-        rule="barrier",
-        stiffest=lambda gains, least_range_m: gains.stiffness_n_m,
-        sets_follow_distance=True,
-    ),
-)
-
 ConventionalImpedanceController_ = define_law_controller(
     "ConventionalImpedanceController",
     __name__,
-    _LAW,
+    CONVENTIONAL,
     about="pushes off linearly within rho_0",
     reference="Han 2019, eq. 18 (F_m) and 19-a",
 )
 ConventionalImpedanceController = ConventionalImpedanceController_[None]
-
-CONVENTIONAL = replace(_LAW, controller=ConventionalImpedanceController)

@@ -6,29 +6,17 @@ from typing import Any
 
 import numpy as np
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
-from systems.framework.parameters import (
-    Duration,
-    Fraction,
-    Length,
-    NonNegative,
-    NonNegativeLength,
-    Parameters,
-    Speed,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
+from systems.laws.parameters import AttractionParameters, GuardedParameters
 from systems.planning.evasion import EvasionNumbers
-from systems.planning.following import FollowingParameters
 from systems.planning.guarded_drive import (
     AT_TICK,
     CARROT_X,
@@ -43,51 +31,16 @@ from systems.planning.guarded_drive import (
     drive_guarded,
 )
 from systems.planning.hazards import Hazards, HazardSensors, make_hazards
+from systems.planning.parameters import FollowingParameters
 from systems.planning.way import Way, make_way
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters, body_radius
+from systems.safety.parameters import FreeSpaceParameters
 
-__all__ = ["GUARDED", "GuardedController", "GuardedParameters", "hazard_sensors"]
-
-
-class GuardedParameters(Parameters):
-    """How the guarded law drives, looks and plans."""
-
-    look_ahead_m: Length = 1.5
-    """It heads for points of its way no farther away, m."""
-    weave_rad: float = Field(default=0.3, ge=0.0, le=1.5)
-    """It weaves by so much to both sides, so that its sensors sweep, rad."""
-    weave_period_s: Duration = 2.4
-    """Period of that, s."""
-    search_rad: float = Field(default=1.0, ge=0.0, le=1.5)
-    """The same where something moves, the target or another body, rad."""
-    search_period_s: Duration = 3.4
-    """Period of that, s."""
-    search_less: Fraction = 0.3
-    """By this share it searches less where it lags behind the target."""
-    hazard_speed_m_s: Speed = 0.6
-    """Bodies that it tracks are no faster, m/s."""
-    risk_gain: NonNegative = 8.0
-    """Price of a body that would be hit, m/s off the wanted speed."""
-    watch_gain: NonNegative = 0.7
-    """Price of a threat that is 1 rad out of view, m/s off the wanted speed."""
-    replan_s: Duration = 0.5
-    """Time from one plan to the next, s."""
-    patience_s: Duration = 0.3
-    """Blocked by the guard for so long, it looks at what blocks it, s."""
-    give_up_s: Duration = 5.5
-    """It stays for so long at most, then it marks what is ahead and backs off, s."""
-    search_way_s: Duration = 20.0
-    """For so long it seeks a way where all lead through what echoes, s."""
-    mark_s: Duration = 10.0
-    """For so long it seeks ways that keep off what has blocked it, s."""
-    clearance_m: NonNegativeLength = 0.02
-    """By so much ways keep the disc that holds the body off echoes, m."""
-    source_clearance_m: NonNegativeLength = 0.85
-    """Echoes from so near to the target do not block ways, m."""
-    source_radius_m: Length = 0.35
-    """Echoes from so near to the target are its own: no other body is there, m."""
+__all__ = [
+    "GuardedController",
+    "hazard_sensors",
+]
 
 
 def guarded_step(
@@ -327,22 +280,3 @@ def hazard_sensors(
 def _copied(numbers: DriveNumbers) -> tuple[Any, Way, Hazards]:
     arrays: list[Any] = [np.copy(values) for values in numbers.way]
     return np.copy(numbers.memory), Way(*arrays), numbers.hazards.copy()
-
-
-GUARDED = Law(
-    name="guarded",
-    title="Guarded law",
-    label="guarded",
-    equations=(
-        Equation(
-            "Guarded law: wanted speed and yaw rate",
-            r"v=k_v\,(\ell-d_f)+k_s\,\dot{\ell}_S,"
-            r"\quad\omega=k_\omega\,(\varphi_c-\theta+A\sin\frac{2\pi t}{T_w})",
-            "v = k_v (l - d_f) + k_s v_S, w = k_w (phi_c - theta + A sin(2 pi t/T_w))",
-        ),
-    ),
-    gains=GuardedParameters,
-    controller=GuardedController,
-    plans=True,
-    guarded=True,
-)

@@ -10,61 +10,30 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import (
-    Duration,
-    NonNegativeDamping,
-    NonNegativeLength,
-    NonNegativeStiffness,
-    Parameters,
-)
 from systems.framework.scalar_math import float_of
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
+from systems.laws.parameters import AttractionParameters, SharedRepulsion, VelocityTerm
 from systems.ranging.collision_vector import SLOTS
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
 __all__ = [
-    "AttractionParameters",
     "ImpedanceLoop",
-    "SharedRepulsion",
-    "VelocityTerm",
     "attraction_force",
     "obstacle_speed",
     "repulsion_force",
 ]
 
-VelocityTerm = Literal["printed", "closing"]
 
 #: Numbers that are remembered a tick: feature, C_x and C_y of each slot.
 _ROW = 3 * SLOTS
-
-
-class AttractionParameters(Parameters):
-    """The spring and damper to the target (Han 2019, eq. 18 and section 5)."""
-
-    stiffness_n_m: NonNegativeStiffness = 2.0
-    """K_r, N/m; printed without unit."""
-    damping_n_s_m: NonNegativeDamping = 1.0
-    """D_r, N s/m; printed without unit. Damping ratio 0.18 with K_r = 2."""
-    follow_distance_m: NonNegativeLength = 1.2
-    """Distance d_f from the source at which the attraction rests, m; ours.
-    0 is as printed: P is pulled onto the source itself."""
-    brake_time_s: Duration = 0.5
-    """Time constant of the stop when there is no target, s; ours."""
-
-
-class SharedRepulsion(Parameters):
-    """What every law reads beside its own gains."""
-
-    velocity_term: VelocityTerm = "printed"
-    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
 
 
 @register_jitable

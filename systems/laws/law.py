@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
@@ -57,17 +58,17 @@ class Law:
     """In the legends of pictures."""
     equations: tuple[Equation, ...]
     """For the model sheet."""
-    force: Callable[..., Any] | None = None
-    """``force(c, s, gains)``: push away from an obstacle in N at a distance in m and
-    a speed in m/s, floats or AutoDiffXd. Its part f(c, 0) has an energy; a law
-    without a force, whose block decides otherwise, has none."""
+    module: str = ""
+    """Of force and block, which is loaded when one is first asked for: to check a
+    scenario takes neither Drake nor compiled code."""
+    force_name: str = ""
+    """Name of ``force`` in it."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
     """Model of its gains; every field has a default."""
-    controller: Callable[..., Any] | None = None
-    """Class of its block, which takes robot, attraction, repulsion and sensors; none:
-    ``RadialLawController`` with the force."""
+    controller_name: str = ""
+    """Name of ``controller`` in ``module``."""
     loop_gains: tuple[str, str] | None = None
     """Gains of the distance term and of the velocity term, for root loci."""
     tuning: Tuning | None = None
@@ -87,6 +88,23 @@ class Law:
     colour: str | None = None
     """In pictures; none: the next one of the palette."""
 
+    @property
+    def force(self) -> Callable[..., Any] | None:
+        """``force(c, s, gains)``: push away from an obstacle, N.
+
+        At a distance in m and a speed in m/s, floats or AutoDiffXd. Its part f(c, 0)
+        has an energy; a law without a force, whose block decides otherwise, has none.
+        """
+        return self._load(self.force_name)
+
+    @property
+    def controller(self) -> Callable[..., Any] | None:
+        """Class of its block, which takes robot, attraction, repulsion and sensors.
+
+        None: ``RadialLawController`` with the force.
+        """
+        return self._load(self.controller_name)
+
     def arguments(self, repulsion: Any, least_range_m: float) -> tuple[Any, ...]:
         """What ``force`` takes after c and s.
 
@@ -103,3 +121,6 @@ class Law:
             given = repulsion is not None
             gains = getattr(repulsion, self.name) if given else self.gains()
         return (gains, least_range_m) if self.least_range else (gains,)
+
+    def _load(self, name: str) -> Any:
+        return getattr(import_module(self.module), name) if name else None

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from pydantic import Field, create_model
 
 from systems.laws.catalogue import LAWS
-from systems.laws.impedance import SharedRepulsion
+from systems.laws.parameters import SharedRepulsion
 
 __all__ = ["RepulsionParameters"]
 

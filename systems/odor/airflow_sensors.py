@@ -3,38 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
-from systems.framework.parameters import Parameters, Positive
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
+from systems.odor.parameters import AirflowParameters
 from systems.odor.wind import WIND_SIZE, wind_velocity
 
-__all__ = ["AirflowParameters", "AirflowSensors", "airflow_reading", "airflow_step"]
+__all__ = [
+    "AirflowSensors",
+    "airflow_reading",
+    "airflow_step",
+]
 
 #: What a crosswind wire feels of wind along it, as a share of its square.
 _ALONG = 0.04
-
-
-class AirflowParameters(Parameters):
-    """The two wires; unit, gain and direction pattern are not printed."""
-
-    gain_s_m: Positive = 3.0
-    """k: reading of a sensor that the wind meets squarely, a m/s: s/m."""
-    lobe: Literal["cosine", "crosswind"] = "cosine"
-    """``cosine``: each feels what blows at it, 45 deg to either side; ``crosswind``:
-    wires along the robot's axis, beside a partition, feel the wind across if it comes
-    from their side, and a fifth of the wind along them."""
-    noise: float = Field(default=0.02, ge=0.0, le=1.0)
-    """Standard deviation of a reading, as a share of it."""
 
 
 @register_jitable

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydantic import Field, Strict, model_validator
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_arrays
-from systems.framework.input_error import InputError
 from systems.framework.noise import (
     BEFORE_THE_RUN,
     TickNoise,
@@ -22,94 +20,18 @@ from systems.framework.noise import (
     standard_normals,
     tick_noise,
 )
-from systems.framework.parameters import (
-    Duration,
-    NonNegativeLength,
-    Parameters,
-    Point,
-    Positive,
-    Time,
-    with_preset,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock
 from systems.odor.odor_plume import PLUME_SIZE, concentration
+from systems.odor.parameters import _COUNT, GasSensorParameters
 
 __all__ = [
     "GasSensorArray",
-    "GasSensorFaultParameters",
-    "GasSensorParameters",
     "gas_sensor_step",
 ]
 
-_COUNT = 3
 _HOUR_S = 3_600.0
 _DEAD, _STUCK = 1, 2
-
-#: Time constants that differ from the paper's.
-_PRESETS = {
-    "song2011": {},
-    # GADEN's table of the TGS2620, ethanol.
-    "tgs2620": {"response_s": 2.96, "recovery_s": 15.71},
-}
-
-
-class GasSensorFaultParameters(Parameters):
-    """A gas sensor that fails in a run, and how."""
-
-    sensor: int = Field(default=1, ge=1, le=_COUNT)
-    """R1 right front, R2 rear, R3 left front."""
-    kind: Literal["dead", "stuck"] = "dead"
-    """``dead``: it reads 1, clean air, without noise; ``stuck``: what it read last."""
-    start_s: Time = 0.0
-    """When that begins, s."""
-
-
-class GasSensorParameters(Parameters):
-    """Three TGS2620 on arms of 20 cm, 120 deg apart (Song 2011, 2.1)."""
-
-    preset: Literal["song2011", "tgs2620"] = "song2011"
-    """Time constants: the paper's, or those that GADEN has for the TGS2620."""
-    positions_m: Annotated[tuple[Point, Point, Point], Strict(False)] = (
-        (0.1, -0.1732),
-        (-0.2, 0.0),
-        (0.1, 0.1732),
-    )
-    """R1 right front, R2 rear, R3 left front, from the origin of B in its axes, m."""
-    height_m: NonNegativeLength = 0.0
-    """Above the floor, m."""
-    exponent: Positive = 0.7155
-    """Of Rs/R0 = (1 + C/C1)^-exponent: ethanol in GADEN's table."""
-    response_s: Duration = 2.5
-    """Time constant where the gas grows, s: 95 % in 7.5 s (2.3.3: 5 to 10)."""
-    recovery_s: Duration = 5.8
-    """Where it fades, s: 95 % in 17.4 s (2.3.3: 15 to 20)."""
-    noise: float = Field(default=0.003, ge=0.0, le=1.0)
-    """Standard deviation of a reading, as a share of it."""
-    mismatch: float = Field(default=0.01, ge=0.0, le=0.1)
-    """That of each sensor's R0, drawn once."""
-    slope_mismatch: float = Field(default=0.03, ge=0.0, le=0.15)
-    """That of each sensor's exponent, drawn once."""
-    drift_per_h: float = Field(default=0.0, ge=-0.03, le=0.03)
-    """Growth of all readings, as a share an hour, 1/h."""
-    faults: Annotated[
-        tuple[GasSensorFaultParameters, ...], Strict(False), Field(max_length=8)
-    ] = ()
-    """Sensors that fail in a run."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill(cls, data: Any) -> Any:
-        return with_preset(data, _PRESETS)
-
-    @model_validator(mode="after")
-    def _check(self) -> GasSensorParameters:
-        failing = [fault.sensor for fault in self.faults]
-        if len({*failing}) < len(failing):
-            raise InputError(
-                "faults", f"sensors {failing}: two faults of one; leave one of each"
-            )
-        return self
 
 
 class GasNumbers(NamedTuple):

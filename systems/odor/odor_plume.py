@@ -3,41 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
-from systems.framework.parameters import (
-    NonNegativeLength,
-    Parameters,
-    Time,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
+from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
-from systems.odor.wind import (
-    WIND_PERIOD_S,
-    WIND_SIZE,
-    WindParameters,
-    initial_wind,
-    wind_velocity,
-)
+from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_velocity
 
 __all__ = [
     "MOST_PUFFS",
     "PLUME_SIZE",
     "PUFFS_BEGIN",
     "PUFF_SIZE",
-    "OdorParameters",
     "OdorPlume",
     "concentration",
     "plume_step",
@@ -71,37 +59,6 @@ _LONGEST_SPIN_UP_S = 25.0
 #: Of the sensor by which the strength of the source is given: its power law, at a
 #: distance downwind, m, in a wind of so many m/s.
 _EXPONENT, _REFERENCE_M, _REFERENCE_M_S = 0.7155, 2.0, 1.0
-
-
-class OdorParameters(Parameters):
-    """A source of odour; the paper prints nothing of it but that it smells."""
-
-    kind: Literal["puffs", "steady"] = "puffs"
-    """``puffs``: as they come; ``steady``: their mean, Song 2011, eq. 6."""
-    ratio_at_2_m: float = Field(default=0.76, ge=1e-3, le=0.999)
-    """Strength: mean ratio Rs/R0 of a gas sensor 2 m downwind on the axis in a wind of
-    1 m/s; its power law makes a concentration of it."""
-    height_m: NonNegativeLength = 0.0
-    """H, above the floor, m."""
-    puffs_per_s: float = Field(default=16.0, ge=1.0, le=50.0)
-    """Puffs released a second, 1/s; 320 are kept, which at 1 m/s reach 6 m."""
-    level_growth: float = Field(default=0.12, ge=1e-3, le=1.0)
-    """Growth of a puff's level spread with its way."""
-    upright_growth: float = Field(default=0.13, ge=1e-3, le=1.0)
-    """Growth of its upright spread."""
-    own_intensity: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Standard deviation of each component of a puff's own velocity over the speed of
-    the wind."""
-    own_time_s: float = Field(default=2.0, ge=0.01, le=3_600.0)
-    """Time over which a puff's own velocity forgets, s."""
-    mean_intensity: float = Field(default=0.197, ge=1e-3, le=1.0)
-    """gamma_1 / u of the mean; that of the default puffs in the default wind."""
-    reach_m: float = Field(default=6.0, ge=0.5, le=1_000.0)
-    """Puffs farther from the source are left out, m."""
-    age_s: Time = 60.0
-    """How long it has been released when a run begins, s."""
-    room_volume_m3: float | None = Field(default=None, ge=1.0, le=1e6)
-    """Of a closed room, m^3, in which the odour gathers evenly; null: an open one."""
 
 
 def release_rate(own: OdorParameters) -> float:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
@@ -19,15 +18,14 @@ from systems.framework.noise import (
     standard_normals,
     tick_noise,
 )
-from systems.framework.parameters import Angle, Length, Parameters, Point
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
+from systems.odor.parameters import WindParameters
 
 __all__ = [
     "WIND_PERIOD_S",
     "WIND_SIZE",
     "WindField",
-    "WindParameters",
     "wind_step",
     "wind_velocity",
 ]
@@ -41,28 +39,6 @@ WIND_PERIOD_S = 0.1
 #: Diameters along which a round jet keeps its speed on the axis (Pope 2000, 5.1: the
 #: decay constant of 6 for a uniform outlet).
 _CORE = 6.0
-
-
-class WindParameters(Parameters):
-    """The wind; the paper prints its range of speeds alone (Song 2011, 4.1)."""
-
-    kind: Literal["uniform", "meandering", "jet"] = "meandering"
-    """``uniform``: always the mean; ``meandering``: its velocity changes slowly, all
-    over alike; ``jet``: a fan's, which meanders, too, widens and slows down."""
-    speed_m_s: float = Field(default=1.0, ge=0.0, le=20.0)
-    """Mean, of a jet at its outlet, m/s."""
-    direction_deg: Angle = 0.0
-    """Towards which it blows, deg CCW from the x axis of W."""
-    meander_intensity: float = Field(default=0.12, ge=0.0, le=1.0)
-    """Standard deviation of each component over the mean speed."""
-    meander_time_s: float = Field(default=8.0, ge=0.1, le=3_600.0)
-    """Time over which it forgets, s."""
-    jet_origin_m: Point = (-2.2, 0.0)
-    """Outlet of the jet in W, m."""
-    jet_diameter_m: Length = 0.3
-    """Of the outlet, m."""
-    jet_growth: float = Field(default=0.1, ge=0.0, le=1.0)
-    """Growth of the half width, at which the speed is exp(-1/2), a metre."""
 
 
 @njit(cache=True)

@@ -6,33 +6,14 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydantic import Field
 
-from systems.framework.parameters import (
-    NonNegativeSpeed,
-    Parameters,
-    Positive,
-    Speed,
-)
+from systems.planning.parameters import FollowingParameters
 
-__all__ = ["FollowNumbers", "FollowingParameters", "approach", "wanted_speed"]
-
-
-class FollowingParameters(Parameters):
-    """How a law that commands motions, in the place of forces, follows and turns."""
-
-    cruise_speed_m_s: Speed = 0.62
-    """Largest wanted speed, m/s."""
-    back_speed_m_s: NonNegativeSpeed = 0.15
-    """Speed of backing off, m/s."""
-    approach_gain: Positive = 1.2
-    """Wanted speed for a distance to go, 1/s."""
-    source_share: float = Field(default=0.8, ge=0.0, le=1.0)
-    """Part of the target's own speed that is added."""
-    turn_gain: Positive = 3.0
-    """Yaw rate for an error of the heading, 1/s."""
-    turn_rate_rad_s: float = Field(default=2.0, gt=0.0, le=20.0)
-    """Largest wanted yaw rate, rad/s."""
+__all__ = [
+    "FollowNumbers",
+    "approach",
+    "wanted_speed",
+]
 
 
 class FollowNumbers(NamedTuple):

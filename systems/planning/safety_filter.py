@@ -6,10 +6,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import (
     hand_position_twist,
     integrate_velocity,
@@ -17,31 +16,22 @@ from systems.base.wheel_speed_command import (
 )
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
-from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
+from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
-from systems.safety.free_space_map import body_radius
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-__all__ = ["SafetyFilter", "SafetyFilterParameters", "safety_filter_step"]
+__all__ = [
+    "SafetyFilter",
+    "safety_filter_step",
+]
 
 #: What moves and has come too near is left within this, s.
 _LEAVE_S = 0.1
 #: Groups of the discrete state, which are the outputs: wheel speeds, velocity of P, and
 #: what was done.
 _SIZES = 2, 2, 2
-
-
-class SafetyFilterParameters(Parameters):
-    """How far the filter keeps P off; all ours."""
-
-    margin_m: NonNegativeLength = 0.05
-    """Kept between the disc about the axle that holds the body and objects, m."""
-    approach_rate: float = Field(default=1.0, ge=1e-3, le=100.0)
-    """alpha, 1/s: what rests is approached by so much of the distance a second."""
-    horizon_s: float = Field(default=4.0, ge=0.1, le=60.0)
-    """Contacts with what moves count if they are nearer than this, s."""
 
 
 class SafetyNumbers(NamedTuple):

@@ -10,18 +10,8 @@ from numba import njit
 from numpy.typing import NDArray
 
 from systems.planning.half_planes import nearest_velocity
-from systems.ranging.objects import (
-    KNOWN,
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
-    RADIUS,
-    ROBOT,
-    THERE,
-    VX,
-    VY,
-    X,
-    Y,
-)
+from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 __all__ = ["FilterNumbers", "disc_plane", "filtered_velocity", "wheel_planes"]
 

@@ -8,40 +8,26 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
-from systems.framework.parameters import Fraction, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs
 from systems.framework.step_block import RunFacts, Step, reseeded
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
+from systems.radio.parameters import RadioParameters
 
-__all__ = ["AIR_SIZE", "RadioChannel", "RadioParameters", "radio_channel_step"]
+__all__ = [
+    "AIR_SIZE",
+    "RadioChannel",
+    "radio_channel_step",
+]
 
 #: Frames that arrive in a tick at most.
 _MOST_ON_AIR = 3 * MOST_FRAMES
 #: Size of the port ``air``: how many bytes, then these.
 AIR_SIZE = 1 + FRAME_BYTES * _MOST_ON_AIR
-
-
-class RadioParameters(Parameters):
-    """Latency, losses and levels; none is printed."""
-
-    latency_s: Time = 0.05
-    """From sending to hearing, s; at least a tick."""
-    loss: Fraction = 0.0
-    """Share of the frames that do not arrive."""
-    byte_error: Fraction = 0.0
-    """Share of the bytes that arrive as something else."""
-    level_at_1_m_dbm: float = Field(default=-42.4, ge=-150.0, le=50.0)
-    """-A of eq. 8, dBm (an example of the CC2431's data sheet)."""
-    path_loss_exponent: float = Field(default=2.5, ge=1.0, le=10.0)
-    """n of eq. 8."""
-    fading_db: float = Field(default=4.0, ge=0.0, le=30.0)
-    """Standard deviation of a level, dB."""
 
 
 class ChannelNumbers(NamedTuple):

@@ -13,7 +13,7 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
-from systems.radio.radio_channel import RadioParameters
+from systems.radio.parameters import RadioParameters
 
 __all__ = ["RadioRange", "radio_distance", "radio_level", "radio_range_step"]
 

@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
 __all__ = [
     "COLLISION_FACTS",
     "SLOTS",
     "CollisionVector",
-    "CollisionVectorParameters",
     "CollisionVector_",
     "carried_point",
     "collision_vectors",
@@ -34,19 +32,6 @@ __all__ = [
 
 #: Collision vectors that a controller takes at once.
 SLOTS = 3
-
-Aggregation = Literal["paper", "nearest", "sum"]
-
-
-class CollisionVectorParameters(Parameters):
-    """How echoes become collision vectors."""
-
-    aggregation: Aggregation = "paper"
-    """``paper``: nearest echo, joined with its nearer neighbour where close
-    enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
-    own vector, whose forces add; of more than three the nearest three."""
-    pair_separation_m: NonNegativeLength = 0.5
-    """Echoes farther apart than this are taken as two obstacles, m."""
 
 
 @register_jitable

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import Field, Strict
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Length, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
+from systems.ranging.parameters import ContactParameters
 from systems.world.geometry import beyond_rectangle
 
 __all__ = [
-    "ContactFaultParameters",
-    "ContactParameters",
     "ContactSwitches",
     "contact_switches_step",
 ]
@@ -29,28 +26,6 @@ __all__ = [
 _POINTS = 8
 #: A touch this near to the middle closes both switches, as a share of the width.
 _MIDDLE = 0.1
-
-
-class ContactFaultParameters(Parameters):
-    """A switch that fails in a run, and how."""
-
-    switch: int = Field(default=1, ge=1, le=2)
-    """1 left, 2 right."""
-    kind: Literal["stuck_open", "stuck_closed"] = "stuck_open"
-    """``stuck_open``: it never closes; ``stuck_closed``: it never opens."""
-    start_s: Time = 0.0
-    """When that begins, s."""
-
-
-class ContactParameters(Parameters):
-    """The two switches behind the front bumper (Song 2011, 2.1); sizes are ours."""
-
-    reach_m: Length = 0.01
-    """A switch closes where a body is this near to the front, m."""
-    faults: Annotated[
-        tuple[ContactFaultParameters, ...], Strict(False), Field(max_length=2)
-    ] = ()
-    """Switches that fail in a run."""
 
 
 class SwitchNumbers(NamedTuple):

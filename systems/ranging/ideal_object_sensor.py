@@ -15,19 +15,10 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
-from systems.framework.parameters import (
-    Length,
-    NonNegativeLength,
-    NonNegativeSpeed,
-    Parameters,
-    Time,
-)
 from systems.framework.signals import TICK_S, whole
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.ranging.objects import (
     KNOWN,
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
     RADIUS,
     ROBOT,
     THERE,
@@ -37,13 +28,17 @@ from systems.ranging.objects import (
     Y,
     nearest_objects,
 )
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS, ObjectSensorParameters
 from systems.world.geometry import (
     control_point,
     nearest_point_on_rectangle,
     segment_clearance,
 )
 
-__all__ = ["IdealObjectSensor", "ObjectSensorParameters", "ideal_object_step"]
+__all__ = [
+    "IdealObjectSensor",
+    "ideal_object_step",
+]
 
 #: A body that moves is taken for a disc unless it is longer than this many times its
 #: width.
@@ -52,22 +47,6 @@ _LONG = 2.0
 _RESTS_M_S = 1e-9
 #: One body hides another where the line to it passes this near, m.
 _GRAZE_M = 1e-6
-
-
-class ObjectSensorParameters(Parameters):
-    """How far and how well objects are seen."""
-
-    maximum_range_m: Length = 2.0
-    """Objects beyond it are not seen, m: R, the range of the scan (table 1)."""
-    noise_m: NonNegativeLength = 0.0
-    """Standard deviation of each coordinate of a place, m."""
-    velocity_noise_m_s: NonNegativeSpeed = 0.0
-    """Standard deviation of each component of a velocity, m/s."""
-    latency_s: Time = 0.0
-    """Age of what is seen, s, a multiple of the tick."""
-    occlusion: bool = False
-    """Whether bodies hide those behind them, unless they leave a corner or the nearest
-    place in view."""
 
 
 class ObjectNumbers(NamedTuple):

@@ -8,19 +8,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import (
-    Length,
-    NonNegativeLength,
-    NonNegativeSpeed,
-    Parameters,
-    Speed,
-    Time,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.ranging.beam_groups import BeamNumbers, group_beams
@@ -30,45 +21,23 @@ from systems.ranging.object_tracks import (
     TrackNumbers,
     track_objects,
 )
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import (
+    OBJECT_SIZE,
+    OBJECT_SLOTS,
+    ObjectDetectorParameters,
+    UltrasonicParameters,
+)
 from systems.world.geometry import control_point
 
-__all__ = ["ObjectDetector", "ObjectDetectorParameters", "object_detector_step"]
+__all__ = [
+    "ObjectDetector",
+    "object_detector_step",
+]
 
 #: Numbers that are kept of a beam: its last hit in W and its range, m, and whether
 #: there was an echo.
 _HIT_X, _HIT_Y, _RANGE, _HEARD = range(4)
 _BEAM_SIZE = 4
-
-
-class ObjectDetectorParameters(Parameters):
-    """How beams become objects; all ours, for the paper prints nothing of it."""
-
-    gap_m: Length = 0.2
-    """Hits of neighbouring beams are on one object if they are nearer than this and
-    what a surface takes that is seen as obliquely as the next field says, m."""
-    most_oblique_deg: float = Field(default=60.0, ge=0.0, le=85.0)
-    """Angle of a beam to a surface's normal up to which hits belong together, deg."""
-    dip_m: Length = 0.08
-    """Where the distance from P rises by this and falls again, two objects meet, m."""
-    wide_m: Length = 0.8
-    """Of what is wider, motion along it is not seen, m."""
-    coarse_m: Length = 0.25
-    """Nor is any where beams are farther apart than this, m: no velocity is known."""
-    gate_m: Length = 0.3
-    """Farther from where it is to be, an object is another one, m."""
-    noise_m: NonNegativeLength = 0.04
-    """Standard deviation of an object's distance besides that of ranges, m: beams hit
-    it elsewhere from tick to tick."""
-    velocity_change_m_s: Speed = 0.1
-    """Standard deviation of a velocity's change within a second, m/s."""
-    confirmation_s: Time = 0.5
-    """An object's velocity is known when it was seen for this long, s."""
-    memory_s: Time = 0.5
-    """What beams do not see any more is still there for this long, s."""
-    resting_m_s: NonNegativeSpeed = 0.05
-    """What is slower rests, m/s."""
 
 
 class DetectorNumbers(NamedTuple):

@@ -18,17 +18,8 @@ from systems.ranging.beam_groups import (
     NEAR_Y,
     OPEN,
 )
-from systems.ranging.objects import (
-    KNOWN,
-    OBJECT_SIZE,
-    RADIUS,
-    THERE,
-    VX,
-    VY,
-    X,
-    Y,
-    nearest_objects,
-)
+from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y, nearest_objects
+from systems.ranging.parameters import OBJECT_SIZE
 
 __all__ = ["TRACKS", "TRACK_SIZE", "TrackNumbers", "track_objects"]
 

@@ -18,10 +18,10 @@ from typing import Any
 import numpy as np
 from numba import njit
 
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+
 __all__ = [
     "KNOWN",
-    "OBJECT_SIZE",
-    "OBJECT_SLOTS",
     "RADIUS",
     "ROBOT",
     "THERE",
@@ -32,7 +32,6 @@ __all__ = [
     "nearest_objects",
 ]
 
-OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 THERE, X, Y, VX, VY, KNOWN, RADIUS, ROBOT = range(8)
 
 

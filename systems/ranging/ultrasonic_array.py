@@ -2,239 +2,47 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import replace
-from functools import cached_property, partial
-from itertools import pairwise
-from typing import Annotated, Any, Literal, NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, Strict, field_validator, model_validator
 from pydrake.systems.framework import LeafSystem
-from scipy.special import ndtri
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, read_arrays
-from systems.framework.input_error import InputError, shortened
 from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
 from systems.framework.parameters import (
-    Angle,
-    Fraction,
-    Length,
-    NonNegativeLength,
-    Parameters,
-    Period,
-    Point,
     Size,
-    SoundSpeed,
-    with_preset,
 )
-from systems.framework.signals import TICK_S, whole
+from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
+from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_faults import (
     BLIND,
     FROZEN,
     NOISY,
     SILENT,
-    SensorFaultParameters,
 )
-from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
 
 __all__ = [
     "UltrasonicArray",
-    "UltrasonicParameters",
     "body_rectangles",
     "cone_ranges",
     "measured_ranges",
     "world_rectangles",
 ]
 
-#: Neighbours are sensors next to one another whose directions differ by this at most,
-#: deg.
-NEIGHBOURS_DEG = 90.0
 
-_Axes = Annotated[tuple[Angle, ...], Strict(False), Field(min_length=1, max_length=360)]
-_Places = Annotated[tuple[Point, ...], Strict(False), Field(max_length=360)]
-_Faults = Annotated[
-    tuple[SensorFaultParameters, ...], Strict(False), Field(max_length=360)
-]
 #: Standard deviation of what a noisy sensor's ranges are off besides, m.
 _NOISY_M = 0.3
-
-
-class UltrasonicParameters(Parameters):
-    """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
-
-    preset: SensorPreset = "three"
-    """A named set: defaults of the other fields, of which those that are given win."""
-    axes_deg: _Axes = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, left to right, deg CCW from x; or a whole number,
-    of as many all around."""
-    positions_m: _Places = ()
-    """Places of the sensors from P, in B axes, m; one: that of all; none: all at P."""
-    beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
-    """Half of each cone's opening angle, deg."""
-    minimum_range_m: Length = 0.03
-    """Nearer surfaces read this range, m."""
-    maximum_range_m: Length = 3.0
-    """Farther surfaces give no echo, m."""
-    noise_m: NonNegativeLength = 0.001
-    """Standard deviation of a range, m."""
-    dropout_probability: Fraction = 0.0
-    """Probability that an echo is missed."""
-    period_s: Period = TICK_S
-    """Time from one firing to the next, s."""
-    firing: Literal["simultaneous", "sequential"] = "simultaneous"
-    """All sensors at once, or one after the other, a period each."""
-    assumed_sound_speed_m_s: SoundSpeed | None = None
-    """Speed by which the sensors turn time into range, m/s; none: the true one."""
-    faults: _Faults = ()
-    """Sensors that fail."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _fill(cls, data: Any) -> Any:
-        return with_preset(data, SENSOR_PRESETS)
-
-    @model_validator(mode="after")
-    def _check(self) -> UltrasonicParameters:
-        if self.minimum_range_m >= self.maximum_range_m:
-            raise InputError(
-                "minimum_range_m",
-                f"{self.minimum_range_m} must be below "
-                f"maximum_range_m {self.maximum_range_m}",
-            )
-        if any(b >= a for a, b in pairwise(self.axes_deg)):
-            raise InputError(
-                "axes_deg",
-                f"{shortened(str(self.axes_deg), 80)} must fall from left to right, as "
-                "30, 0, -30",
-            )
-        if self.axes_deg[0] - self.axes_deg[-1] >= 360.0:
-            raise InputError(
-                "axes_deg",
-                f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or more; "
-                "end before the first direction comes again",
-            )
-        for number, fault in enumerate(self.faults):
-            if fault.sensor > self.count:
-                raise InputError(
-                    f"faults.{number}.sensor",
-                    f"{fault.sensor} is none of {self.count} sensors; lower it",
-                )
-        if len(self.positions_m) not in (0, 1, self.count):
-            raise InputError(
-                "positions_m",
-                f"has {len(self.positions_m)} places for {self.count} sensors of "
-                "axes_deg; give one each, one for all, or none",
-            )
-        return self
-
-    @field_validator(
-        "axes_deg",
-        mode="before",
-        json_schema_input_type=_Axes | Annotated[int, Field(ge=1, le=360)],
-    )
-    @classmethod
-    def _ring(cls, axes: Any) -> Any:
-        """So many directions all around, one of them ahead."""
-        if isinstance(axes, int) and not isinstance(axes, bool):
-            if not 1 <= axes <= 360:
-                raise InputError("", f"{axes} sensors; take 1 to 360")
-            return tuple(180.0 - 360.0 * k / axes for k in range(axes))
-        return axes
-
-    @property
-    def count(self) -> int:
-        """Number of sensors."""
-        return len(self.axes_deg)
-
-    @property
-    def places(self) -> tuple[tuple[float, float], ...]:
-        """Of the sensors from P, in B axes, m."""
-        if len(self.positions_m) == self.count:
-            return self.positions_m
-        return (self.positions_m or ((0.0, 0.0),)) * self.count
-
-    @cached_property
-    def neighbours(self) -> tuple[tuple[int, int], ...]:
-        """Pairs of sensors next to one another, the left one first."""
-        around = [*self.axes_deg, self.axes_deg[0] - 360.0]
-        pairs = [
-            (k, (k + 1) % self.count)
-            for k, (left, right) in enumerate(pairwise(around))
-            if left - right <= NEIGHBOURS_DEG
-        ]
-        return tuple(pair for pair in pairs if pair[0] != pair[1])
-
-    @cached_property
-    def axes(self) -> tuple[float, ...]:
-        """Directions of the cones in B, rad."""
-        return tuple(map(math.radians, self.axes_deg))
-
-    @cached_property
-    def beams(self) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Axes (n,) in B, rad, places (n, 2) from P, m, and half angle, rad."""
-        half_angle = math.radians(self.beam_half_angle_deg)
-        return np.array(self.axes), np.array(self.places), half_angle
-
-    def period_ticks(self, tick_s: float) -> int:
-        """Ticks from one firing to the next.
-
-        Raises:
-            InputError: The period is no multiple of the tick.
-        """
-        ticks = self.period_s / tick_s
-        if not whole(ticks):
-            raise InputError(
-                "period_s",
-                f"{self.period_s:g} s is no multiple of a tick of {tick_s:g} s; give "
-                "one",
-            )
-        return round(ticks)
-
-    def round_ticks(self, tick_s: float) -> int:
-        """Ticks from one reading of a sensor to its next."""
-        rounds = self.count if self.firing == "sequential" else 1
-        return rounds * self.period_ticks(tick_s)
-
-    def turns(self, tick_s: float) -> NDArray[np.int64]:
-        """(n,) ticks into the round at which each sensor fires."""
-        turns = np.arange(self.count) * self.period_ticks(tick_s)
-        return turns if self.firing == "sequential" else 0 * turns
-
-    def errors(self, sound_speed: float) -> tuple[float, float, float, float, float]:
-        """Stretch of the ranges, noise, m, least luck, least and greatest range, m.
-
-        Args:
-            sound_speed: True speed of sound, m/s.
-
-        Returns:
-            As ``_measured_ranges`` takes them.
-        """
-        stretch = (self.assumed_sound_speed_m_s or sound_speed) / sound_speed
-        limits = self.minimum_range_m, self.maximum_range_m
-        return stretch, self.noise_m, self.least_luck, *limits
-
-    def fault_ticks(self, tick_s: float) -> NDArray[np.int64]:
-        """(n, 2) kind of each sensor's fault, 0 none, and tick of its begin."""
-        ticks = np.zeros((self.count, 2), dtype=np.int64)
-        for fault in self.faults:
-            begin = round(fault.start_s / tick_s)
-            ticks[fault.sensor - 1] = fault.number, begin
-        return ticks
-
-    @cached_property
-    def least_luck(self) -> float:
-        """Standard normal numbers below this drop an echo."""
-        return float(ndtri(self.dropout_probability))
 
 
 @njit(cache=True)

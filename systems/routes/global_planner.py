@@ -8,7 +8,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from pydantic import model_validator
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
@@ -16,10 +15,9 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
-from systems.framework.parameters import Duration, Length, Point
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import (
     OccupancyGrid,
     arena_about,
@@ -27,7 +25,7 @@ from systems.routes.occupancy_grid import (
     block_rectangles,
     make_occupancy_grid,
 )
-from systems.routes.path_target import PathTargetParameters
+from systems.routes.parameters import RouteParameters
 from systems.routes.route import ROUTE_SIZE, fill_route, find_route, plan_route
 from systems.routes.seen_points import (
     SeenPoints,
@@ -37,47 +35,16 @@ from systems.routes.seen_points import (
 )
 from systems.world.geometry import control_point
 
-__all__ = ["GlobalPlanner", "RouteParameters", "planner_step"]
+__all__ = [
+    "GlobalPlanner",
+    "planner_step",
+]
 
 #: Places in the state after the route.
 REPLANS, SINCE_S, FROM_M = range(ROUTE_SIZE, ROUTE_SIZE + 3)
 #: Sizes of its groups: the route, how often it was planned anew, and since when, s, and
 #: from where along the route, m, P has been making no way.
 _SIZES = ROUTE_SIZE, 1, 2
-
-
-class RouteParameters(PathTargetParameters):
-    """Where the robot goes, how its route is planned, and how the target moves."""
-
-    goal_m: Point = (4.0, 0.0)
-    """Where P is to go in W, m."""
-    clearance_m: Length = 0.35
-    """Kept between the route and all obstacles, m (ours)."""
-    cell_m: Length = 0.05
-    """Side of a cell of the grid, m (ours)."""
-    arena_margin_m: Length = 2.0
-    """Routes stay in the least rectangle about start, goal and known obstacles, and
-    this margin, m (ours)."""
-    replan: bool = True
-    """Whether a robot that stalls plans anew, with what it has seen (ours)."""
-    stall_m: Length = 0.1
-    """It stalls where P does not come so far along the route, m ..."""
-    stalled_s: Duration = 6.0
-    """... in this time, s."""
-    arrived_m: Length = 0.15
-    """Nearer to the goal than this it has arrived, and does not stall, m."""
-
-    @model_validator(mode="after")
-    def _check(self) -> RouteParameters:
-        if self.stall_m > self.speed_m_s * self.stalled_s:
-            raise InputError(
-                "stall_m",
-                f"{self.stall_m:g} m in stalled_s = {self.stalled_s:g} s is more than "
-                f"speed_m_s = {self.speed_m_s:g} makes: it would always stall; lower "
-                "it, or raise stalled_s",
-            )
-        make_occupancy_grid((0.0, 0.0, 0.0, 0.0), self.cell_m, self.clearance_m)
-        return self
 
 
 class PlannerNumbers(NamedTuple):

@@ -10,6 +10,7 @@ from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
+from systems.routes.parameters import check_cells
 from systems.world.geometry import beyond_rectangle, rectangle_corners
 
 __all__ = [
@@ -25,10 +26,6 @@ __all__ = [
 
 #: Cells of a grid at most: a search among them takes 40 MB.
 _MOST_CELLS = 1_000_000
-#: Cells in the radius of the disc at least: then a step between two free cells comes
-#: nearer than the radius by less than 3 % of it.
-_LEAST_CELLS = 3.0
-
 #: (n, 3) places and radii of discs, m; compiled code has no type for it.
 Discs = Any
 
@@ -80,12 +77,7 @@ def make_occupancy_grid(
     Raises:
         InputError: The cells are too many, or too coarse for the radius.
     """
-    if cell_m * _LEAST_CELLS > radius_m:
-        raise InputError(
-            "cell_m",
-            f"{cell_m:g} m is too coarse for a clearance of {radius_m:g} m; lower it "
-            f"to {radius_m / _LEAST_CELLS:.3g} or less",
-        )
+    check_cells(cell_m, radius_m)
     low_x, low_y, high_x, high_y = arena
     size = [
         max(math.ceil(extent / cell_m - 1e-9), 1)

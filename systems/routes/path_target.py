@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -13,15 +13,14 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Acceleration, Length, Parameters, Speed
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
+from systems.routes.parameters import PathTargetParameters
 from systems.routes.route import ROUTE_SIZE
 from systems.world.geometry import control_point
 
 __all__ = [
     "PathTarget",
-    "PathTargetParameters",
     "TargetNumbers",
     "nearest_on_route",
     "next_speed",
@@ -38,19 +37,6 @@ _STATES = 3 + 4
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
 #: So near to the goal the target is there, m.
 _THERE_M = 1e-6
-
-
-class PathTargetParameters(Parameters):
-    """How the target moves along the route."""
-
-    speed_m_s: Speed = 0.15
-    """Its speed along the route, m/s (ours; Engelbrecht and others print none)."""
-    acceleration_m_s2: Acceleration = 0.15
-    """Of that speed from rest and to rest, m/s^2 (ours)."""
-    timing: Literal["timed", "waiting"] = "timed"
-    """It moves by the clock, as in the paper, or waits for the robot."""
-    lead_m: Length = 0.5
-    """Where it waits, it is no farther ahead of P along the route, m (ours)."""
 
 
 class TargetNumbers(NamedTuple):

@@ -9,18 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from systems.ranging.objects import (
-    KNOWN,
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
-    RADIUS,
-    ROBOT,
-    THERE,
-    VX,
-    VY,
-    X,
-    Y,
-)
+from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import OccupancyGrid, cell_of
 from systems.routes.route import place_clearance
 

@@ -7,21 +7,24 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
+
+from systems.safety.views import Sectors, lasting
 
 __all__ = [
     "FreeSpace",
-    "Sectors",
     "cell_is_free",
     "clear_disc",
     "edge_cells",
     "end_view",
-    "lasting",
     "make_free_space",
     "move_window",
     "nearest_cell",
     "see",
 ]
+
+register_jitable(lasting)
 
 #: Places in ``FreeSpace.facts``.
 FIRST_I, FIRST_J, ROLLED, TICK = range(4)
@@ -73,25 +76,6 @@ class FreeSpace(NamedTuple):
             np.copy(self.arcs_s),
             self.cell_m,
         )
-
-
-class Sectors(NamedTuple):
-    """Apertures of range sensors, cut where they overlap: directions from one place.
-
-    A group is all sensors at one place. Its sectors are next to one another, counter-
-    clockwise; where no sensor looks in between, one has none.
-    """
-
-    places: NDArray[np.float64]
-    """(groups, 2) from the axle in B, m."""
-    first: NDArray[np.int64]
-    """(groups + 1,) first sector of each group, and the number of all."""
-    right: NDArray[np.float64]
-    """(sectors, 1) directions in B at which they begin, rad."""
-    left: NDArray[np.float64]
-    """(sectors, 1) where they end, rad."""
-    seen_by: NDArray[np.bool_]
-    """(sectors, sensors) which sensors see a sector."""
 
 
 def make_free_space(
@@ -426,29 +410,6 @@ def end_view(
         space.arcs[sensor, k, 0] = x + reach * math.cos(angle)
         space.arcs[sensor, k, 1] = y + reach * math.sin(angle)
     space.arcs_s[sensor, 0] = time
-
-
-@njit(cache=True)
-def lasting(distance: float, drift: Any) -> float:  # pragma: no cover  (compiled)
-    """Way for which a cell's place stays known well enough, m.
-
-    If each wheel's way is known to a share e, then after a way s the place of a cell
-    that was d away is off by e s + 2 e s/L (d + s) at most, L between the wheels: the
-    error of the way, and that of the heading times the distance.
-
-    Args:
-        distance: Of the cell from the axle when it was seen, m, or more.
-        drift: (wheel error e, allowed error of the place, m, wheel separation L, m).
-
-    Returns:
-        m; infinite without wheel errors.
-    """
-    error, allowed, separation = drift
-    if error == 0.0:
-        return np.inf
-    a = 2.0 * error / separation
-    b = error + a * distance
-    return (math.sqrt(b * b + 4.0 * a * allowed) - b) / (2.0 * a)
 
 
 @njit(cache=True)

@@ -3,166 +3,41 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Field
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, read_arrays
-from systems.framework.input_error import InputError
-from systems.framework.parameters import Fraction, Length, NonNegativeLength, Parameters
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     NEVER,
     ROLLED,
     TICK,
     FreeSpace,
-    Sectors,
     clear_disc,
     end_view,
-    lasting,
     make_free_space,
     move_window,
     see,
 )
+from systems.safety.parameters import FreeSpaceParameters
+from systems.safety.views import Sectors, lasting, sensor_sectors
 
 __all__ = [
     "FreeSpaceMap",
-    "FreeSpaceParameters",
-    "body_radius",
     "map_step",
-    "sensor_sectors",
 ]
 
-#: Cells of a window at most: 16 million take 0.4 GB.
-_MOST_CELLS = 4_000
 #: Points of a sensor's arc are this near to one another, seen from it, rad.
 _ARC_STEP = 0.035
-#: A range's error stays below so many standard deviations of it.
-_SIGMAS = 5.0
-
-
-class FreeSpaceParameters(Parameters):
-    """How space is remembered."""
-
-    cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
-    """Side of a cell, m."""
-    window_m: Length = 12.8
-    """Side of the square that is remembered, m; it moves along with the robot."""
-    start_bubble_m: Length = 1.0
-    """Radius about the axle in which nothing stands at the start, m: assumed."""
-    range_margin_m: NonNegativeLength = 0.002
-    """What ranges may be too long, m, besides five standard deviations of their
-    noise."""
-    wheel_error: Fraction = 0.0
-    """To what share each wheel's way is known: of 0, space stays known for ever."""
-    place_error_m: NonNegativeLength = 0.0
-    """Error of place by ``wheel_error`` up to which a cell counts as free, m; the guard
-    keeps off by as much more."""
-
-    @property
-    def cells(self) -> int:
-        """Of the window along a side."""
-        return math.ceil(self.window_m / self.cell_m - 1e-9)
-
-    def range_error(self, sensors: UltrasonicParameters) -> float:
-        """What ranges may be too long, m."""
-        return self.range_margin_m + _SIGMAS * sensors.noise_m
-
-    def check(self, robot: RobotParameters) -> None:
-        """Refuses what cannot serve a robot.
-
-        Args:
-            robot: Its body.
-
-        Raises:
-            InputError: The grid is too coarse, too large or too small, or nothing
-                would count as free for any way.
-        """
-        radius = body_radius(robot)
-        if self.cells > _MOST_CELLS:
-            raise InputError(
-                "window_m",
-                f"{self.window_m:g} m in cells of {self.cell_m:g} m are {self.cells}^2 "
-                f"cells, more than {_MOST_CELLS}^2; lower it, or raise cell_m",
-            )
-        if self.start_bubble_m < radius + 2.0 * self.cell_m:
-            raise InputError(
-                "start_bubble_m",
-                f"{self.start_bubble_m:g} m does not hold the body, which turns within "
-                f"{radius:.3g} m, and two cells of {self.cell_m:g} m; raise it to "
-                f"{radius + 2.0 * self.cell_m:.3g}, or lower cell_m",
-            )
-        if self.window_m < 4.0 * self.start_bubble_m:
-            raise InputError(
-                "window_m",
-                f"{self.window_m:g} m is less than four times the bubble of "
-                f"{self.start_bubble_m:g} m; raise it",
-            )
-        if self.wheel_error > 0.0 and self.place_error_m == 0.0:
-            raise InputError(
-                "place_error_m",
-                f"is 0, but wheel_error is {self.wheel_error:g}: nothing would stay "
-                "known; give what a place may be off, as 0.03",
-            )
-
-
-def body_radius(robot: RobotParameters) -> float:
-    """Radius of the disc about the axle that holds the body at any heading, m."""
-    return 0.5 * math.hypot(robot.length_m, robot.width_m)
-
-
-def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
-    """What a set of range sensors sees, as sectors of common places.
-
-    Args:
-        sensors: Any.
-        control_point_m: Distance of P ahead of the axle, m.
-
-    Returns:
-        The sectors.
-    """
-    half = math.radians(sensors.beam_half_angle_deg)
-    places: dict[tuple[float, float], list[int]] = {}
-    for k, place in enumerate(sensors.places):
-        places.setdefault(place, []).append(k)
-    first, right, left, seen_by = [0], [], [], []
-    for members in places.values():
-        spans = [(sensors.axes[k] - half, sensors.axes[k] + half) for k in members]
-        for a, b in _between(spans):
-            middle = 0.5 * (a + b)
-            right.append(a)
-            left.append(b)
-            seen = np.zeros(sensors.count, dtype=bool)
-            for k, (low, high) in zip(members, spans, strict=True):
-                seen[k] = any(low < middle + t < high for t in (-math.tau, 0, math.tau))
-            seen_by.append(seen)
-        first.append(len(right))
-    ahead = np.array([[control_point_m + x, y] for x, y in places])
-    columns = np.reshape(right, (-1, 1)), np.reshape(left, (-1, 1))
-    return Sectors(ahead, np.array(first), *columns, np.array(seen_by))
-
-
-def _between(
-    spans: Sequence[tuple[float, float]],
-) -> list[tuple[float, float]]:
-    """Sectors between neighbouring edges, from right to left; at most a turn."""
-    edges = sorted(edge for span in spans for edge in span)
-    if edges[-1] - edges[0] >= math.tau - 1e-9:
-        begin = edges[0]
-        edges = sorted(begin + (edge - begin) % math.tau for edge in edges)
-        edges.append(begin + math.tau)
-    return [(a, b) for a, b in pairwise(edges) if b - a > 1e-9]
 
 
 class MapNumbers(NamedTuple):

@@ -7,12 +7,11 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from pydantic import Field, model_validator
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.diff_drive_plant import PlantParameters
-from systems.base.robot import RobotParameters
+from systems.base.parameters import PlantParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import (
     COMMANDS,
     hand_position_twist,
@@ -21,13 +20,6 @@ from systems.base.wheel_speed_command import (
 )
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import read_lists
-from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Acceleration,
-    NonNegativeLength,
-    NonNegativeSpeed,
-    Parameters,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.safety.braking import (
@@ -39,9 +31,10 @@ from systems.safety.braking import (
     roll_on,
 )
 from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters, body_radius
+from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.views import stopping_way
 
-__all__ = ["GuardParameters", "MotionGuard", "stopping_way"]
+__all__ = ["MotionGuard"]
 
 # Groups of the discrete state.
 _V_WP, _WHEEL_SPEEDS, _REPORT, _MODEL = range(4)
@@ -49,31 +42,6 @@ _SIZES = 2, 2, 4, 2
 #: In between, a robot that passes a corner at top speed comes a tenth of a millimetre
 #: nearer to it, s.
 _PART_S = 0.025
-
-
-class GuardParameters(Parameters):
-    """How the guard keeps a robot in free space."""
-
-    obstacle_speed_m_s: NonNegativeSpeed = 0.0
-    """Largest speed of bodies in view that it reckons with, m/s; 0: all rest."""
-    braking_m_s2: Acceleration = 1.5
-    """Braking of the faster wheel's rim, m/s^2."""
-    margin_m: NonNegativeLength = 0.012
-    """It keeps the disc that holds the body off what is not free, m."""
-    least_margin_m: NonNegativeLength = 0.009
-    """The same where models were wrong and the robot has come nearer, m."""
-    slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
-    """Turning in its place no faster, the robot counts as at rest, rad/s."""
-
-    @model_validator(mode="after")
-    def _check(self) -> GuardParameters:
-        if self.least_margin_m > self.margin_m:
-            raise InputError(
-                "least_margin_m",
-                f"{self.least_margin_m:g} is above margin_m {self.margin_m:g}; "
-                "lower it",
-            )
-        return self
 
 
 class GuardNumbers(NamedTuple):
@@ -272,25 +240,6 @@ class MotionGuard(LeafSystem):
             values = np.array(state[begin : begin + size])
             discrete_state.set_value(group, values)
             begin += size
-
-
-def stopping_way(
-    own: GuardParameters, robot: RobotParameters, plant: PlantParameters, tick_s: float
-) -> float:
-    """Way of the faster wheel from top speed to rest, after a tick of it, or more.
-
-    Args:
-        own: Braking.
-        robot: Top speed.
-        plant: Lag of the motors.
-        tick_s: Period of the command, s.
-
-    Returns:
-        m.
-    """
-    top = robot.top_speed_m_s
-    delayed = plant.motor_lag_s + 2.0 * tick_s
-    return top * top / (2.0 * own.braking_m_s2) + top * delayed
 
 
 def _numbers(

@@ -12,7 +12,7 @@ from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 
 __all__ = ["SENSING_FAULTS", "MonitorNumbers", "SensingMonitor", "monitor_step"]
 

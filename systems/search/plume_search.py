@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Duration, Fraction, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs, ticks_of
 from systems.framework.step_block import Step
 from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
+from systems.search.parameters import (
+    PlumeSearchParameters,
+)
 from systems.search.search_ending import (
     FOUND,
     NO_NOSE,
@@ -41,14 +42,13 @@ from systems.search.search_state import (
     clear_frames,
     publish_search,
 )
-from systems.search.song_rules import SongRuleParameters, song2011_turn
-from systems.search.upwind_gradient import (
-    RULE_MEMORY,
-    UpwindGradientParameters,
-    upwind_gradient_turn,
-)
+from systems.search.song_rules import song2011_turn
+from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 
-__all__ = ["PlumeSearch", "PlumeSearchParameters", "plume_search_step"]
+__all__ = [
+    "PlumeSearch",
+    "plume_search_step",
+]
 
 #: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
@@ -67,36 +67,6 @@ _FN_SET, _FN_HEADING, _FN_GAS, _FN_AIRFLOW, _FN_RESULT = 2, 5, 6, 9, 12
 _DEAD_GAS, _STUCK = 1, 8
 #: Readings nearer to one another than this in a whole stop come from no live sensor.
 _LIFELESS = 1e-9
-
-
-class PlumeSearchParameters(Parameters):
-    """Times of a step, and the rules by which it turns."""
-
-    rules: Literal["song2011", "upwind_gradient"] = "upwind_gradient"
-    """The paper's four phases, or ours."""
-    wait_s: Time = 15.0
-    """Rest before the sensors count, s (Song 2011, 4.2)."""
-    sense_s: Duration = 2.0
-    """Their mean over this time counts, without the largest and the least reading, s
-    (4.2)."""
-    move_s: Duration = 3.0
-    """Turning and driving, s (4.2)."""
-    most_steps: int = Field(default=40, ge=1, le=1_000)
-    """After so many steps the search is given up."""
-    gate: bool = True
-    """Whether what is touched has to smell to be the source; off: any touch ends the
-    search as a find, as printed."""
-    gate_share: Fraction = 0.95
-    """It smells where the least of the three ratios since the last stop but one, those
-    of the stops included, is below this share of that in clean air, 1."""
-    address: int = Field(default=1, ge=1, le=3)
-    """Of the robot in its radio frames (Song 2011, 3.3)."""
-    call_every_s: Duration = 1.0
-    """Once it has ended it reports so by radio every so often, s."""
-    song2011: SongRuleParameters = SongRuleParameters()
-    """Of the paper's rules."""
-    upwind_gradient: UpwindGradientParameters = UpwindGradientParameters()
-    """Of ours."""
 
 
 class PlumeSearchNumbers(NamedTuple):

@@ -5,33 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from numba.extending import register_jitable
-from pydantic import Field
 
-from systems.framework.parameters import Parameters, Positive
 from systems.search.search_ending import UNDECIDED
 
-__all__ = ["SongRuleParameters", "song2011_turn"]
-
-
-class SongRuleParameters(Parameters):
-    """Thresholds and angles of the four phases (Song 2011, 4.2)."""
-
-    initial_threshold: float = Field(default=0.95, ge=0.0, le=2.0)
-    """R_init: in the plume where all three ratios Rs/R0 are below."""
-    airflow_threshold: Positive = 1.0
-    """F_thresh, in the unit of ``airflow``: printed without one, so that
-    ``airflow_sensors.gain_s_m`` decides what it means."""
-    turning_threshold: float = Field(default=0.75, ge=0.0, le=2.0)
-    """R_turning: phase 3 turns where R1 or R3 is below."""
-    reverse_threshold: float = Field(default=0.9, ge=0.0, le=2.0)
-    """R_reverse: phase 3 turns back where R2 is least and below. Used in the paper
-    without a value; ours."""
-    upwind_turn_deg: float = Field(default=45.0, ge=0.0, le=180.0)
-    """Of phase 2, deg."""
-    gradient_turn_deg: float = Field(default=60.0, ge=0.0, le=180.0)
-    """Of phase 3, deg."""
-    local_turn_deg: float = Field(default=30.0, ge=0.0, le=180.0)
-    """Of phase 4, deg."""
+__all__ = ["song2011_turn"]
 
 
 @register_jitable

@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydantic import Field
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Duration, Length, Parameters, Time
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs, ticks_of
 from systems.framework.step_block import Step
 from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
-from systems.radio.radio_channel import AIR_SIZE, RadioParameters
+from systems.radio.parameters import RadioParameters
+from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.radio_range import radio_distance
 from systems.radio.stream import PARSER_SIZE, parse_byte
+from systems.search.parameters import SoundSearchParameters
 from systems.search.search_ending import (
     AMBIGUOUS,
     CALLER_LOST,
@@ -46,7 +46,10 @@ from systems.search.search_state import (
     publish_search,
 )
 
-__all__ = ["SoundSearch", "SoundSearchParameters", "sound_search_step"]
+__all__ = [
+    "SoundSearch",
+    "sound_search_step",
+]
 
 #: What the robot is at; ``search_phase`` in its report.
 _WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
@@ -80,50 +83,6 @@ _TURN_S_DEG, _LAG_S = 1.0 / 90.0, 0.1
 _SHORT_OF = 0.93
 #: A step is no shorter, s.
 _SHORTEST_S = 0.5
-
-
-class SoundSearchParameters(Parameters):
-    """Times of a step, who calls, who waits, and where the robot stops."""
-
-    await_call: bool = True
-    """Whether it starts when the caller reports its find by radio; off: at once."""
-    caller: int = Field(default=1, ge=1, le=3)
-    """Address of the robot that calls (Song 2011, 3.3)."""
-    address: int = Field(default=2, ge=1, le=3)
-    """Of this robot in its radio frames."""
-    waits_for: int = Field(default=0, ge=0, le=3)
-    """Address of a robot that goes first: this one holds within ``hold_within_m`` of
-    the caller until that one reports its result; 0: none."""
-    hold_within_m: Length = 1.2
-    """By radio, m."""
-    hold_s: Duration = 200.0
-    """It holds for so long at most, s."""
-    call_within_s: Duration = 1800.0
-    """Without a call for so long it gives up, s."""
-    noise_s: Time = 0.5
-    """At the start it listens to the noise alone, s; 0: it does not."""
-    listen_s: Duration = 2.0
-    """Of a step, s (Song 2011, 4.3)."""
-    compute_s: Duration = 5.0
-    """Of a step, s (4.3)."""
-    move_s: Duration = 3.0
-    """Of a step, turning and driving, s (4.3)."""
-    stop: Literal["range", "radio"] = "range"
-    """It has arrived by the range that it hears, or by radio; or by radio alone, as
-    printed."""
-    stop_range_m: Length = 0.52
-    """Nearer than this to what it hears it has arrived, m."""
-    radio_gate_m: Length = 1.2
-    """Only this near by radio does the range that it hears count, m."""
-    radio_stop_m: Length = 0.42
-    """Nearer than this by radio, meant over a step's listening, it has arrived, m;
-    printed: 0.2 (4.3), where the robots' arms have long touched."""
-    tries: int = Field(default=3, ge=1, le=100)
-    """So many times in a row it may hear nothing, or not whence, before it gives up."""
-    most_steps: int = Field(default=30, ge=1, le=1_000)
-    """After so many steps the search is given up."""
-    report_every_s: Duration = 1.0
-    """Once it has ended it reports so by radio every so often, s."""
 
 
 class SoundSearchNumbers(NamedTuple):

@@ -6,14 +6,11 @@ import math
 from typing import Any
 
 from numba.extending import register_jitable
-from pydantic import Field
 
-from systems.framework.parameters import Angle, Fraction, Parameters, Positive
 from systems.search.search_ending import NO_WIND, UNDECIDED
 
 __all__ = [
     "RULE_MEMORY",
-    "UpwindGradientParameters",
     "upwind_gradient_turn",
 ]
 
@@ -28,23 +25,6 @@ _ABEAM_DEG = 80.0
 _LEAST = 0.01
 #: Stops in a row without any wind, a half turn between them, end the search.
 _CALM_STOPS = 3
-
-
-class UpwindGradientParameters(Parameters):
-    """Upwind, with the gradient of the smell across; all ours."""
-
-    gain_deg: Angle = 20.0
-    """Lean towards the front sensor that smells more, deg for each e-fold between their
-    ratios Rs/R0."""
-    largest_lean_deg: float = Field(default=45.0, ge=0.0, le=90.0)
-    """Largest lean, deg."""
-    lost_share: Fraction = 0.35
-    """Lost: no sensor's 1 - Rs/R0 is this share of the largest one so far."""
-    cast_deg: float = Field(default=110.0, ge=45.0, le=180.0)
-    """Lost, it goes to either side in turn at this angle from upwind, a step farther
-    each time, deg."""
-    still_air: Positive = 0.05
-    """No wind: both airflow sensors read less than this, in their own unit."""
 
 
 @register_jitable

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from systems.sound.adc import MicArrayParameters, channel_skew
+from systems.sound.parameters import MicArrayParameters, channel_skew
 
 __all__ = ["RealArray", "Tolerances", "draw_tolerances", "real_array"]
 

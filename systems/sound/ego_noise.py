@@ -12,9 +12,9 @@ from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.noise import BEFORE_THE_RUN, tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
-from systems.sound.adc import MicArrayParameters
+from systems.sound.parameters import MICROPHONE_BAND_HZ, MicArrayParameters
 from systems.sound.sound_file import read_sound
-from systems.sound.waveforms import MICROPHONE_BAND_HZ, band_limited
+from systems.sound.waveforms import band_limited
 
 __all__ = ["EgoNoise", "driving_share"]
 

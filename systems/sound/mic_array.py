@@ -10,7 +10,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import BasicVector, LeafSystem
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
@@ -22,14 +22,14 @@ from systems.framework.signals import (
 )
 from systems.framework.step_block import RunFacts, Step
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import (
     RealArray,
     Tolerances,
     real_array,
 )
-from systems.sound.recorder import MicMemory, Recorder, microphones_B
-from systems.sound.room import RoomParameters, room_images
+from systems.sound.parameters import MicArrayParameters, RoomParameters
+from systems.sound.recorder import MicMemory, Recorder
+from systems.sound.room import room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
 __all__ = [

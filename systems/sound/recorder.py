@@ -9,25 +9,24 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.noise import BEFORE_THE_RUN, frame_noise, tick_generator
 from systems.framework.signals import AudioFrame, Emission, read_only
-from systems.sound.adc import MicArrayParameters, check_faults, convert
+from systems.sound.adc import check_faults, convert
 from systems.sound.array_tolerances import RealArray, draw_tolerances, real_array
 from systems.sound.ego_noise import EgoNoise, driving_share
+from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
-from systems.sound.room import RoomParameters
 
-__all__ = ["MicMemory", "Recorder", "microphones_B", "record_frame"]
+__all__ = [
+    "MicMemory",
+    "Recorder",
+    "record_frame",
+]
 
 # Two instants closer than this are one tick of the clock, s.
 _SAME_INSTANT_S = 1e-6
-
-
-def microphones_B(robot: RobotParameters) -> NDArray[np.float64]:
-    """(n, 2) microphones in B, m, in the order of the channels."""
-    return np.add(robot.microphones_m, [robot.control_point_m, 0.0])
 
 
 def record_frame(

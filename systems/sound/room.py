@@ -10,142 +10,24 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Annotated
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike, NDArray
-from pydantic import Field, Strict, model_validator
 
-from systems.framework.input_error import InputError
-from systems.framework.parameters import Length, Parameters, Point
-from systems.framework.signals import SAMPLE_RATE_HZ, whole
+from systems.framework.signals import SAMPLE_RATE_HZ
+from systems.sound.parameters import RoomParameters
 from systems.sound.propagation import (
     INTERPOLATION_KERNEL,
     KERNEL_REACH,
     MINIMUM_RANGE_M,
 )
 
-__all__ = ["RoomImages", "RoomParameters", "room_images", "room_impulse_responses"]
-
-#: Higher orders of reflection are refused: four million images and more.
-GREATEST_ORDER = 150
-
-
-class RoomParameters(Parameters):
-    """A shoebox room round the floor of W, for sound: obstacles are what can be hit."""
-
-    size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
-        7.0,
-        7.0,
-        3.0,
-    )
-    """Extents along x and y of W, and height, m."""
-    corner_m: Point | None = None
-    """The corner of smallest x and y, in W, m.
-
-    Unset, the origin of W lies in the middle of the floor.
-    """
-    reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
-    """Time in which sound decays by 60 dB according to Sabine's formula, s.
-
-    Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m
-    their decay from -5 to -35 dB stands for 0.25, 0.45 and 0.72 s where 0.25, 0.4
-    and 0.6 s are asked for.
-    """
-    absorption: float | None = Field(default=None, gt=0.0, le=1.0)
-    """Share of the energy that a wall absorbs.
-
-    When set, the reverberation time follows from it.
-    """
-    maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
-    """Most walls that a reflection meets.
-
-    Unset, all count that arrive within the reverberation time.
-    """
-    source_height_m: Length = 0.3
-    """Height of every loudspeaker above the floor, m."""
-    microphone_height_m: Length = 0.3
-    """Height of the microphones above the floor, m."""
-    update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
-    """Reflections are of the poses at multiples of this, s; a multiple of a frame."""
-
-    @model_validator(mode="after")
-    def _check(self) -> RoomParameters:
-        for name in ("source_height_m", "microphone_height_m"):
-            if getattr(self, name) >= self.size_m[2]:
-                raise InputError(
-                    f"{name}",
-                    f"{getattr(self, name)} is not below the ceiling at "
-                    f"{self.size_m[2]} m; lower it",
-                )
-        return self
-
-    def update_frames(self, frame_s: float) -> int:
-        """Frames from one update of the reflections to the next.
-
-        Raises:
-            InputError: The update's period is no multiple of a frame.
-        """
-        frames = self.update_period_s / frame_s
-        if not whole(frames):
-            raise InputError(
-                "room.update_period_s",
-                f"{self.update_period_s:g} s is not a multiple of a frame of the "
-                f"microphones, {frame_s:g} s; use "
-                f"{max(1, round(frames)) * frame_s:g}",
-            )
-        return round(frames)
-
-    @property
-    def corner(self) -> NDArray[np.float64]:
-        """(2,) the corner of smallest x and y in W, m."""
-        if self.corner_m is None:
-            return np.array(self.size_m[:2]) / -2.0
-        return np.array(self.corner_m)
-
-    @property
-    def rise_m(self) -> float:
-        """Height of the microphones above the loudspeakers, m."""
-        return self.microphone_height_m - self.source_height_m
-
-    def contains(self, p_W: ArrayLike) -> bool:
-        """Whether all of the points (..., 2) in W lie between the walls."""
-        inside = np.asarray(p_W) - self.corner
-        return bool(np.all((inside > 0.0) & (inside < self.size_m[:2])))
-
-    def walls(self, c: float) -> tuple[float, float, int]:
-        """Absorption, reverberation time in s, and order of reflections.
-
-        Args:
-            c: Speed of sound, m/s.
-
-        Raises:
-            InputError: No walls are so dull, or so many images are needed
-                that they cannot be handled.
-        """
-        size = np.array(self.size_m)
-        sabine = float(12.0 * math.log(10.0) / (c * np.sum(1.0 / size)))
-        absorption, time = self.absorption, self.reverberation_time_s
-        if absorption is not None:
-            time = sabine / absorption
-        elif time <= sabine:
-            raise InputError(
-                "room.reverberation_time_s",
-                f"{time} s is too short for a room of "
-                f"{self.size_m} m; {sabine:.2g} s would take walls that absorb all",
-            )
-        # The farthest plane of images of one order, less a room on either side.
-        order = math.ceil(c * time * math.sqrt(np.sum(size**-2.0))) + 2
-        order = self.maximum_order or order
-        if order > GREATEST_ORDER:
-            raise InputError(
-                "room.maximum_order",
-                f"a reverberation time of {time:.2g} s takes "
-                f"reflections of order {order} in a room of {self.size_m} m; set it to "
-                f"{GREATEST_ORDER} or less",
-            )
-        return absorption or sabine / time, time, order
+__all__ = [
+    "RoomImages",
+    "room_images",
+    "room_impulse_responses",
+]
 
 
 @dataclass(frozen=True)

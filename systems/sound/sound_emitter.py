@@ -16,7 +16,8 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission, read_only
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.parameters import SoundParameters
+from systems.sound.waveforms import make_waveform
 
 __all__ = [
     "MAXIMUM_RANGE_M",

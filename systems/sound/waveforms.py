@@ -2,97 +2,28 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
-
 import numpy as np
 import soxr
 from numpy.typing import NDArray
-from pydantic import Field, model_validator
 
 from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Duration,
-    Frequency,
-    Parameters,
-    Positive,
-    Time,
-)
 from systems.framework.signals import SAMPLE_RATE_HZ
+from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
 from systems.sound.sound_file import read_sound
 
 __all__ = [
     "LARGEST_CREST",
-    "MICROPHONE_BAND_HZ",
-    "SoundParameters",
     "band_limited",
     "make_waveform",
 ]
 
-#: What the microphones pass (Han 2019, 4.1). The filter is applied to the
-#: waveform: a linear filter common to all microphones commutes with
-#: propagation, but for a Doppler factor of a part in a thousand.
-MICROPHONE_BAND_HZ = (50.0, 18_000.0)
 
-#: Raised-cosine edges of every burst, s: no clicks at the gate.
-EDGE_S = 0.004
 #: A file's beginning is cut while it is this far below its peak.
 SILENCE_DB = -50.0
 #: Largest ratio of peak to RMS level that the loudspeaker gives.
 LARGEST_CREST = 4.0
 #: Length of the noise, after which it repeats, s.
 _NOISE_SECONDS = 2.0
-
-
-class SoundParameters(Parameters):
-    """What is played, how loud, and when (Han 2019, 4.1: 0.5 s in every 2 s)."""
-
-    kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
-    """Waveform; ``wav`` plays ``file``."""
-    file: str | None = None
-    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
-    low_hz: Frequency = 500.0
-    """Lower end of chirp and band noise, Hz."""
-    high_hz: Frequency = 8_000.0
-    """Upper end of chirp and band noise, Hz."""
-    tone_hz: Frequency = 2_000.0
-    """Frequency of the tone and fundamental of the horn, Hz."""
-    level_pa: Positive = 0.05
-    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); less where the
-    peaks would exceed four times this, the loudspeaker's limit."""
-    on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
-    """Length of a burst, s."""
-    period_s: Duration = 2.0
-    """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
-    start_s: Time = 0.0
-    """First burst, s."""
-
-    @model_validator(mode="after")
-    def _check(self) -> SoundParameters:
-        if self.on_s > self.period_s:
-            raise InputError(
-                "on_s",
-                f"{self.on_s} is longer than period_s {self.period_s}; shorten it",
-            )
-        if self.low_hz >= self.high_hz:
-            raise InputError(
-                "low_hz", f"{self.low_hz} is not below high_hz {self.high_hz}; lower it"
-            )
-        top = MICROPHONE_BAND_HZ[1]
-        for name in ("high_hz", "tone_hz"):
-            if getattr(self, name) > top:
-                raise InputError(
-                    f"{name}",
-                    f"{getattr(self, name)} is above the {top:g} Hz that "
-                    "the microphones pass; lower it",
-                )
-        if self.kind == "wav" and self.file is None:
-            raise InputError("file", "kind is wav but no file is given; name one")
-        return self
-
-    def sounds(self, time: Any) -> Any:
-        """Whether the gate is open at a time in s, or at each of an array of them."""
-        phase = time - self.start_s
-        return (phase >= 0.0) & (phase % self.period_s < self.on_s)
 
 
 def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:

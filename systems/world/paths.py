@@ -15,7 +15,6 @@ from itertools import pairwise
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
@@ -168,7 +167,9 @@ class WaypointPath:
         times = np.asarray(times, dtype=float)
         if not self._moves:
             return np.full((len(times), 3), self._pieces[0][1:4])
-        return _poses_on(np.array(self._pieces), self._elapsed(times)[0])
+        from systems.world.path_poses import poses_on  # compiled code: when it is used
+
+        return poses_on(np.array(self._pieces), self._elapsed(times)[0])
 
     def twists(self, times: ArrayLike) -> NDArray[np.float64]:
         """(n, 2) speeds ahead, negative where a shuttle goes back, and yaw rates.
@@ -192,31 +193,6 @@ class WaypointPath:
             np.where(back, self._duration - elapsed, elapsed),
             np.where(back, -1.0, 1.0),
         )
-
-
-@njit(cache=True)
-def _poses_on(
-    pieces: NDArray[np.float64], elapsed: NDArray[np.float64]
-) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
-    """(n, 3) poses at times since the first of the pieces, (m, 7), began."""
-    poses = np.empty((elapsed.size, 3))
-    begins = np.ascontiguousarray(pieces[:, 0])
-    cosines, sines = np.cos(pieces[:, 3]), np.sin(pieces[:, 3])
-    for i in range(elapsed.size):
-        k = np.searchsorted(begins, elapsed[i], side="right") - 1
-        begin, x, y, theta, curvature, speed, acceleration = pieces[k]
-        since = elapsed[i] - begin
-        chord = (speed + 0.5 * acceleration * since) * since
-        half = 0.5 * curvature * chord
-        c, s = cosines[k], sines[k]
-        if half != 0.0:
-            # The chord of an arc: it tends to the arc as the curvature vanishes.
-            chord *= math.sin(half) / half
-            c, s = math.cos(theta + half), math.sin(theta + half)
-        poses[i, 0] = x + chord * c
-        poses[i, 1] = y + chord * s
-        poses[i, 2] = theta + 2.0 * half
-    return poses
 
 
 def _along(

@@ -16,7 +16,7 @@ from diagrams.compiled import source as compiled_source
 from diagrams.compiled.parts import run_parts
 from diagrams.compiled.source import LoopPart, address_of, compiled_part
 from systems.framework.input_error import InputError
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import AttractionParameters
 
 
 class Numbers(NamedTuple):

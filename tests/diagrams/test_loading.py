@@ -21,7 +21,7 @@ from diagrams.loading import (
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
-from systems.sound.room import RoomParameters
+from systems.sound.parameters import RoomParameters
 
 ONE_OF_EVERYTHING = """
 name: one of everything

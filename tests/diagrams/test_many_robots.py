@@ -14,7 +14,7 @@ from diagrams.loading import scenario_from_mapping
 from diagrams.robot import make_robot
 from systems.framework.input_error import InputError
 from systems.hearing.tdoa_estimator import may_sound
-from systems.sound.waveforms import SoundParameters
+from systems.sound.parameters import SoundParameters
 
 #: No noise whose seed would depend on the robot's name.
 EXACT: dict[str, Any] = {

@@ -13,8 +13,8 @@ from pydantic.fields import FieldInfo
 
 from diagrams.participants import SourceParameters
 from diagrams.scenario import Scenario
-from systems.sound.room import RoomParameters
-from systems.world.obstacles import ObstacleParameters
+from systems.sound.parameters import RoomParameters
+from systems.world.parameters import ObstacleParameters
 
 Number = tuple[str, type, list[Any]]
 

@@ -11,7 +11,7 @@ from analysis.hearing.detection import FalseAlarms, detection_curve, false_alarm
 from analysis.hearing.free_field import Loudspeaker
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.hearing.localise import TDOAParameters
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 pytestmark = pytest.mark.slow

@@ -22,17 +22,16 @@ from benchmarks.guard_drivers import (
     run_trial,
 )
 from diagrams import InputError, Scenario, load_scenario, simulate
-from systems.base.diff_drive_plant import (
-    DiffDrivePlant,
-    PlantParameters,
-)
+from systems.base.diff_drive_plant import DiffDrivePlant
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_odometry import advance_pose
-from systems.ranging.ultrasonic_array import UltrasonicParameters, measured_ranges
+from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.ultrasonic_array import measured_ranges
 from systems.safety.braking import braked, roll_on
-from systems.safety.free_space import lasting
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
+from systems.safety.views import lasting
 from systems.world.geometry import fan_ranges, rectangle_clearance
 
 SEED = 7

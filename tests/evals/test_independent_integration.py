@@ -25,11 +25,8 @@ from systems.laws.active_impedance_2017_controller import active_2017_force
 from systems.laws.active_impedance_controller import active_force
 from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
 from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.impedance import (
-    AttractionParameters,
-    attraction_force,
-    repulsion_force,
-)
+from systems.laws.impedance import attraction_force, repulsion_force
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 T = 0.025

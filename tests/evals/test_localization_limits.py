@@ -20,7 +20,7 @@ from analysis.hearing.localization import prepare_localization
 from analysis.hearing.localization_report import localization_summary, localization_text
 from analysis.hearing.paper_tables import PAPER_CELLS
 from systems.base.robot import RobotParameters
-from systems.hearing.localise import TDOAParameters
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 pytestmark = pytest.mark.slow

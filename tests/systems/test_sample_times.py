@@ -9,8 +9,8 @@ import pytest
 from pydrake.systems.framework import LeafSystem
 
 import systems
-from systems.ranging.ultrasonic_array import UltrasonicParameters
-from systems.sound.adc import MicArrayParameters
+from systems.ranging.parameters import UltrasonicParameters
+from systems.sound.parameters import MicArrayParameters
 
 IN_TURN = UltrasonicParameters(firing="sequential")
 SAMPLED: dict[str, dict[str, Any]] = {

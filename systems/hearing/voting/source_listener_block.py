@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.block_facts import BlockFacts
 from systems.hearing.audio_port import check_rate, read_audio
 from systems.hearing.voting.listening_plan import vote_plan
@@ -18,9 +18,8 @@ from systems.hearing.voting.source_listener import (
     hear_sources,
 )
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_shape import ArrayShape
-from systems.sound.recorder import microphones_B
+from systems.sound.parameters import MicArrayParameters
 
 __all__ = ["SourceListener"]
 

@@ -9,15 +9,14 @@ from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import NonNegativeLength, Parameters
 from systems.framework.step_block import Step, StepBlock
-from systems.laws.impedance import AttractionParameters
-from systems.planning.following import FollowingParameters, FollowNumbers
+from systems.laws.parameters import AttractionParameters
+from systems.planning.following import FollowNumbers
+from systems.planning.parameters import FollowingParameters
 
 __all__ = [
     "BASELINE_INPUTS",
     "BaselineController",
-    "MapParameters",
     "follow_numbers",
     "half_size",
     "speed_limits",
@@ -30,15 +29,6 @@ BASELINE_INPUTS = (
     ("target_valid", 1),
     ("pose_WB_estimated", 3),
 )
-
-
-class MapParameters(Parameters):
-    """Of baselines that look at a map of echoes."""
-
-    clearance_m: NonNegativeLength = 0.05
-    """Kept from places that echoed, m."""
-    source_clearance_m: NonNegativeLength = 0.5
-    """Echoes from so near to the target are its own, m."""
 
 
 class BaselineController(LeafSystem, StepBlock):

@@ -11,34 +11,24 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
-from systems.framework.parameters import (
-    Acceleration,
-    Duration,
-    Length,
-    NonNegative,
-    NonNegativeLength,
-    Positive,
-)
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    MapParameters,
     follow_numbers,
     half_size,
     speed_limits,
 )
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
-from systems.planning.following import FollowingParameters, FollowNumbers, approach
+from systems.laws.baselines.parameters import DynamicWindowParameters
+from systems.laws.parameters import AttractionParameters
+from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
+from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters
+from systems.safety.parameters import FreeSpaceParameters
 
 __all__ = [
-    "DWA",
     "DynamicWindowController",
-    "DynamicWindowParameters",
     "WindowNumbers",
     "choose_in_window",
     "dynamic_window_step",
@@ -49,27 +39,6 @@ __all__ = [
 _SPEEDS, _TURNS = 9, 17
 #: Places farther off are not looked at, m.
 _REACH_M = 2.5
-
-
-class DynamicWindowParameters(MapParameters):
-    """Weights and limits of the dynamic window."""
-
-    clearance_m: NonNegativeLength = 0.19
-    """Kept from places that echoed, m."""
-    heading_gain: NonNegative = 0.91
-    """Weight alpha of the heading (the paper's: 2)."""
-    distance_gain: NonNegative = 3.0
-    """Weight beta of the distance to the next obstacle (the paper's: 0.2)."""
-    speed_gain: NonNegative = 3.6
-    """Weight gamma of the speed (the paper's: 0.2)."""
-    acceleration_m_s2: Acceleration = 1.0
-    """Of the window, and of braking, m/s^2."""
-    turn_acceleration_rad_s2: Positive = 6.1
-    """Of the window, and of braking, rad/s^2."""
-    period_s: Duration = 0.1
-    """Time from one choice to the next, s."""
-    farthest_m: Length = 2.6
-    """What is farther along an arc counts as being there, m."""
 
 
 class WindowNumbers(NamedTuple):
@@ -338,21 +307,3 @@ class DynamicWindowController(BaselineController):
             state=(0.0, 0.0),
             carried=("free_space",),
         )
-
-
-DWA = Law(
-    name="dwa",
-    title="Dynamic window approach (Fox, Burgard and Thrun 1997)",
-    label="dynamic window",
-    equations=(
-        Equation(
-            "Dynamic window approach: objective",
-            r"G(v,\omega)=\alpha\,\mathrm{heading}+\beta\,\mathrm{dist}"
-            r"+\gamma\,\mathrm{velocity}",
-            "G(v, w) = alpha heading + beta dist + gamma velocity",
-        ),
-    ),
-    gains=DynamicWindowParameters,
-    controller=DynamicWindowController,
-    plans=True,
-)

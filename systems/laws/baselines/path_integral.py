@@ -9,41 +9,30 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydantic import Field
 
-from systems.base.robot import RobotParameters
-from systems.framework.parameters import (
-    Duration,
-    Length,
-    NonNegative,
-    NonNegativeLength,
-    Positive,
-    Speed,
-)
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    MapParameters,
     follow_numbers,
     half_size,
     speed_limits,
 )
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
+from systems.laws.baselines.parameters import PathIntegralParameters
+from systems.laws.parameters import AttractionParameters
 from systems.planning.carrot import find_carrot
-from systems.planning.following import FollowingParameters, FollowNumbers, wanted_speed
+from systems.planning.following import FollowNumbers, wanted_speed
 from systems.planning.occupied import list_occupied
+from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
 from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters, body_radius
+from systems.safety.parameters import FreeSpaceParameters
 
 __all__ = [
-    "MPPI",
     "PathIntegralController",
     "PathIntegralNumbers",
-    "PathIntegralParameters",
     "distance_field",
     "path_integral_step",
     "roll_out",
@@ -60,39 +49,6 @@ _DISCS = 3
 _DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
 #: Of a step between cells across a corner.
 _ACROSS = math.sqrt(2.0)
-
-
-class PathIntegralParameters(MapParameters):
-    """Samples and costs of the controller; critics are those of Nav2."""
-
-    clearance_m: NonNegativeLength = 0.08
-    """Kept from places that echoed, m."""
-    samples: int = Field(default=500, ge=10, le=5_000)
-    """Sequences of motions that are tried."""
-    steps: int = Field(default=25, ge=2, le=100)
-    """Steps of a sequence."""
-    step_s: Duration = 0.1
-    """Length of a step, and time from one plan to the next, s."""
-    speed_spread_m_s: Speed = 0.2
-    """Standard deviation of tried speeds, m/s (Nav2's)."""
-    turn_spread_rad_s: Positive = 1.1
-    """Standard deviation of tried yaw rates, rad/s."""
-    temperature: Positive = 0.37
-    """Costs by so much higher count 1/e; Nav2's is 0.3."""
-    control_gain: NonNegative = 0.015
-    """Price of leaving the last plan, gamma (Nav2's)."""
-    goal_gain: NonNegative = 5.0
-    """Price of a metre from where it should be, on average (Nav2's goal critic: 5)."""
-    angle_gain: NonNegative = 0.63
-    """Price of a radian off the way (Nav2's path angle critic: 2)."""
-    forward_gain: NonNegative = 0.81
-    """Price of driving back, s/m (Nav2's prefer forward critic: 5)."""
-    obstacle_gain: NonNegative = 3.4
-    """Price of touching what is kept off (Nav2's cost critic: 3.81)."""
-    inflation_m: Length = 0.057
-    """Farther away by this it is 1/e of that, m."""
-    collision_cost: NonNegative = 1_000.0
-    """Price of a contact."""
 
 
 class RollNumbers(NamedTuple):
@@ -433,21 +389,3 @@ def _roll_numbers(
 def _noise(own: PathIntegralParameters, seed: int) -> NDArray[np.float64]:
     shape = _ROUNDS * own.samples, own.steps, 2
     return np.random.default_rng(seed).standard_normal(shape)
-
-
-MPPI = Law(
-    name="mppi",
-    title="Model predictive path integral control (Williams et al. 2018)",
-    label="MPPI",
-    equations=(
-        Equation(
-            "MPPI: the plan",
-            r"u_k=\sum_n w_n\,(u_k+\epsilon_k^n),"
-            r"\quad w_n\propto\exp(-\frac{1}{\lambda}S_n)",
-            "u_k = sum of w_n (u_k + e_k^n), w_n ~ exp(-S_n/lambda)",
-        ),
-    ),
-    gains=PathIntegralParameters,
-    controller=PathIntegralController,
-    plans=True,
-)

@@ -9,48 +9,27 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 
-from systems.base.robot import RobotParameters
-from systems.framework.parameters import (
-    Duration,
-    Length,
-    NonNegativeLength,
-    Parameters,
-)
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
     follow_numbers,
 )
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
-from systems.planning.following import FollowingParameters, FollowNumbers, approach
+from systems.laws.baselines.parameters import ReciprocalAvoidanceParameters
+from systems.laws.parameters import AttractionParameters
+from systems.planning.following import FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
+from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
-from systems.safety.free_space_map import body_radius
 
 __all__ = [
-    "ORCA",
     "ReciprocalAvoidanceController",
-    "ReciprocalAvoidanceParameters",
     "avoid_body",
     "reciprocal_avoidance_step",
 ]
 
 #: A velocity that does not lead out of a contact at once does so in this time, s.
 _OUT_S = 0.1
-
-
-class ReciprocalAvoidanceParameters(Parameters):
-    """Horizon and disc of ORCA."""
-
-    horizon_s: Duration = 1.8
-    """No contact for so long, s."""
-    offset_m: Length = 0.045
-    """The point that moves as it likes is so far ahead of the axle, m."""
-    clearance_m: NonNegativeLength = 0.02
-    """Kept from all bodies, m."""
-    farthest_m: Length = 5.0
-    """Bodies farther off do not count, m."""
 
 
 class AvoidanceNumbers(NamedTuple):
@@ -293,21 +272,3 @@ class ReciprocalAvoidanceController(BaselineController):
             state=[0.0] * (2 + 3 * bodies),
             inputs=(("pose_WB", 3), ("poses_WO", 3 * bodies), ("sizes", 2 * bodies)),
         )
-
-
-ORCA = Law(
-    name="orca",
-    title="ORCA with perfect knowledge (van den Berg et al. 2011)",
-    label="ORCA",
-    equations=(
-        Equation(
-            "ORCA: velocity of the point ahead of the axle",
-            r"v=\mathrm{argmin}\,|v-v^{pref}|"
-            r"\quad\mathrm{with}\quad n_i\cdot(v-v_i-u_i)\geq 0",
-            "v = argmin |v - v_pref| with n_i . (v - v_i - u_i) >= 0",
-        ),
-    ),
-    gains=ReciprocalAvoidanceParameters,
-    controller=ReciprocalAvoidanceController,
-    plans=True,
-)

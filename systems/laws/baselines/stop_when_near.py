@@ -7,34 +7,22 @@ from typing import Any, NamedTuple
 from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
-from systems.framework.parameters import (
-    Length,
-    Parameters,
-)
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
     follow_numbers,
 )
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
-from systems.planning.following import FollowingParameters, FollowNumbers, approach
+from systems.laws.baselines.parameters import StopWhenNearParameters
+from systems.laws.parameters import AttractionParameters
+from systems.planning.following import FollowNumbers, approach
+from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 
 __all__ = [
-    "STOP_WHEN_NEAR",
     "StopWhenNearController",
-    "StopWhenNearParameters",
     "stop_when_near_step",
 ]
-
-
-class StopWhenNearParameters(Parameters):
-    """When it stops."""
-
-    stop_m: Length = 0.6
-    """It does not go on while an echo is nearer, m."""
 
 
 class StopNumbers(NamedTuple):
@@ -119,21 +107,3 @@ class StopWhenNearController(BaselineController):
             tick_s,
             inputs=(("ranges", count), ("echo", count)),
         )
-
-
-STOP_WHEN_NEAR = Law(
-    name="stop_when_near",
-    title="Stop when near",
-    label="stop when near",
-    equations=(
-        Equation(
-            "Stop when near: wanted speed",
-            r"v=k_v\,(\ell-d_f)+k_s\,\dot{\ell}_S"
-            r"\quad\mathrm{while\ all\ ranges}\geq r_0",
-            "v = k_v (l - d_f) + k_s v_S while all ranges >= r_0, else 0",
-        ),
-    ),
-    gains=StopWhenNearParameters,
-    controller=StopWhenNearController,
-    plans=True,
-)

@@ -9,35 +9,27 @@ import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydantic import model_validator
 
-from systems.base.robot import RobotParameters
-from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Length,
-    NonNegative,
-    NonNegativeLength,
-    Positive,
-)
+from systems.base.robot import RobotParameters, body_radius
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    MapParameters,
     follow_numbers,
 )
-from systems.laws.impedance import AttractionParameters
-from systems.laws.law import Equation, Law
-from systems.planning.following import FollowingParameters, FollowNumbers, approach
+from systems.laws.baselines.parameters import (
+    VectorFieldHistogramParameters,
+)
+from systems.laws.parameters import AttractionParameters
+from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
+from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters, body_radius
+from systems.safety.parameters import FreeSpaceParameters
 
 __all__ = [
-    "VFH_PLUS",
     "HistogramNumbers",
     "VectorFieldHistogramController",
-    "VectorFieldHistogramParameters",
     "choose_direction",
     "polar_histogram",
     "vector_field_histogram_step",
@@ -47,37 +39,6 @@ __all__ = [
 _SECTORS, _WIDE = 72, 16
 #: No direction was chosen before.
 _NONE = -1.0
-
-
-class VectorFieldHistogramParameters(MapParameters):
-    """Weights and thresholds of VFH+."""
-
-    clearance_m: NonNegativeLength = 0.04
-    """Kept from places that echoed, m."""
-    window_m: Length = 1.1
-    """Cells within this count, m; half of the paper's active window is 1.65."""
-    low_threshold: NonNegative = 0.33
-    """A sector with less is free."""
-    high_threshold: NonNegative = 0.66
-    """A sector with more is blocked; in between it stays as it was."""
-    slow_density: Positive = 69.0
-    """Density ahead at which the robot would stand."""
-    target_gain: NonNegative = 5.0
-    """Weight mu_1 of the target's direction (the paper's)."""
-    heading_gain: NonNegative = 2.0
-    """Weight mu_2 of the robot's heading (the paper's)."""
-    previous_gain: NonNegative = 2.9
-    """Weight mu_3 of the direction chosen before (the paper's: 2)."""
-
-    @model_validator(mode="after")
-    def _check_thresholds(self) -> VectorFieldHistogramParameters:
-        if self.high_threshold < self.low_threshold:
-            raise InputError(
-                "high_threshold",
-                f"{self.high_threshold:g} is below low_threshold, "
-                f"{self.low_threshold:g}; raise it",
-            )
-        return self
 
 
 class HistogramNumbers(NamedTuple):
@@ -365,21 +326,3 @@ class VectorFieldHistogramController(BaselineController):
             state=(*[0.0] * _SECTORS, _NONE, 0.0),
             carried=("free_space",),
         )
-
-
-VFH_PLUS = Law(
-    name="vfh_plus",
-    title="VFH+ (Ulrich and Borenstein 1998)",
-    label="VFH+",
-    equations=(
-        Equation(
-            "VFH+: cost of a candidate direction",
-            r"g(c)=\mu_1\,\Delta(c,k_t)+\mu_2\,\Delta(c,\theta/\alpha)"
-            r"+\mu_3\,\Delta(c,k_{n-1})",
-            "g(c) = mu_1 D(c, k_t) + mu_2 D(c, theta/alpha) + mu_3 D(c, k_(n-1))",
-        ),
-    ),
-    gains=VectorFieldHistogramParameters,
-    controller=VectorFieldHistogramController,
-    plans=True,
-)

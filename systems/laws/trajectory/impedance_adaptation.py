@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydantic import Field, model_validator
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
-from systems.framework.input_error import InputError
-from systems.framework.parameters import (
-    Length,
-    NonNegative,
-    Parameters,
-    Positive,
-    Time,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.laws.trajectory.impedance_sensitivity import (
@@ -28,67 +19,25 @@ from systems.laws.trajectory.impedance_sensitivity import (
     penalty_gradient,
     sensitivity_sources,
 )
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
-    TrajectoryImpedanceParameters,
     contact_numbers,
     contacts_of_objects,
 )
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-__all__ = ["AdaptationParameters", "ImpedanceAdaptation", "adaptation_step"]
+__all__ = [
+    "ImpedanceAdaptation",
+    "adaptation_step",
+]
 
 #: Places in the state: what adapts, and sensitivities to each, four numbers.
 _GAINS, _SENSITIVITIES = 0, 3
-
-
-class AdaptationParameters(Parameters):
-    """How K, D and K_e adapt (eq. 42); rates and cures are not printed."""
-
-    rule: Literal["none", "lyapunov", "sensitivity"] = "none"
-    """Nothing adapts; eq. 40 to 42 as they are printed, which is a Lyapunov rule; or
-    the gradient of eq. 27 by the sensitivities that eq. 34 means."""
-    rate: NonNegative = 10.0
-    """gamma = eta/T of K and D, (N/m)^2/(m^2 s)."""
-    contact_rate: NonNegative = 0.0
-    """The same of K_e."""
-    velocity_weight_s: Time = 0.5
-    """tau_v, s: an error of 1 m/s counts as one of tau_v metres."""
-    penalty: NonNegative = 0.0
-    """lambda of the hinge on distances below ``penalty_distance_m``."""
-    penalty_distance_m: Length = 0.5
-    """d_sec, m."""
-    normalisation: Positive | None = None
-    """m_0: rates are divided by m_0 and the squared sensitivity; none: they are not."""
-    projected: bool = False
-    """Whether K and D stay in their boxes."""
-    stiffness_box_n_m: tuple[Positive, Positive] = Field(
-        default=(0.5, 6.0), strict=False
-    )
-    """Least and greatest K, N/m."""
-    damping_box_n_s_m: tuple[Positive, Positive] = Field(
-        default=(3.0, 8.0), strict=False
-    )
-    """Least and greatest D, N s/m."""
-    contact_box_n_m: tuple[Positive, Positive] = Field(
-        default=(0.5, 24.0), strict=False
-    )
-    """Least and greatest K_e, N/m."""
-    leakage: NonNegative = 0.0
-    """sigma, 1/s: at which all returns to its nominal value."""
-    freezes: bool = False
-    """Whether nothing adapts while there is a contact."""
-
-    @model_validator(mode="after")
-    def _check(self) -> AdaptationParameters:
-        for name in ("stiffness_box_n_m", "damping_box_n_s_m", "contact_box_n_m"):
-            low, high = getattr(self, name)
-            if low >= high:
-                raise InputError(
-                    name, f"begins at {low:g} and ends at {high:g}; give the less first"
-                )
-        return self
 
 
 class AdaptationNumbers(NamedTuple):

@@ -12,42 +12,14 @@ from pydrake.systems.framework import LeafSystem
 from scipy.linalg import expm
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.parameters import Parameters, Positive
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 
 __all__ = [
     "ReferenceModel",
-    "ReferenceModelParameters",
     "held_matrices",
     "reference_step",
 ]
-
-
-class ReferenceModelParameters(Parameters):
-    """Its poles; none: those of the nominal impedance, so that nothing is to adapt."""
-
-    natural_frequency_rad_s: Positive | None = None
-    """w_n, rad/s; not printed."""
-    damping_ratio: Positive | None = None
-    """xi; not printed."""
-
-    def poles(
-        self, mass: float, stiffness: float, damping: float
-    ) -> tuple[float, float]:
-        """w_n, rad/s, and xi, those of M, K and D where they are not given.
-
-        Args:
-            mass: M, kg.
-            stiffness: K, N/m, above 0.
-            damping: D, N s/m.
-
-        Returns:
-            Both.
-        """
-        frequency = self.natural_frequency_rad_s or math.sqrt(stiffness / mass)
-        ratio = self.damping_ratio or damping / (2.0 * math.sqrt(stiffness * mass))
-        return frequency, ratio
 
 
 class ReferenceNumbers(NamedTuple):

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 
 __all__ = [
     "RATE_BOUNDS",

@@ -2,70 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from systems.framework.parameters import (
-    Acceleration,
-    Damping,
-    Length,
-    NonNegativeDamping,
-    NonNegativeStiffness,
-    Parameters,
-    Stiffness,
-)
-from systems.ranging.objects import (
-    OBJECT_SIZE,
-    OBJECT_SLOTS,
-    THERE,
-    VX,
-    VY,
-    X,
-    Y,
-)
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
+from systems.ranging.objects import THERE, VX, VY, X, Y
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import safe_norm
 
 __all__ = [
     "Contact",
     "ContactNumbers",
-    "TrajectoryImpedanceParameters",
     "contact_force",
     "contact_numbers",
     "contacts_of_objects",
     "state_matrices",
     "target_force",
 ]
-
-
-class TrajectoryImpedanceParameters(Parameters):
-    """Springs and dampers to the target and to contacts; the defaults are ours."""
-
-    stiffness_n_m: Stiffness = 3.0
-    """K to the target, N/m."""
-    damping_n_s_m: Damping = 4.0
-    """D to the target, N s/m."""
-    contact_stiffness_n_m: NonNegativeStiffness = 8.0
-    """K_e to robots and obstacles, N/m."""
-    contact_damping_n_s_m: NonNegativeDamping = 4.0
-    """D_e to robots and obstacles, N s/m."""
-    security_zone_m: Length = 0.8
-    """S: contacts begin at this distance from P, m (1 m in table 1)."""
-    horizon_m: Length = 2.0
-    """R, m; counts with ``zone`` envelope or jump alone."""
-    zone: Literal["security", "envelope", "jump"] = "security"
-    """Three readings of eq. 4, 5 and sec. 6: S - d within S; R - d within R; R - d
-    within S."""
-    damping_fades: bool = True
-    """Whether the damping of a contact grows from 0 at the edge of the zone (ours), or
-    is switched on there (the paper)."""
-    reading: Literal["restored", "printed_force", "printed_state"] = "restored"
-    """Signs that follow from a potential; those of eq. 4 and 5, whose damping drives;
-    or those of eq. 10, whose spring pulls to the obstacle."""
-    acceleration_limit_m_s2: Acceleration = 2.5
-    """Largest acceleration of the virtual mass, m/s^2."""
 
 
 class ContactNumbers(NamedTuple):

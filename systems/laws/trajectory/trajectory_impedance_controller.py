@@ -13,15 +13,15 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
-    TrajectoryImpedanceParameters,
     contact_force,
     contact_numbers,
     contacts_of_objects,
     target_force,
 )
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
 __all__ = [

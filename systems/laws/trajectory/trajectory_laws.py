@@ -2,64 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
-from systems.framework.parameters import Length, NonNegativeStiffness
 from systems.laws.law import Equation, Law
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
-from systems.laws.trajectory.reference_model import ReferenceModelParameters
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
-from systems.laws.trajectory.trajectory_impedance_controller import (
-    TrajectoryImpedanceController,
+from systems.laws.trajectory.parameters import (
+    AdaptiveTrajectoryParameters,
+    ConventionalTrajectoryParameters,
+    FilteredTrajectoryParameters,
+    TrajectoryImpedanceParameters,
 )
-from systems.planning.safety_filter import SafetyFilterParameters
 
 __all__ = [
     "TRAJECTORY_ADAPTIVE",
     "TRAJECTORY_CONVENTIONAL",
     "TRAJECTORY_FILTERED",
-    "AdaptiveTrajectoryParameters",
-    "ConventionalTrajectoryParameters",
-    "FilteredTrajectoryParameters",
-    "PrintedAdaptationParameters",
 ]
-
-
-class ConventionalTrajectoryParameters(TrajectoryImpedanceParameters):
-    """As in the paper, with the signs restored: K_e = K, S of table 1."""
-
-    contact_stiffness_n_m: NonNegativeStiffness = 3.0
-    """K_e to robots and obstacles, N/m."""
-    security_zone_m: Length = 1.0
-    """S, m."""
-    damping_fades: bool = False
-    """Switched on at the edge of the zone, as it is printed."""
-
-
-class PrintedAdaptationParameters(AdaptationParameters):
-    """How K, D and K_e adapt: as eq. 40 to 42 are printed, unless ``rule`` is set."""
-
-    rule: Literal["none", "lyapunov", "sensitivity"] = "lyapunov"
-    """Nothing adapts; eq. 40 to 42 as they are printed, which is a Lyapunov rule; or
-    the gradient of eq. 27 by the sensitivities that eq. 34 means."""
-
-
-class AdaptiveTrajectoryParameters(ConventionalTrajectoryParameters):
-    """The same with the adaptation that eq. 40 to 42 print."""
-
-    adaptation: PrintedAdaptationParameters = PrintedAdaptationParameters()
-    """How K, D and K_e adapt."""
-    reference: ReferenceModelParameters = ReferenceModelParameters()
-    """What they adapt to."""
-    safety_filter: SafetyFilterParameters | None = None
-    """Keeps P off objects, whatever the impedance; null: nothing does."""
-
-
-class FilteredTrajectoryParameters(TrajectoryImpedanceParameters):
-    """Ours: a narrower and stiffer zone, and a filter."""
-
-    safety_filter: SafetyFilterParameters = SafetyFilterParameters()
-    """Keeps P off objects, whatever the impedance."""
 
 
 _IMPEDANCE = Equation(
@@ -82,7 +37,8 @@ def _law(
         label=label,
         equations=(_IMPEDANCE, *more),
         gains=gains,
-        controller=TrajectoryImpedanceController,
+        module="systems.laws.trajectory.trajectory_impedance_controller",
+        controller_name="TrajectoryImpedanceController",
         plans=True,
         on_route=True,
     )

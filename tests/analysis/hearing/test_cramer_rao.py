@@ -16,7 +16,8 @@ from analysis.hearing.cramer_rao import (
     arrival_information,
     position_bound,
 )
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.parameters import SoundParameters
+from systems.sound.waveforms import make_waveform
 
 RATE, C, FRAME_S = 100_000.0, 340.0, 0.025
 ROW = np.array([[0.0, 0.4], [0.0, 0.0], [0.0, -0.4]])

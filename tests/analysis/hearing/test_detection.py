@@ -14,7 +14,8 @@ from systems.base.robot import RobotParameters
 from systems.delays.delays import look
 from systems.delays.half_band import halve_rate
 from systems.framework.noise import tick_generator
-from systems.hearing.localise import Localiser, TDOAParameters
+from systems.hearing.localise import Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -16,8 +16,8 @@ from analysis.hearing.free_field import (
     total_consistency,
 )
 from systems.base.robot import RobotParameters
+from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_fix import SourceFix
-from systems.hearing.tdoa_estimator import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -11,10 +11,8 @@ from hypothesis import strategies as st
 
 import analysis.hearing.room_trials
 from analysis.hearing.room_trials import Layout, RoomResult, draw_layouts, locate_bursts
-from systems.hearing.tdoa_estimator import TDOAParameters
-from systems.hearing.tracker_model import TrackerParameters
-from systems.sound.room import RoomParameters
-from systems.sound.waveforms import SoundParameters
+from systems.hearing.parameters import TDOAParameters, TrackerParameters
+from systems.sound.parameters import RoomParameters, SoundParameters
 
 #: Walls that absorb nearly all: one order of faint reflections.
 DULL = RoomParameters(absorption=0.999, maximum_order=1)

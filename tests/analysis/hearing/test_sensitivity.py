@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from analysis.hearing.free_field import Loudspeaker, frame_estimator
 from analysis.hearing.sensitivity import ArrayErrors, measured_std, predicted_std
 from systems.base.robot import RobotParameters
-from systems.hearing.localise import TDOAParameters
 from systems.hearing.multilateration import locate_source
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -10,11 +10,8 @@ import pytest
 
 from analysis.linear.heading_loop import heading_loop_margins
 from systems.base.robot import RobotParameters
-from systems.heading.heading_controller import (
-    HeadingController,
-    HeadingControlParameters,
-)
-from systems.heading.motor_driver import MotorDriverParameters
+from systems.heading.heading_controller import HeadingController
+from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
 
 ROBOT = RobotParameters(preset="song2011_hearing")
 PARTS = HeadingControlParameters(), MotorDriverParameters(), ROBOT, 0.1

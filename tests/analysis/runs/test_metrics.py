@@ -20,7 +20,8 @@ from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.scenario import Scenario
 from diagrams.stop_rules import Collision
-from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.ultrasonic_array import cone_ranges
 from systems.world.geometry import contact_time, rectangle_clearance
 
 TICK = 0.025

@@ -9,7 +9,7 @@ import pytest
 from analysis.safety.guarantees import clear_way, guarantees, seen_angle_deg
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 
 
 def facts(name="two_static_obstacles", *settings):

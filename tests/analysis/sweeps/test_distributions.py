@@ -6,7 +6,7 @@ from pydantic import ValidationError
 from scipy import stats
 
 from analysis.sweeps.distributions import Distribution
-from systems.world.obstacles import ObstacleParameters
+from systems.world.parameters import ObstacleParameters
 
 COUNT = 4000
 BOXES = {"count": [2, 4], "x_m": [1.0, 3.0], "y_m": [-1.0, 1.0], "side_m": [0.1, 0.5]}

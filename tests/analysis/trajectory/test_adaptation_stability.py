@@ -13,13 +13,15 @@ from analysis.trajectory.adaptation_stability import (
 from analysis.trajectory.point_run import PointLoop, run_point
 from diagrams import load_scenario
 from systems.framework.input_error import InputError
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
+)
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     rate_bound,
     sampled_matrix,
 )
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
 
 LAW = TrajectoryImpedanceParameters(
     stiffness_n_m=3.0,

@@ -10,8 +10,8 @@ import pytest
 from diagrams import InputError, load_scenario
 from diagrams.fields import find_fields, list_fields, scenario_schema
 from diagrams.scenario import Scenario
-from systems.sound.room import RoomParameters
-from systems.world.obstacles import ObstacleParameters
+from systems.sound.parameters import RoomParameters
+from systems.world.parameters import ObstacleParameters
 
 SCHEMA = scenario_schema()
 FIELDS = {field.path: field for field in list_fields(SCHEMA)}

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
 from diagrams import load_scenario
-from systems.base.carrier import CarrierParameters, DrivenPath
+from systems.base.carrier_parameters import CarrierParameters, driven_path
+from systems.base.driven_path import DrivenPath
 
 T = 0.025
 LAG, RADIUS, SEPARATION = 0.05, 0.06, 0.29
@@ -175,13 +176,13 @@ def test_a_shuttle_brakes_and_drives_backwards():
 def test_it_moves_alike_whatever_is_asked_first():
     """It is integrated in pieces, as far as asked."""
     times = [T * k for k in range(1200)]
-    fresh = DrivenPath(carrier(at_end="shuttle"))
+    fresh = driven_path.__wrapped__(carrier(at_end="shuttle"))
     in_turn = [fresh.pose(time) for time in times]
     shuffled = random.Random(1).sample(times, len(times))
-    other = DrivenPath(carrier(at_end="shuttle"))
+    other = driven_path.__wrapped__(carrier(at_end="shuttle"))
     found = {time: other.pose(time) for time in shuffled}
     assert in_turn == [found[time] for time in times]
-    at_once = DrivenPath(carrier(at_end="shuttle")).poses(times)
+    at_once = driven_path.__wrapped__(carrier(at_end="shuttle")).poses(times)
     np.testing.assert_allclose(at_once, in_turn, atol=1e-14)
 
 

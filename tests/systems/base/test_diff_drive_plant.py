@@ -12,7 +12,8 @@ from pydrake.systems.analysis import (
     SimulatorConfig,
 )
 
-from systems.base.diff_drive_plant import DiffDrivePlant, PlantParameters
+from systems.base.diff_drive_plant import DiffDrivePlant
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 
 LAG = 0.05

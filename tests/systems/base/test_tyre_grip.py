@@ -19,7 +19,8 @@ from pydrake.systems.analysis import (
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, minimize
 
-from systems.base.diff_drive_plant import DiffDrivePlant, PlantParameters
+from systems.base.diff_drive_plant import DiffDrivePlant
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.tyre_grip import GripNumbers, grip_accelerations
 

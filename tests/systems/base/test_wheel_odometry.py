@@ -13,14 +13,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
-from systems.base.diff_drive_plant import DiffDrivePlant, PlantParameters
+from systems.base.diff_drive_plant import DiffDrivePlant
+from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.wheel_odometry import (
-    OdometryParameters,
-    WheelOdometry,
-    advance_pose,
-    encoder_angle,
-)
+from systems.base.wheel_odometry import WheelOdometry, advance_pose, encoder_angle
 
 ROBOT = RobotParameters()
 EXACT = OdometryParameters(rounding=False)

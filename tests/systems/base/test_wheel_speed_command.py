@@ -9,12 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.base.diff_drive_plant import (
-    PlantNumbers,
-    PlantParameters,
-    body_twist,
-    plant_derivatives,
-)
+from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import (
     TwistWheelCommand,

@@ -16,7 +16,7 @@ from pydrake.systems.analysis import Simulator_
 from pydrake.systems.framework import LeafSystem, LeafSystem_, PortDataType
 
 import systems
-from systems.base.wheel_odometry import OdometryParameters
+from systems.base.parameters import OdometryParameters
 from systems.framework.finite import check_finite, read_arrays, read_lists
 from systems.framework.signals import (
     FRAME_SAMPLES,
@@ -25,12 +25,12 @@ from systems.framework.signals import (
     AudioFrame,
     Emission,
 )
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters
-from systems.sound.adc import MicArrayParameters, convert
+from systems.safety.parameters import FreeSpaceParameters
+from systems.sound.adc import convert
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import make_emission
-from systems.sound.waveforms import SoundParameters
 
 NOT_FINITE = (math.nan, math.inf, -math.inf)
 # Each once as it is, and in each way that reads its ports differently.

@@ -21,8 +21,8 @@ from systems.framework.parameters import (
     Positive,
     Size,
 )
-from systems.laws.active_impedance_controller import ActiveParameters
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.laws.parameters import ActiveParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.sound.acoustics import AcousticParameters, sound_speed
 
 

@@ -16,14 +16,10 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource, LogVectorOutput
 
 from systems import DiffDrivePlant, HeadingController, MagneticHeading, MotorDriver
-from systems.base.diff_drive_plant import PlantParameters
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.heading.compass import CompassParameters
-from systems.heading.heading_controller import (
-    PULSE_WIDTHS,
-    HeadingControlParameters,
-    motor_duties,
-)
+from systems.heading.heading_controller import PULSE_WIDTHS, motor_duties
+from systems.heading.parameters import CompassParameters, HeadingControlParameters
 
 MENDED, PRINTED, ELSE_ONLY = range(len(PULSE_WIDTHS))
 

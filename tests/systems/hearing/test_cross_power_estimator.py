@@ -11,13 +11,13 @@ from analysis.searching.bearing_trials import BearingTrial, hear_once
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.hearing.cross_power_estimator import (
-    ArrayListener,
-    CrossPowerEstimator,
-    CrossPowerParameters,
+from systems.hearing.cross_power_estimator import ArrayListener, CrossPowerEstimator
+from systems.hearing.parameters import CrossPowerParameters
+from systems.sound.parameters import (
+    MicArrayParameters,
+    MicrophoneFaultParameters,
+    SoundParameters,
 )
-from systems.sound.adc import MicArrayParameters, MicrophoneFaultParameters
-from systems.sound.waveforms import SoundParameters
 
 SIREN = SoundParameters(kind="siren", on_s=1.0, period_s=1.0)
 NOISE = SoundParameters(kind="band_noise", on_s=1.0, period_s=1.0)

@@ -15,11 +15,9 @@ from pydrake.systems.framework import DiagramBuilder, LeafSystem
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts
-from systems.hearing.cross_power_estimator import (
-    CrossPowerEstimator,
-    CrossPowerParameters,
-)
-from systems.sound.adc import MicArrayParameters
+from systems.hearing.cross_power_estimator import CrossPowerEstimator
+from systems.hearing.parameters import CrossPowerParameters
+from systems.sound.parameters import MicArrayParameters
 
 RATE = 32_000.0
 #: What is asked for at each tick: noise for 4, sound for 8, and again for 3.

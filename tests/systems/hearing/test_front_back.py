@@ -12,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from systems.framework.signals import TICK_S
-from systems.hearing.target_filter import (
+from systems.hearing.tracking.target_filter import (
     HYPOTHESIS,
     LARGEST_COST,
     LARGEST_STEP,

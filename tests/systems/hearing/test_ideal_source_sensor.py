@@ -10,12 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from systems.base.robot import RobotParameters
-from systems.hearing.ideal_source_sensor import (
-    IdealHearingParameters,
-    IdealSourceSensor,
-    relative_position,
-)
-from systems.sound.waveforms import SoundParameters
+from systems.hearing.ideal_source_sensor import IdealSourceSensor, relative_position
+from systems.hearing.parameters import IdealHearingParameters
+from systems.sound.parameters import SoundParameters
 
 ALWAYS = IdealHearingParameters(burst_gaps=False)
 place = st.floats(-5.0, 5.0)

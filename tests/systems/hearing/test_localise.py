@@ -13,7 +13,8 @@ from numpy.random import Generator, Philox
 from systems.delays.delay_search import weakest_sound
 from systems.delays.delays import look
 from systems.hearing import localise
-from systems.hearing.localise import HearingMemory, Localiser, TDOAParameters
+from systems.hearing.localise import HearingMemory, Localiser
+from systems.hearing.parameters import TDOAParameters
 from systems.sound.array_shape import ArrayShape
 
 FS, N, C = 100_000.0, 2500, 340.0

@@ -12,16 +12,17 @@ from systems.base.robot import RobotParameters
 from systems.delays.delay_sets import estimate_delay_sets
 from systems.delays.delays import look
 from systems.delays.half_band import halve_rate
-from systems.hearing.localise import TDOAParameters
+from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory
-from systems.hearing.target_filter import NEVER_HEARD_S
 from systems.hearing.tdoa_estimator import (
     TDOAEstimator,
     robot_choice,
     robot_localiser,
 )
+from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import convert
+from systems.sound.parameters import MicArrayParameters
 
 FS, N, C, FRAME_S = 100_000.0, 2500, 340.0, 0.025
 ROBOT = RobotParameters()

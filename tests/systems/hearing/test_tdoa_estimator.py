@@ -13,13 +13,11 @@ from pydrake.common.value import Value
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise
 from systems.framework.signals import AudioFrame
-from systems.hearing.tdoa_estimator import (
-    TDOAEstimator,
-    TDOAParameters,
-    robot_localiser,
-)
+from systems.hearing.parameters import TDOAParameters
+from systems.hearing.tdoa_estimator import TDOAEstimator, robot_localiser
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import convert
+from systems.sound.parameters import MicArrayParameters
 
 FS, N, L, C = 100_000.0, 2500, 0.4, 340.0
 PLACES = np.array([[0.0, L], [0.0, 0.0], [0.0, -L]])

@@ -14,11 +14,10 @@ from scipy.integrate import quad
 
 from systems.base.robot import RobotParameters
 from systems.laws.active_impedance_2017_controller import (
-    Active2017Parameters,
     ActiveImpedance2017Controller,
     active_2017_force,
 )
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import Active2017Parameters, AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 GAINS = Active2017Parameters(

@@ -14,14 +14,14 @@ from scipy.optimize import minimize_scalar
 from systems.base.robot import RobotParameters
 from systems.laws.active_impedance_controller import (
     ActiveImpedanceController,
-    ActiveParameters,
     active_force,
 )
-from systems.laws.conventional_impedance_controller import (
+from systems.laws.conventional_impedance_controller import conventional_force
+from systems.laws.parameters import (
+    ActiveParameters,
+    AttractionParameters,
     ConventionalParameters,
-    conventional_force,
 )
-from systems.laws.impedance import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]

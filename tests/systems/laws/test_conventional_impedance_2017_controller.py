@@ -10,13 +10,12 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.laws.conventional_impedance_2017_controller import (
-    Conventional2017Parameters,
     ConventionalImpedance2017Controller,
     conventional_2017_force,
 )
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import AttractionParameters, Conventional2017Parameters
 from systems.laws.repulsion import RepulsionParameters
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 
 GAINS = Conventional2017Parameters(distance_gain_j=1.2, damping_n_s_m=3.0)
 #: Least range of the sensors, m (Kim 2017, 4.2: 3 cm).

@@ -9,10 +9,9 @@ from scipy.integrate import quad
 from systems.base.robot import RobotParameters
 from systems.laws.conventional_impedance_controller import (
     ConventionalImpedanceController,
-    ConventionalParameters,
     conventional_force,
 )
-from systems.laws.impedance import AttractionParameters
+from systems.laws.parameters import AttractionParameters, ConventionalParameters
 from systems.laws.repulsion import RepulsionParameters
 
 GAINS = ConventionalParameters(stiffness_n_m=10.0, damping_n_s_m=3.0)

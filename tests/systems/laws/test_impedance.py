@@ -9,12 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.laws.impedance import (
-    AttractionParameters,
-    attraction_force,
-    obstacle_speed,
-    repulsion_force,
-)
+from systems.laws.impedance import attraction_force, obstacle_speed, repulsion_force
+from systems.laws.parameters import AttractionParameters
 from systems.laws.radial_law_controller import RadialLawController
 from systems.laws.repulsion import RepulsionParameters
 

@@ -18,18 +18,15 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.laws.active_impedance_2017_controller import (
+from systems.laws.active_impedance_2017_controller import active_2017_force
+from systems.laws.active_impedance_controller import active_force
+from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
+from systems.laws.conventional_impedance_controller import conventional_force
+from systems.laws.parameters import (
     Active2017Parameters,
-    active_2017_force,
-)
-from systems.laws.active_impedance_controller import ActiveParameters, active_force
-from systems.laws.conventional_impedance_2017_controller import (
+    ActiveParameters,
     Conventional2017Parameters,
-    conventional_2017_force,
-)
-from systems.laws.conventional_impedance_controller import (
     ConventionalParameters,
-    conventional_force,
 )
 from systems.laws.repulsion import RepulsionParameters
 

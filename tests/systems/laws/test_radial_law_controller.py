@@ -9,8 +9,8 @@ import pytest
 from pydrake.math import exp
 
 from systems.base.robot import RobotParameters
-from systems.laws.conventional_impedance_controller import ConventionalParameters
 from systems.laws.no_avoidance import no_force
+from systems.laws.parameters import ConventionalParameters
 from systems.laws.radial_law_controller import RadialLawController
 from systems.laws.repulsion import RepulsionParameters
 

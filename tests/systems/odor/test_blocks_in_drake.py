@@ -12,10 +12,15 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from systems.framework.step_block import RunFacts
-from systems.odor.airflow_sensors import AirflowParameters, AirflowSensors
-from systems.odor.gas_sensor_array import GasSensorArray, GasSensorParameters
+from systems.odor.airflow_sensors import AirflowSensors
+from systems.odor.gas_sensor_array import GasSensorArray
 from systems.odor.odor_plume import PLUME_SIZE, OdorPlume
-from systems.odor.wind import WIND_SIZE, WindField, WindParameters
+from systems.odor.parameters import (
+    AirflowParameters,
+    GasSensorParameters,
+    WindParameters,
+)
+from systems.odor.wind import WIND_SIZE, WindField
 
 POSE = (1.5, 0.1, 3.0)
 TICK_S = 0.025

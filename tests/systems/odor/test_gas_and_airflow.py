@@ -8,14 +8,16 @@ import numpy as np
 import pytest
 from numba import njit
 
-from systems.odor.airflow_sensors import AirflowParameters, AirflowSensors
-from systems.odor.gas_sensor_array import (
-    GasSensorArray,
+from systems.odor.airflow_sensors import AirflowSensors
+from systems.odor.gas_sensor_array import GasSensorArray
+from systems.odor.odor_plume import PLUME_SIZE
+from systems.odor.parameters import (
+    AirflowParameters,
     GasSensorFaultParameters,
     GasSensorParameters,
+    WindParameters,
 )
-from systems.odor.odor_plume import PLUME_SIZE
-from systems.odor.wind import WindField, WindParameters
+from systems.odor.wind import WindField
 
 QUIET = {"noise": 0.0, "mismatch": 0.0, "slope_mismatch": 0.0}
 

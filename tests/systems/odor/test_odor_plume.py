@@ -8,15 +8,10 @@ import numpy as np
 import pytest
 
 from systems.framework.input_error import InputError
-from systems.odor.odor_plume import (
-    PUFFS_BEGIN,
-    OdorParameters,
-    OdorPlume,
-    concentration,
-    release_rate,
-)
+from systems.odor.odor_plume import PUFFS_BEGIN, OdorPlume, concentration, release_rate
+from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
-from systems.odor.wind import WindField, WindParameters, wind_velocity
+from systems.odor.wind import WindField, wind_velocity
 
 WIND = WindParameters()
 INTENSITY = math.sqrt(0.12**2 + 0.12**2 + 0.1**2)

@@ -10,7 +10,8 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.framework.step_block import Step
-from systems.planning.safety_filter import SafetyFilter, SafetyFilterParameters
+from systems.planning.parameters import SafetyFilterParameters
+from systems.planning.safety_filter import SafetyFilter
 from systems.planning.velocity_filter import (
     FilterNumbers,
     disc_plane,

@@ -11,12 +11,11 @@ from hypothesis import strategies as st
 
 from systems.ranging.collision_vector import (
     CollisionVector,
-    CollisionVectorParameters,
     collision_vectors,
     echo_point,
     foot_on_segment,
 )
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 
 PAPER = CollisionVectorParameters()
 NEAREST = CollisionVectorParameters(aggregation="nearest")

@@ -7,11 +7,8 @@ import pytest
 from numba import njit
 
 from systems.base.robot import RobotParameters
-from systems.ranging.contact_switches import (
-    ContactFaultParameters,
-    ContactParameters,
-    ContactSwitches,
-)
+from systems.ranging.contact_switches import ContactSwitches
+from systems.ranging.parameters import ContactFaultParameters, ContactParameters
 
 BODY = RobotParameters(length_m=0.2, width_m=0.3)
 

@@ -10,11 +10,9 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
-from systems.ranging.ideal_object_sensor import (
-    IdealObjectSensor,
-    ObjectSensorParameters,
-)
+from systems.ranging.ideal_object_sensor import IdealObjectSensor
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
+from systems.ranging.parameters import ObjectSensorParameters
 
 ROBOT_PARAMETERS = RobotParameters(control_point_m=0.1)
 

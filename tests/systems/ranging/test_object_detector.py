@@ -11,13 +11,10 @@ from numba import njit
 
 from systems.base.robot import RobotParameters
 from systems.ranging.beam_groups import EXTENT, NEAR_X, NEAR_Y, OPEN, group_beams
-from systems.ranging.object_detector import (
-    ObjectDetector,
-    ObjectDetectorParameters,
-    object_detector_step,
-)
+from systems.ranging.object_detector import ObjectDetector, object_detector_step
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y
-from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.ranging.parameters import ObjectDetectorParameters, UltrasonicParameters
+from systems.ranging.ultrasonic_array import cone_ranges
 
 BURGER = RobotParameters.model_validate({"preset": "turtlebot3_burger"})
 EPSILON = 0.08

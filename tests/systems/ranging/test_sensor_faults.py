@@ -8,8 +8,8 @@ from pydantic import ValidationError
 
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
+from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_faults import SensorFaultParameters
-from systems.ranging.ultrasonic_array import UltrasonicParameters
 
 BEGIN_S, BEGIN = 1.0, 40
 SETTINGS = (

@@ -12,8 +12,9 @@ from pydantic import ValidationError
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import reproducing_command
 from diagrams import Scenario, dump_scenario, load_scenario, simulate
+from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS
-from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.ranging.ultrasonic_array import cone_ranges
 
 RINGS = ("ring_8", "ring_12", "lidar")
 MAST, CONTROL_POINT_M = (-0.175, 0.0), 0.175

@@ -11,12 +11,9 @@ from pydantic import ValidationError
 
 from diagrams import load_scenario, simulate
 from systems import CollisionVector
-from systems.ranging.collision_vector import (
-    CollisionVectorParameters,
-    collision_vectors,
-    echo_points,
-)
-from systems.ranging.ultrasonic_array import UltrasonicParameters, cone_ranges
+from systems.ranging.collision_vector import collision_vectors, echo_points
+from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
+from systems.ranging.ultrasonic_array import cone_ranges
 
 SIX = UltrasonicParameters.model_validate({"preset": "six"})
 

@@ -9,8 +9,9 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.laws.radial_law_controller import RadialLawController
-from systems.ranging.collision_vector import CollisionVector, CollisionVectorParameters
-from systems.ranging.ultrasonic_array import UltrasonicArray, UltrasonicParameters
+from systems.ranging.collision_vector import CollisionVector
+from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
+from systems.ranging.ultrasonic_array import UltrasonicArray
 
 T = 0.025
 START = 2.4

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
-from systems.ranging.ultrasonic_array import UltrasonicArray, UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.ultrasonic_array import UltrasonicArray
 from systems.sound.acoustics import AcousticParameters
 
 QUIET = UltrasonicParameters(noise_m=0.0)

@@ -15,12 +15,9 @@ from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.global_planner import (
-    GlobalPlanner,
-    RouteParameters,
-    planner_step,
-)
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
+from systems.routes.global_planner import GlobalPlanner, planner_step
+from systems.routes.parameters import RouteParameters
 from systems.routes.path_target import PathTarget
 from systems.routes.route import ROUTE_SIZE, plan_route
 from systems.world.geometry import nearest_point_on_rectangle, segment_clearance

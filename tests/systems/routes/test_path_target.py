@@ -9,12 +9,8 @@ import pytest
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
-from systems.routes.path_target import (
-    PathTarget,
-    PathTargetParameters,
-    nearest_on_route,
-    point_on_route,
-)
+from systems.routes.parameters import PathTargetParameters
+from systems.routes.path_target import PathTarget, nearest_on_route, point_on_route
 from systems.routes.route import ROUTE_SIZE, Route, plan_route
 from systems.world.paths import WaypointPath
 

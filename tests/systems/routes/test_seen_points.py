@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from systems.ranging.objects import OBJECT_SIZE, OBJECT_SLOTS
+from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import make_occupancy_grid
 from systems.routes.seen_points import (
     discs_to_avoid,

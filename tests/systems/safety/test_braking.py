@@ -10,11 +10,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from systems.base.diff_drive_plant import (
-    PlantNumbers,
-    PlantParameters,
-    plant_derivatives,
-)
+from systems.base.diff_drive_plant import PlantNumbers, plant_derivatives
+from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.safety.braking import (
     BRAKED,

@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     FIRST_I,
     FIRST_J,
@@ -21,13 +21,12 @@ from systems.safety.free_space import (
     clear_disc,
     edge_cells,
     end_view,
-    lasting,
     make_free_space,
     move_window,
     nearest_cell,
     see,
 )
-from systems.safety.free_space_map import sensor_sectors
+from systems.safety.views import lasting, sensor_sectors
 from systems.world.geometry import fan_ranges
 
 CONTROL_POINT_M = 0.175

@@ -11,11 +11,12 @@ import pytest
 
 from diagrams import InputError, Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelSpeedCommand
+from systems.base.robot import body_radius
 from systems.framework.step_block import RunFacts
 from systems.safety.braking import HALTED
 from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
-from systems.safety.free_space_map import FreeSpaceParameters, body_radius, map_step
-from systems.safety.motion_guard import GuardParameters
+from systems.safety.free_space_map import map_step
+from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 
 OWN_LAWS = """
 import math

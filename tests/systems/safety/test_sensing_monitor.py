@@ -8,7 +8,7 @@ from itertools import count
 import numpy as np
 import pytest
 
-from systems.ranging.ultrasonic_array import UltrasonicParameters
+from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.sensing_monitor import SENSING_FAULTS, SensingMonitor
 
 T = 0.025

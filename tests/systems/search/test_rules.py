@@ -6,11 +6,11 @@ import math
 
 import pytest
 
+from systems.search.parameters import SongRuleParameters, UpwindGradientParameters
 from systems.search.search_ending import NO_WIND, UNDECIDED
-from systems.search.song_rules import SongRuleParameters, song2011_turn
+from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import (
     RULE_MEMORY,
-    UpwindGradientParameters,
     upwind_angle,
     upwind_gradient_turn,
 )

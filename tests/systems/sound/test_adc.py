@@ -9,7 +9,8 @@ import pytest
 from pydantic import ValidationError
 
 from systems.framework.noise import frame_noise
-from systems.sound.adc import MicArrayParameters, convert
+from systems.sound.adc import convert
+from systems.sound.parameters import MicArrayParameters
 
 SILENT = np.zeros((3, 2500), dtype=np.float32)
 

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import draw_tolerances
+from systems.sound.parameters import MicArrayParameters
 
 
 def parameters(position=0.0, delay=0.0, gain_db=0.0):

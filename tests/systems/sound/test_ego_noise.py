@@ -14,11 +14,11 @@ from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters
 from systems.framework.signals import FRAME_SAMPLES, TICK_S
-from systems.sound.adc import MicArrayParameters
 from systems.sound.ego_noise import EgoNoise, driving_share
 from systems.sound.mic_array import MicArray
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import make_emission
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.waveforms import make_waveform
 
 RATE = 16_000
 ROBOT = RobotParameters()

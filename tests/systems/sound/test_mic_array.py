@@ -10,13 +10,12 @@ import pytest
 from pydantic import ValidationError
 from pydrake.common.value import Value
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame, Emission
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicrophoneFaultParameters
-from systems.sound.mic_array import MicArray, MicArrayParameters
-from systems.sound.recorder import microphones_B
+from systems.sound.mic_array import MicArray
+from systems.sound.parameters import MicArrayParameters, MicrophoneFaultParameters
 
 FS = 100_000.0
 TIME = 0.5

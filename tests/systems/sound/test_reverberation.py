@@ -10,16 +10,15 @@ import pytest
 import scipy.signal
 from pydrake.common.value import Value
 
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.signals import FRAME_SAMPLES, TICK_S, Emission
 from systems.sound import reverberation
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_tolerances import draw_tolerances, real_array
 from systems.sound.mic_array import MicArray
+from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import microphone_paths, propagate
-from systems.sound.recorder import microphones_B
 from systems.sound.reverberation import Reverberation, _place
-from systems.sound.room import RoomParameters, room_images, room_impulse_responses
+from systems.sound.room import room_images, room_impulse_responses
 
 FS = 100_000
 C = 340.0

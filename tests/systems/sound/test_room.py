@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from pydantic import ValidationError
 
 from systems.framework.input_error import InputError
-from systems.sound.room import RoomParameters, room_images, room_impulse_responses
+from systems.sound.parameters import RoomParameters
+from systems.sound.room import room_images, room_impulse_responses
 
 FS = 100_000
 C = 340.0

@@ -9,17 +9,18 @@ import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from systems.base.source_robot import SourceRobot, SourceRobotParameters
+from systems.base.carrier_parameters import SourceRobotParameters
+from systems.base.source_robot import SourceRobot
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
 from systems.sound.mic_array import MicArray
+from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import (
     SoundEmitter,
     emissions_along,
     emitted_samples,
     history_ticks,
 )
-from systems.sound.waveforms import SoundParameters, make_waveform
+from systems.sound.waveforms import make_waveform
 
 FS = 100_000
 

@@ -10,7 +10,8 @@ import soundfile
 from pydantic import ValidationError
 from scipy.special import j0
 
-from systems.sound.waveforms import EDGE_S, SoundParameters, make_waveform
+from systems.sound.parameters import EDGE_S, SoundParameters
+from systems.sound.waveforms import make_waveform
 
 FS = 100_000
 KINDS = ("chirp", "band_noise", "tone", "horn", "siren")

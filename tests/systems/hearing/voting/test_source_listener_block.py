@@ -9,7 +9,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
 from systems import SourceListener
-from systems.base.robot import RobotParameters
+from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.hearing.voting import vote_plan
@@ -19,9 +19,8 @@ from systems.hearing.voting.source_listener import (
     hear_sources,
 )
 from systems.sound.acoustics import AcousticParameters
-from systems.sound.adc import MicArrayParameters
 from systems.sound.array_shape import ArrayShape
-from systems.sound.recorder import microphones_B
+from systems.sound.parameters import MicArrayParameters
 
 MICROPHONES = MicArrayParameters(sample_rate_hz=16_000.0)
 SECONDS = 2.0

@@ -7,12 +7,8 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from systems.base.robot import RobotParameters
-from systems.laws.baselines.path_integral import (
-    PathIntegralParameters,
-    _roll_numbers,
-    distance_field,
-    roll_out,
-)
+from systems.laws.baselines.parameters import PathIntegralParameters
+from systems.laws.baselines.path_integral import _roll_numbers, distance_field, roll_out
 
 CELL_M = 0.05
 START = 0.0, 0.0, 0.0

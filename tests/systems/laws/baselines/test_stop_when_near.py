@@ -6,12 +6,10 @@ import math
 
 import pytest
 
-from systems.laws.baselines.stop_when_near import (
-    StopNumbers,
-    StopWhenNearParameters,
-    stop_when_near_step,
-)
-from systems.planning.following import FollowingParameters, FollowNumbers, approach
+from systems.laws.baselines.parameters import StopWhenNearParameters
+from systems.laws.baselines.stop_when_near import StopNumbers, stop_when_near_step
+from systems.planning.following import FollowNumbers, approach
+from systems.planning.parameters import FollowingParameters
 
 FOLLOW = FollowNumbers(FollowingParameters(), 1.2, 0.175)
 NUMBERS = StopNumbers(StopWhenNearParameters(stop_m=0.6), FOLLOW)

@@ -7,9 +7,9 @@ import math
 import numpy as np
 import pytest
 
+from systems.laws.baselines.parameters import VectorFieldHistogramParameters
 from systems.laws.baselines.vector_field_histogram import (
     HistogramNumbers,
-    VectorFieldHistogramParameters,
     choose_direction,
     polar_histogram,
 )

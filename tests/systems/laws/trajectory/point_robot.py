@@ -10,8 +10,10 @@ from numpy.typing import NDArray
 
 from analysis.trajectory.point_run import PointLoop, run_point
 from systems.base.robot import RobotParameters
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
+)
 
 TICK_S = 0.025
 ROBOT = RobotParameters(mass_kg=1.0, control_point_m=0.08)

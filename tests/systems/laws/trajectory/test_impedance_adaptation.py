@@ -9,12 +9,12 @@ import pytest
 from pydantic import ValidationError
 from scipy.integrate import solve_ivp
 
-from systems.laws.trajectory.impedance_adaptation import AdaptationParameters
 from systems.laws.trajectory.impedance_sensitivity import sensitivity_sources
-from systems.laws.trajectory.trajectory_impedance import (
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
     TrajectoryImpedanceParameters,
-    target_force,
 )
+from systems.laws.trajectory.trajectory_impedance import target_force
 from tests.systems.laws.trajectory.point_robot import TICK_S, along, run
 
 LAW = TrajectoryImpedanceParameters(contact_stiffness_n_m=3.0, security_zone_m=1.0)

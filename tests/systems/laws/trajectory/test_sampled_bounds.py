@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,
     damping_bound,
@@ -16,7 +17,6 @@ from systems.laws.trajectory.sampled_bounds import (
     sampled_matrix,
     stiffness_bound,
 )
-from systems.laws.trajectory.trajectory_impedance import TrajectoryImpedanceParameters
 
 BUILT = SampledMass(1.0, 0.05, 0.025)
 

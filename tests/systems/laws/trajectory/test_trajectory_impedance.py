@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import (
-    TrajectoryImpedanceParameters,
     contact_force,
     contact_numbers,
     contacts_of_objects,

@@ -14,12 +14,8 @@ from systems.framework.input_error import InputError
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S, whole
-from systems.hearing.tracker_model import (
-    Measurement,
-    Track,
-    TrackerModel,
-    TrackerParameters,
-)
+from systems.hearing.parameters import TrackerParameters
+from systems.hearing.tracking.tracker_model import Measurement, Track, TrackerModel
 
 __all__ = ["SourceTracker", "SourceTracker_"]
 
@@ -48,8 +44,8 @@ def SourceTracker_(T):
             - age [s]
             - target_valid [0 or 1]
 
-        A Kalman filter in W (``systems.hearing.target_filter``). A new estimate is
-        placed by the odometry pose of the moment it was measured,
+        A Kalman filter in W (``systems.hearing.tracking.target_filter``). A new
+        estimate is placed by the odometry pose of the moment it was measured,
         ``measurement_age_s`` ago; one without range counts across its bearing
         alone. An estimate that no source can have reached is dropped, unless
         several in a row agree. Between bursts the target rests in W, moves with

@@ -3,25 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydantic import Field
 
 from systems.base.robot import RobotParameters
-from systems.framework.parameters import (
-    Duration,
-    Length,
-    NonNegativeLength,
-    Parameters,
-    Speed,
-)
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step
-from systems.hearing.target_filter import (
+from systems.hearing.parameters import TrackerParameters
+from systems.hearing.tracking.target_filter import (
     HYPOTHESIS,
     TRACK_NAMES,
     FilterSettings,
@@ -38,35 +31,8 @@ __all__ = [
     "Measurement",
     "Track",
     "TrackerModel",
-    "TrackerParameters",
     "past_pose",
 ]
-
-
-class TrackerParameters(Parameters):
-    """How the target is tracked."""
-
-    hold: Literal["world", "robot", "motion"] = "motion"
-    """Between bursts the target rests in W, moves with the robot, or goes on
-    with its own velocity, which fades."""
-    maximum_age_s: Duration = 6.0
-    """An older target is lost: three periods of the sound, s."""
-    assumed_range_m: Length = 3.0
-    """Range of the first target when only its bearing is known, m."""
-    resolve_front_back: bool = True
-    """Let the robot's motion tell the source from its mirror image behind a row
-    of microphones; off: every source is in front."""
-    source_top_speed_m_s: Speed = 0.7
-    """Speed of a fast source, m/s: two standard deviations of each component of
-    a velocity that is not known."""
-    velocity_fade_s: Duration = 5.0
-    """Time constant with which a source's velocity is forgotten, s."""
-    measurement_floor_m: NonNegativeLength = 0.01
-    """Standard deviation of what the covariance of an estimate leaves out, m."""
-    gate_floor_m: Length = 0.2
-    """Standard deviation that the gate allows for besides the covariances, m."""
-    believed_outliers: int = Field(default=3, ge=1, le=1_000)
-    """The outlier of this number in a row is believed, if they agree."""
 
 
 class Measurement(NamedTuple):
@@ -88,7 +54,7 @@ class Track(NamedTuple):
     pose_heard: NDArray[Any]
     """(3,) odometry pose of the moment of the last estimate."""
     memory: NDArray[Any]
-    """The filter's, see ``systems.hearing.target_filter``."""
+    """The filter's, see ``systems.hearing.tracking.target_filter``."""
 
     @classmethod
     def unpack(cls, state: NDArray[Any], ticks: int) -> Track:
@@ -195,7 +161,7 @@ def _sighting(
 
     Returns:
         Pose of the robot (3,) at the moment that the estimate is valid for, and
-        the sighting (10,) of ``systems.hearing.target_filter``.
+        the sighting (10,) of ``systems.hearing.tracking.target_filter``.
     """
     pose = past_pose(poses, ticks)
     c, s = np.cos(pose[2]), np.sin(pose[2])

@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
 
 from systems.base.robot import RobotParameters
-from systems.hearing.source_tracker import SourceTracker
-from systems.hearing.tracker_model import (
+from systems.hearing.parameters import TrackerParameters
+from systems.hearing.tracking.source_tracker import SourceTracker
+from systems.hearing.tracking.tracker_model import (
     Measurement,
     Track,
     TrackerModel,
-    TrackerParameters,
     past_pose,
 )
 

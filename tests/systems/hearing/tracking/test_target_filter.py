@@ -12,7 +12,7 @@ from scipy.linalg import expm
 from scipy.stats import chi2
 
 from systems.framework.signals import TICK_S
-from systems.hearing.target_filter import (
+from systems.hearing.tracking.target_filter import (
     GATE,
     HYPOTHESIS,
     NEVER_HEARD_S,

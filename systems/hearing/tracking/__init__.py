@@ -1,0 +1,1 @@
+"""From fixes to a target: the filter, its model, the block."""

@@ -1,0 +1,120 @@
+"""What the memory of space and the guard have."""
+
+from __future__ import annotations
+
+import math
+
+from pydantic import Field, model_validator
+
+from systems.base.robot import RobotParameters, body_radius
+from systems.framework.input_error import InputError
+from systems.framework.parameters import (
+    Acceleration,
+    Fraction,
+    Length,
+    NonNegativeLength,
+    NonNegativeSpeed,
+    Parameters,
+)
+from systems.ranging.parameters import UltrasonicParameters
+
+__all__ = [
+    "FreeSpaceParameters",
+    "GuardParameters",
+]
+
+#: Cells of a window at most: 16 million take 0.4 GB.
+_MOST_CELLS = 4_000
+
+#: A range's error stays below so many standard deviations of it.
+_SIGMAS = 5.0
+
+
+class FreeSpaceParameters(Parameters):
+    """How space is remembered."""
+
+    cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
+    """Side of a cell, m."""
+    window_m: Length = 12.8
+    """Side of the square that is remembered, m; it moves along with the robot."""
+    start_bubble_m: Length = 1.0
+    """Radius about the axle in which nothing stands at the start, m: assumed."""
+    range_margin_m: NonNegativeLength = 0.002
+    """What ranges may be too long, m, besides five standard deviations of their
+    noise."""
+    wheel_error: Fraction = 0.0
+    """To what share each wheel's way is known: of 0, space stays known for ever."""
+    place_error_m: NonNegativeLength = 0.0
+    """Error of place by ``wheel_error`` up to which a cell counts as free, m; the guard
+    keeps off by as much more."""
+
+    @property
+    def cells(self) -> int:
+        """Of the window along a side."""
+        return math.ceil(self.window_m / self.cell_m - 1e-9)
+
+    def range_error(self, sensors: UltrasonicParameters) -> float:
+        """What ranges may be too long, m."""
+        return self.range_margin_m + _SIGMAS * sensors.noise_m
+
+    def check(self, robot: RobotParameters) -> None:
+        """Refuses what cannot serve a robot.
+
+        Args:
+            robot: Its body.
+
+        Raises:
+            InputError: The grid is too coarse, too large or too small, or nothing
+                would count as free for any way.
+        """
+        radius = body_radius(robot)
+        if self.cells > _MOST_CELLS:
+            raise InputError(
+                "window_m",
+                f"{self.window_m:g} m in cells of {self.cell_m:g} m are {self.cells}^2 "
+                f"cells, more than {_MOST_CELLS}^2; lower it, or raise cell_m",
+            )
+        if self.start_bubble_m < radius + 2.0 * self.cell_m:
+            raise InputError(
+                "start_bubble_m",
+                f"{self.start_bubble_m:g} m does not hold the body, which turns within "
+                f"{radius:.3g} m, and two cells of {self.cell_m:g} m; raise it to "
+                f"{radius + 2.0 * self.cell_m:.3g}, or lower cell_m",
+            )
+        if self.window_m < 4.0 * self.start_bubble_m:
+            raise InputError(
+                "window_m",
+                f"{self.window_m:g} m is less than four times the bubble of "
+                f"{self.start_bubble_m:g} m; raise it",
+            )
+        if self.wheel_error > 0.0 and self.place_error_m == 0.0:
+            raise InputError(
+                "place_error_m",
+                f"is 0, but wheel_error is {self.wheel_error:g}: nothing would stay "
+                "known; give what a place may be off, as 0.03",
+            )
+
+
+class GuardParameters(Parameters):
+    """How the guard keeps a robot in free space."""
+
+    obstacle_speed_m_s: NonNegativeSpeed = 0.0
+    """Largest speed of bodies in view that it reckons with, m/s; 0: all rest."""
+    braking_m_s2: Acceleration = 1.5
+    """Braking of the faster wheel's rim, m/s^2."""
+    margin_m: NonNegativeLength = 0.012
+    """It keeps the disc that holds the body off what is not free, m."""
+    least_margin_m: NonNegativeLength = 0.009
+    """The same where models were wrong and the robot has come nearer, m."""
+    slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
+    """Turning in its place no faster, the robot counts as at rest, rad/s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> GuardParameters:
+        if self.least_margin_m > self.margin_m:
+            raise InputError(
+                "least_margin_m",
+                f"{self.least_margin_m:g} is above margin_m {self.margin_m:g}; "
+                "lower it",
+            )
+        return self

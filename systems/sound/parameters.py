@@ -1,0 +1,341 @@
+"""What sounds, microphones, converter and room have."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import Field, Strict, model_validator
+
+from systems.framework.input_error import InputError
+from systems.framework.parameters import (
+    Duration,
+    Fraction,
+    Frequency,
+    Length,
+    Parameters,
+    Period,
+    Point,
+    Positive,
+    Time,
+)
+from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
+
+__all__ = [
+    "EDGE_S",
+    "GREATEST_ORDER",
+    "MICROPHONE_BAND_HZ",
+    "MicArrayParameters",
+    "MicrophoneFaultParameters",
+    "RoomParameters",
+    "SoundParameters",
+    "channel_skew",
+]
+
+#: What the microphones pass (Han 2019, 4.1). The filter is applied to the
+#: waveform: a linear filter common to all microphones commutes with
+#: propagation, but for a Doppler factor of a part in a thousand.
+MICROPHONE_BAND_HZ = (50.0, 18_000.0)
+
+#: Raised-cosine edges of every burst, s: no clicks at the gate.
+EDGE_S = 0.004
+
+
+class SoundParameters(Parameters):
+    """What is played, how loud, and when (Han 2019, 4.1: 0.5 s in every 2 s)."""
+
+    kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
+    """Waveform; ``wav`` plays ``file``."""
+    file: str | None = None
+    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
+    low_hz: Frequency = 500.0
+    """Lower end of chirp and band noise, Hz."""
+    high_hz: Frequency = 8_000.0
+    """Upper end of chirp and band noise, Hz."""
+    tone_hz: Frequency = 2_000.0
+    """Frequency of the tone and fundamental of the horn, Hz."""
+    level_pa: Positive = 0.05
+    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); less where the
+    peaks would exceed four times this, the loudspeaker's limit."""
+    on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
+    """Length of a burst, s."""
+    period_s: Duration = 2.0
+    """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
+    start_s: Time = 0.0
+    """First burst, s."""
+
+    @model_validator(mode="after")
+    def _check(self) -> SoundParameters:
+        if self.on_s > self.period_s:
+            raise InputError(
+                "on_s",
+                f"{self.on_s} is longer than period_s {self.period_s}; shorten it",
+            )
+        if self.low_hz >= self.high_hz:
+            raise InputError(
+                "low_hz", f"{self.low_hz} is not below high_hz {self.high_hz}; lower it"
+            )
+        top = MICROPHONE_BAND_HZ[1]
+        for name in ("high_hz", "tone_hz"):
+            if getattr(self, name) > top:
+                raise InputError(
+                    f"{name}",
+                    f"{getattr(self, name)} is above the {top:g} Hz that "
+                    "the microphones pass; lower it",
+                )
+        if self.kind == "wav" and self.file is None:
+            raise InputError("file", "kind is wav but no file is given; name one")
+        return self
+
+    def sounds(self, time: Any) -> Any:
+        """Whether the gate is open at a time in s, or at each of an array of them."""
+        phase = time - self.start_s
+        return (phase >= 0.0) & (phase % self.period_s < self.on_s)
+
+
+class MicrophoneFaultParameters(Parameters):
+    """A microphone that fails in a run, and how."""
+
+    microphone: int = Field(default=1, ge=1, le=64)
+    """Which one, from 1."""
+    kind: Literal["dead", "frozen"] = "dead"
+    """``dead``: its counts are 0; ``frozen``: they rest at a quarter of full scale."""
+    start_s: Time = 0.0
+    """When that begins, s."""
+
+
+class MicArrayParameters(Parameters):
+    """Microphones, amplifier and converter (Han 2019, 4.1)."""
+
+    sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
+    """Rate of the converter, Hz; at most that at which sound is computed.
+
+    No filter stands before the converter: what sounds above half the rate is folded.
+    """
+    frame_s: Period = TICK_S
+    """Length of a frame, and time from one to the next, s: so often the robot hears."""
+    snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the noise, dB.
+
+    The noise is white and Gaussian up to half the sample rate, of equal power in every
+    channel and independent of distance.
+    """
+    sensitivity_db: float = Field(default=-23.0, ge=-120.0, le=40.0)
+    """Sensitivity of the microphones, dB re 1 V/Pa."""
+    preamplifier_gain_db: float = Field(default=40.0, ge=-40.0, le=120.0)
+    """Gain between microphone and converter, dB."""
+    adc_full_scale_v: Positive = 1.65
+    """Voltage at which the converter clips, V, of either sign."""
+    adc_bits: int = Field(default=10, ge=2, le=16)
+    """Resolution of the converter, bits."""
+    channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
+    """Time by which each channel is sampled later, s; below one sample.
+
+    One time for each microphone, or none where all are sampled at once.
+    """
+
+    ego_noise_file: str | None = None
+    """Recording of the robot's own noise (WAV, FLAC ...), repeated for ever.
+
+    One channel for all microphones, or one for each.
+    """
+    ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
+    """Level of the source at 1 m over the ego noise at top speed, dB."""
+    ego_noise_share_at_rest: Fraction = 1.0
+    """Amplitude of the ego noise at rest over that at top speed; linear between."""
+    position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
+    """Each microphone stands off its place by up to this in x and in y, m.
+
+    This error and the next two are uniform, and drawn once from the seed.
+    """
+    delay_tolerance_s: float = Field(default=0.0, ge=0.0, le=1e-4)
+    """Each channel is sampled up to this earlier or later, s."""
+    gain_tolerance_db: float = Field(default=0.0, ge=0.0, le=40.0)
+    """The gain of each channel, noise included, is off by up to this, dB."""
+    faults: Annotated[
+        tuple[MicrophoneFaultParameters, ...], Strict(False), Field(max_length=64)
+    ] = ()
+    """Microphones that fail in a run."""
+
+    @model_validator(mode="after")
+    def _check(self) -> MicArrayParameters:
+        sample = 1.0 / self.sample_rate_hz
+        if not all(0.0 <= skew < sample for skew in self.channel_skew_s):
+            raise InputError(
+                "channel_skew_s",
+                f"{self.channel_skew_s} must lie in [0, {sample:g}) s, one sample",
+            )
+        if not whole(samples := self.frame_s * self.sample_rate_hz):
+            raise InputError(
+                "sample_rate_hz",
+                f"{self.sample_rate_hz:g} Hz gives {samples:.4f} samples in a frame of "
+                f"{self.frame_s:g} s; use {round(samples) / self.frame_s:g}",
+            )
+        failing = [fault.microphone for fault in self.faults]
+        if len({*failing}) < len(failing):
+            raise InputError(
+                "faults", f"microphones {failing}: two faults of one; leave one of each"
+            )
+        return self
+
+    @cached_property
+    def frame_samples(self) -> int:
+        """Samples a channel in a frame."""
+        return round(self.frame_s * self.sample_rate_hz)
+
+    @cached_property
+    def full_scale(self) -> int:
+        """Counts of the positive full scale."""
+        return 2 ** (self.adc_bits - 1)
+
+    @cached_property
+    def counts_per_pa(self) -> float:
+        """Counts for one pascal."""
+        gain = 10.0 ** ((self.sensitivity_db + self.preamplifier_gain_db) / 20.0)
+        return gain * self.full_scale / self.adc_full_scale_v
+
+
+def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float64]:
+    """(count,) s by which each channel is sampled later.
+
+    Args:
+        parameters: Have the skew; empty: none.
+        count: Number of microphones.
+
+    Returns:
+        (count,) s.
+
+    Raises:
+        InputError: The skew is given for another number of channels.
+    """
+    skew = parameters.channel_skew_s
+    if len(skew) not in (0, count):
+        raise InputError(
+            "microphones.channel_skew_s",
+            f"{skew} has {len(skew)} times for {count} "
+            "microphones; give one for each, or []",
+        )
+    return np.array(skew) if skew else np.zeros(count)
+
+
+#: Higher orders of reflection are refused: four million images and more.
+GREATEST_ORDER = 150
+
+
+class RoomParameters(Parameters):
+    """A shoebox room round the floor of W, for sound: obstacles are what can be hit."""
+
+    size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
+        7.0,
+        7.0,
+        3.0,
+    )
+    """Extents along x and y of W, and height, m."""
+    corner_m: Point | None = None
+    """The corner of smallest x and y, in W, m.
+
+    Unset, the origin of W lies in the middle of the floor.
+    """
+    reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
+    """Time in which sound decays by 60 dB according to Sabine's formula, s.
+
+    Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m
+    their decay from -5 to -35 dB stands for 0.25, 0.45 and 0.72 s where 0.25, 0.4
+    and 0.6 s are asked for.
+    """
+    absorption: float | None = Field(default=None, gt=0.0, le=1.0)
+    """Share of the energy that a wall absorbs.
+
+    When set, the reverberation time follows from it.
+    """
+    maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
+    """Most walls that a reflection meets.
+
+    Unset, all count that arrive within the reverberation time.
+    """
+    source_height_m: Length = 0.3
+    """Height of every loudspeaker above the floor, m."""
+    microphone_height_m: Length = 0.3
+    """Height of the microphones above the floor, m."""
+    update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
+    """Reflections are of the poses at multiples of this, s; a multiple of a frame."""
+
+    @model_validator(mode="after")
+    def _check(self) -> RoomParameters:
+        for name in ("source_height_m", "microphone_height_m"):
+            if getattr(self, name) >= self.size_m[2]:
+                raise InputError(
+                    f"{name}",
+                    f"{getattr(self, name)} is not below the ceiling at "
+                    f"{self.size_m[2]} m; lower it",
+                )
+        return self
+
+    def update_frames(self, frame_s: float) -> int:
+        """Frames from one update of the reflections to the next.
+
+        Raises:
+            InputError: The update's period is no multiple of a frame.
+        """
+        frames = self.update_period_s / frame_s
+        if not whole(frames):
+            raise InputError(
+                "room.update_period_s",
+                f"{self.update_period_s:g} s is not a multiple of a frame of the "
+                f"microphones, {frame_s:g} s; use "
+                f"{max(1, round(frames)) * frame_s:g}",
+            )
+        return round(frames)
+
+    @property
+    def corner(self) -> NDArray[np.float64]:
+        """(2,) the corner of smallest x and y in W, m."""
+        if self.corner_m is None:
+            return np.array(self.size_m[:2]) / -2.0
+        return np.array(self.corner_m)
+
+    @property
+    def rise_m(self) -> float:
+        """Height of the microphones above the loudspeakers, m."""
+        return self.microphone_height_m - self.source_height_m
+
+    def contains(self, p_W: ArrayLike) -> bool:
+        """Whether all of the points (..., 2) in W lie between the walls."""
+        inside = np.asarray(p_W) - self.corner
+        return bool(np.all((inside > 0.0) & (inside < self.size_m[:2])))
+
+    def walls(self, c: float) -> tuple[float, float, int]:
+        """Absorption, reverberation time in s, and order of reflections.
+
+        Args:
+            c: Speed of sound, m/s.
+
+        Raises:
+            InputError: No walls are so dull, or so many images are needed
+                that they cannot be handled.
+        """
+        size = np.array(self.size_m)
+        sabine = float(12.0 * math.log(10.0) / (c * np.sum(1.0 / size)))
+        absorption, time = self.absorption, self.reverberation_time_s
+        if absorption is not None:
+            time = sabine / absorption
+        elif time <= sabine:
+            raise InputError(
+                "room.reverberation_time_s",
+                f"{time} s is too short for a room of "
+                f"{self.size_m} m; {sabine:.2g} s would take walls that absorb all",
+            )
+        # The farthest plane of images of one order, less a room on either side.
+        order = math.ceil(c * time * math.sqrt(np.sum(size**-2.0))) + 2
+        order = self.maximum_order or order
+        if order > GREATEST_ORDER:
+            raise InputError(
+                "room.maximum_order",
+                f"a reverberation time of {time:.2g} s takes "
+                f"reflections of order {order} in a room of {self.size_m} m; set it to "
+                f"{GREATEST_ORDER} or less",
+            )
+        return absorption or sabine / time, time, order

@@ -1,0 +1,45 @@
+"""Poses on a path through waypoints, compiled."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+__all__ = ["poses_on"]
+
+
+@njit(cache=True)
+def poses_on(
+    pieces: NDArray[np.float64], elapsed: NDArray[np.float64]
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Poses at many times.
+
+    Args:
+        pieces: (m, 7) begin in s, x, y, theta, curvature, speed and acceleration of
+            each piece of the path.
+        elapsed: (n,) times since the first of them began, s.
+
+    Returns:
+        (n, 3) m and rad.
+    """
+    poses = np.empty((elapsed.size, 3))
+    begins = np.ascontiguousarray(pieces[:, 0])
+    cosines, sines = np.cos(pieces[:, 3]), np.sin(pieces[:, 3])
+    for i in range(elapsed.size):
+        k = np.searchsorted(begins, elapsed[i], side="right") - 1
+        begin, x, y, theta, curvature, speed, acceleration = pieces[k]
+        since = elapsed[i] - begin
+        chord = (speed + 0.5 * acceleration * since) * since
+        half = 0.5 * curvature * chord
+        c, s = cosines[k], sines[k]
+        if half != 0.0:
+            # The chord of an arc: it tends to the arc as the curvature vanishes.
+            chord *= math.sin(half) / half
+            c, s = math.cos(theta + half), math.sin(theta + half)
+        poses[i, 0] = x + chord * c
+        poses[i, 1] = y + chord * s
+        poses[i, 2] = theta + 2.0 * half
+    return poses
