@@ -21,7 +21,7 @@ from typing import NamedTuple
 
 from scipy.stats import qmc
 
-from analysis.comparison.compare import comparison_plan
+from analysis.comparison.plans import comparison_plan
 from diagrams import simulate
 
 __all__ = ["FAMILIES", "RANGES", "Tried", "tried_settings", "try_setting"]

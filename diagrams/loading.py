@@ -10,28 +10,19 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic_core import ValidationError
 
-from diagrams.fields import (
-    begins_anew,
-    check_fields,
-    did_you_mean,
-    explain,
-    scenario_schema,
-)
+from diagrams.fields import begins_anew, did_you_mean, explain, scenario_schema
 from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
-from systems.framework.input_files import require_file
 
 if TYPE_CHECKING:
     from diagrams.scenario import Scenario
 
 __all__ = [
-    "check_files",
     "dump_scenario",
     "library_scenarios",
     "load_scenario",
     "parse_setting",
-    "read_fields",
     "read_mapping",
     "resolve_sound",
     "scenario_from_mapping",
@@ -67,35 +58,13 @@ def load_scenario(
             unknown, of the wrong type or out of range; names each by its whole
             path.
     """
-    return scenario_from_mapping(read_fields(source, overrides))
-
-
-def read_fields(
-    source: str | Path = "default", overrides: Iterable[str] = ()
-) -> dict[str, Any]:
-    """The fields of a scenario, each checked by itself.
-
-    What takes several fields to judge is left to ``scenario_from_mapping``, which
-    loads what simulates.
-
-    Args:
-        source: As of ``load_scenario``.
-        overrides: As of ``load_scenario``.
-
-    Returns:
-        Plain values.
-
-    Raises:
-        InputError: As of ``load_scenario``.
-    """
     path = _find(source)
     data = read_mapping(path)
     data.setdefault("name", path.stem)
     resolve_sound(data, path.parent)
     set_fields(data, _settings(overrides))
     resolve_sound(data, Path.cwd())
-    check_fields(data)
-    return data
+    return scenario_from_mapping(data)
 
 
 def _settings(
@@ -211,29 +180,6 @@ def resolve_sound(data: dict[str, Any], folder: Path) -> None:
             fields = place.get(group)
             if isinstance(fields, dict) and isinstance(fields.get(key), str):
                 fields[key] = str((folder / fields[key]).resolve())
-
-
-def check_files(data: dict[str, Any]) -> None:
-    """Refuses files that a run would not find: of sound, and of own laws.
-
-    Args:
-        data: Fields of a scenario.
-
-    Raises:
-        InputError: One is no file.
-    """
-    places = {"": data}
-    for group in ("robots", "sources"):
-        named = _participants(data, group)
-        places |= {f"{group}.{name}.": fields for name, fields in named.items()}
-    for place, fields in places.items():
-        for key in ("sound", "loudspeaker"):
-            sound = fields.get(key) or {}
-            if sound.get("kind") == "wav" and sound.get("file"):
-                require_file(sound["file"], f"{place}{key}.file", "WAV or FLAC")
-        law, colon, _ = fields.get("law", "").rpartition(":")
-        if colon and law.endswith(".py"):
-            require_file(law, f"{place}law", "Python")
 
 
 def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:

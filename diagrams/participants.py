@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import Field, Strict, model_validator
+from pydantic import Field, Strict, field_validator, model_validator
 
+from diagrams.fields import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
@@ -107,6 +108,13 @@ class FollowerParameters(Parameters):
     compass: CompassParameters = CompassParameters()
     heading_control: HeadingControlParameters = HeadingControlParameters()
     motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+    @field_validator("law")
+    @classmethod
+    def _check_law(cls, law: str) -> str:
+        if ":" not in law and law not in LAWS:
+            raise unknown_law(law, LAWS)
+        return law
 
     @model_validator(mode="after")
     def _check_channels(self) -> FollowerParameters:

@@ -15,7 +15,7 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer, VectorLogSink
 
 from diagrams.laws import commanded, make_command, make_controller
-from diagrams.own_code import with_own_blocks
+from diagrams.own_blocks import with_own_blocks
 from diagrams.participants import SourceParameters
 from diagrams.robots.following_robot import following_blocks
 from diagrams.robots.routed_robot import routed_blocks, trajectory_command

@@ -13,7 +13,12 @@ from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ValidationError, model_validator
+from pydantic import (
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 
 from diagrams.bodies import (
     Body,
@@ -23,7 +28,7 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.fields import explain, joined
+from diagrams.fields import explain, joined, single_faults
 from diagrams.goal_checks import check_goals, start_note
 from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters
@@ -96,6 +101,28 @@ class Scenario(FollowerParameters, RunParameters):
             if robot.loudspeaker is not None:
                 played[name] = robot.loudspeaker
         return played
+
+    def sound_field(self, name: str) -> str:
+        """Where the scenario says what somebody plays, for a message.
+
+        Args:
+            name: One of ``sounds``.
+
+        Returns:
+            Dotted path.
+        """
+        if name in self.all_robots:
+            return f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
+        return (
+            f"sources.{name}.sound"
+            if "sound" in self.sources.get(name, {})
+            else "sound"
+        )
+
+    def robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:
+        """Each robot, with what its fields begin with in a message."""
+        for name, robot in self.all_robots.items():
+            yield (f"robots.{name}." if self.robots else ""), robot
 
     @property
     def longest_frame_s(self) -> float:
@@ -232,7 +259,7 @@ class Scenario(FollowerParameters, RunParameters):
             guard_note(n, robot, self.surroundings(n).bodies, self.duration_s)
             for n, robot in self.all_robots.items()
         ]
-        for prefix, robot in self._robot_fields():
+        for prefix, robot in self.robot_fields():
             notes.append(start_note(prefix, robot, self.mapped()))
             notes += route_notes(prefix, robot, self.tick_s)
         return [note for note in notes if note]
@@ -256,8 +283,45 @@ class Scenario(FollowerParameters, RunParameters):
         margin = self.stop.following_band_m if moves else self.stop.goal_margin_m
         return self.follow_distance_m + margin
 
+    @field_validator("robots", "sources")
+    @classmethod
+    def _check_changes(cls, named: Any, info: ValidationInfo) -> Any:
+        robots = info.field_name == "robots"
+        model = FollowerParameters if robots else SourceParameters
+        faults = [
+            InputError.joined([fault], below=name)
+            for name, changes in named.items()
+            for fault in single_faults(model, changes, f"one of {info.field_name}")
+        ]
+        if faults:
+            raise InputError.joined(faults)
+        return named
+
     @model_validator(mode="after")
-    def _check_names(self) -> Scenario:
+    def _check(self) -> Scenario:
+        # The others rest on these.
+        self._check_names()
+        self._check_targets()
+        self._check_searches()
+        faults = []
+        for check in (
+            self._check_routes,
+            self._check_goals,
+            self._check_rates,
+            self._check_step,
+            self._check_room,
+            self._check_start,
+            self._check_guards,
+        ):
+            try:
+                check()
+            except InputError as fault:
+                faults.append(fault)
+        if faults:
+            raise InputError.joined(faults)
+        return self
+
+    def _check_names(self) -> None:
         taken = [ODOR] if self.odor is not None else []
         for name in self.all_robots:
             if name in (WORLD, *taken):
@@ -277,10 +341,8 @@ class Scenario(FollowerParameters, RunParameters):
                         "robot a name of its own",
                     )
                 taken.append(name)
-        return self
 
-    @model_validator(mode="after")
-    def _check_targets(self) -> Scenario:
+    def _check_targets(self) -> None:
         played, sources = self.sounds(), self.all_sources
         for name, robot in self.all_robots.items():
             if robot.has_goal:
@@ -303,7 +365,6 @@ class Scenario(FollowerParameters, RunParameters):
             if robot.tdoa.schedule_known and robot.listens:
                 _check_schedule(field, target, played)
         self._check_heard(played)
-        return self
 
     def _check_heard(self, played: Mapping[str, SoundParameters]) -> None:
         robots = self.all_robots
@@ -321,9 +382,8 @@ class Scenario(FollowerParameters, RunParameters):
                     "'audio'; let one, or make it an obstacle",
                 )
 
-    @model_validator(mode="after")
-    def _check_goals(self) -> Scenario:
-        for prefix, robot in self._robot_fields():
+    def _check_routes(self) -> None:
+        for prefix, robot in self.robot_fields():
             law = LAWS.get(robot.law)
             if robot.route is not None:
                 if law is not None and not law.on_route:
@@ -339,29 +399,13 @@ class Scenario(FollowerParameters, RunParameters):
                     f"is missing, and law {robot.law!r} drives on one; set "
                     f"{prefix}route.goal_m",
                 )
-        check_goals(dict(self._robot_fields()), self.stop.diverged_range_m)
-        check_searches(
-            dict(zip(self.all_robots, self._robot_fields(), strict=True)), self
-        )
-        return self
 
-    @model_validator(mode="after")
-    def _check_numbers(self) -> Scenario:
-        """What does not rest on one another is told at once."""
-        faults = []
-        for check in (
-            self._check_rates,
-            self._check_step,
-            self._check_room,
-            self._check_start,
-        ):
-            try:
-                check()
-            except InputError as fault:
-                faults.append(fault)
-        if faults:
-            raise InputError.joined(faults)
-        return self
+    def _check_goals(self) -> None:
+        check_goals(dict(self.robot_fields()), self.stop.diverged_range_m)
+
+    def _check_searches(self) -> None:
+        robots = dict(zip(self.all_robots, self.robot_fields(), strict=True))
+        check_searches(robots, self)
 
     def _check_rates(self) -> None:
         tick = self.tick_s
@@ -372,7 +416,7 @@ class Scenario(FollowerParameters, RunParameters):
                 "sound; round it",
             )
         periods = []
-        for prefix, robot in self._robot_fields():
+        for prefix, robot in self.robot_fields():
             periods += [
                 (f"{prefix}microphones.frame_s", robot.microphones.frame_s),
                 (f"{prefix}ultrasonic.period_s", robot.ultrasonic.period_s),
@@ -392,7 +436,7 @@ class Scenario(FollowerParameters, RunParameters):
         # Where explicit Runge-Kutta steps of these orders amplify a decay.
         limits = {"runge_kutta2": 2.0, "runge_kutta3": 2.51, "runge_kutta5": 3.3}
         step = self.integrator.step_s
-        for prefix, robot in self._robot_fields():
+        for prefix, robot in self.robot_fields():
             lag = robot.plant.motor_lag_s
             if lag < step / limits[self.integrator.scheme]:
                 raise InputError(
@@ -409,7 +453,7 @@ class Scenario(FollowerParameters, RunParameters):
         for name, source in self.all_sources.items():
             group = f"sources.{name}" if self.sources else "source"
             places[f"{group}.waypoints_m"] = source.waypoints_m
-        for prefix, robot in self._robot_fields():
+        for prefix, robot in self.robot_fields():
             microphones = microphones_W(robot.start.pose, robot.robot)
             places[f"{prefix}start.position_m"] = microphones
         for field, points in places.items():
@@ -427,7 +471,7 @@ class Scenario(FollowerParameters, RunParameters):
         footprints = {
             name: (prefix, robot, robot_rectangle(robot.start.pose, robot.robot))
             for name, (prefix, robot) in zip(
-                self.all_robots, self._robot_fields(), strict=True
+                self.all_robots, self.robot_fields(), strict=True
             )
         }
         for (first, (_, _, a)), (second, (prefix, robot, b)) in combinations(
@@ -455,17 +499,10 @@ class Scenario(FollowerParameters, RunParameters):
                         f"{prefix}start.position_m",
                     )
 
-    @model_validator(mode="after")
-    def _check_guards(self) -> Scenario:
-        robots = zip(self.all_robots, self._robot_fields(), strict=True)
+    def _check_guards(self) -> None:
+        robots = zip(self.all_robots, self.robot_fields(), strict=True)
         for name, (prefix, robot) in robots:
             check_guard(prefix, robot, self.surroundings(name).bodies, self.tick_s)
-        return self
-
-    def _robot_fields(self) -> Iterator[tuple[str, FollowerParameters]]:
-        """Each robot, with what its fields begin with in a message."""
-        for name, robot in self.all_robots.items():
-            yield (f"robots.{name}." if self.robots else ""), robot
 
 
 def _check_schedule(

@@ -191,9 +191,9 @@ def compare(
         InputError: Something of that is no good; says what, and the remedy.
         RunError: Every run failed.
     """
-    from analysis.comparison.compare import comparison_plan, prepare_comparison
+    from analysis.comparison.compare import prepare_comparison
+    from analysis.comparison.plans import EXPERIMENTS, comparison_plan
     from analysis.comparison.report import compare_summary, write_comparison
-    from analysis.comparison.words import EXPERIMENTS
 
     chosen = None if laws is None else list(laws)
     plans = {
@@ -240,18 +240,18 @@ def stability(
     Raises:
         InputError: There is no such law or robot, or it has no linear model.
     """
-    from analysis.stability.law_analysis import (
-        analyse_law,
-        chosen_laws,
-        chosen_robot,
-    )
+    from analysis.stability.choice import chosen_laws, chosen_robot
+    from analysis.stability.law_analysis import analyse_law
     from analysis.stability.report_files import stability_document
     from analysis.stability.report_parts import parts_for
+    from diagrams.laws import make_controller
 
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
     alone, _ = chosen_robot(scenario, robot)
     scenarios = chosen_laws(alone, list(laws))
+    for each in scenarios:
+        make_controller(each)
     work = parts_for(scenarios, full=full)
     step = progress or (lambda title: None)
     analyses = [analyse_law(each, work, step=step) for each in scenarios]

@@ -32,11 +32,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
-    from diagrams.loading import read_fields
+    from analysis.hearing.trial_counts import check_trials
+    from diagrams.loading import load_scenario
 
     place = take(options.out)
     overrides = [] if options.seed is None else [f"seed={options.seed}"]
-    read_fields("default", overrides)
+    load_scenario("default", overrides)
+    check_trials(options.trials)
     say("measuring how well sounds are located")
 
     from analysis.hearing.localization import prepare_localization

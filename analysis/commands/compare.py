@@ -64,22 +64,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(
     options: Namespace, take: Take
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
-    from analysis.comparison.words import EXPERIMENTS, check_words
-
-    check_words(
-        options.scenario,
-        laws=options.laws,
-        velocity_terms=options.velocity_term,
-        runs=options.runs,
-        seed=options.seed,
-        settings=options.set,
-        grid=options.grid,
-    )
-    say(f"comparing laws in {', '.join(options.scenario or EXPERIMENTS)}")
-
-    from analysis.comparison.compare import comparison_plans, prepare_comparison
-    from analysis.comparison.report import compare_summary, write_comparison
-    from analysis.comparison.report_text import compare_text
+    from analysis.comparison.plans import comparison_plans
 
     plans = comparison_plans(
         options.scenario,
@@ -90,6 +75,14 @@ def _prepare(
         settings=options.set,
         grid=options.grid,
     )
+    for plan in plans.values():
+        plan.check()
+    say(f"comparing laws in {', '.join(plans)}")
+
+    from analysis.comparison.compare import prepare_comparison
+    from analysis.comparison.report import compare_summary, write_comparison
+    from analysis.comparison.report_text import compare_text
+
     prepared = prepare_comparison(
         plans, options.out, workers=options.workers, resume=options.resume
     )

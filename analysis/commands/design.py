@@ -21,13 +21,13 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
-    from diagrams.loading import check_files, read_fields, scenario_from_mapping
+    from diagrams.loading import load_scenario
+    from diagrams.scenario_files import check_files
 
     place = take(options.out)
-    fields = read_fields(options.scenario, overrides(options))
-    check_files(fields)
-    say(f"designing gains for {fields['name']}")
-    scenario = scenario_from_mapping(fields)
+    scenario = load_scenario(options.scenario, overrides(options))
+    check_files(scenario)
+    say(f"designing gains for {scenario.name}")
 
     from analysis.design.design_study import STUDY_RUNS, study_design
     from analysis.design.design_text import design_summary, design_text, write_design

@@ -56,14 +56,14 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.run_error import RunError
-    from diagrams.loading import check_files, read_fields, scenario_from_mapping
+    from diagrams.loading import load_scenario
+    from diagrams.scenario_files import check_files
     from systems.framework.input_error import InputError
 
     place, exports = take(options.out), Exports.chosen(options)
-    fields = read_fields(options.scenario, _settings(options))
-    check_files(fields)
-    say(f"simulating {fields['name']}")
-    scenario = scenario_from_mapping(fields)
+    scenario = load_scenario(options.scenario, _settings(options))
+    check_files(scenario)
+    say(f"simulating {scenario.name}")
 
     from analysis.exports.recorded_run import RecordedRun
     from analysis.runs.run_report import run_summary, summary_text, write_run

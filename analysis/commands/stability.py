@@ -48,30 +48,31 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
-    from diagrams.fields import known_laws, unknown_law
-    from diagrams.loading import check_files, read_fields, scenario_from_mapping
+    from analysis.stability.choice import chosen_laws, chosen_robot
+    from diagrams.loading import load_scenario
+    from diagrams.scenario_files import check_files
 
     place = take(options.out)
-    fields = read_fields(options.scenario, overrides(options))
-    check_files(fields)
-    for law in options.law or []:
-        if law != "all" and ":" not in law and law not in known_laws():
-            raise unknown_law(law, known_laws())
-    say(f"analysing {fields['name']}")
-    whole = scenario_from_mapping(fields)
+    whole = load_scenario(options.scenario, overrides(options))
+    scenario, note = chosen_robot(whole, options.robot)
+    scenarios = chosen_laws(scenario, options.law or [])
+    for each in scenarios:
+        check_files(each)
+    say(f"analysing {whole.name}")
 
-    from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
+    from analysis.stability.law_analysis import analyse_law
     from analysis.stability.report_files import (
         stability_document,
         stability_text,
         write_stability,
     )
     from analysis.stability.report_parts import parts_for
+    from diagrams.laws import make_controller
 
-    scenario, note = chosen_robot(whole, options.robot)
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)
-    scenarios = chosen_laws(scenario, options.law or [])
+    for each in scenarios:
+        make_controller(each)
     work = parts_for(scenarios, full=options.full)
 
     def run(progress: Progress) -> list[LawAnalysis]:

@@ -30,18 +30,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
-    from analysis.sweeps.sweep_file import read_sweep
+    from analysis.sweeps.plan import load_sweep
 
-    read_sweep(options.sweep)
+    plan = load_sweep(options.sweep)
+    plan.check()
     say(f"sweeping {options.sweep}")
 
     from analysis.sweeps.one_run import require_runs
     from analysis.sweeps.page import write_sweep
-    from analysis.sweeps.plan import load_sweep
     from analysis.sweeps.summary import sweep_summary, sweep_text
     from analysis.sweeps.sweep import prepare_sweep
 
-    plan = load_sweep(options.sweep)
     sweep = prepare_sweep(
         plan,
         options.out,

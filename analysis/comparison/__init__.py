@@ -7,15 +7,14 @@ from systems.framework.lazy import lazy_exports
 if TYPE_CHECKING:
     from analysis.comparison.claims import CLAIMS, claims_table
     from analysis.comparison.compare import (
-        comparison_plan,
         prepare_comparison,
     )
     from analysis.comparison.laws_in_pairs import compare_runs
     from analysis.comparison.mechanisms import failure_mechanisms
     from analysis.comparison.paired_statistics import paired_median, paired_rate
+    from analysis.comparison.plans import EXPERIMENTS, comparison_plan, library_layouts
     from analysis.comparison.report import compare_summary, write_comparison
     from analysis.comparison.report_text import compare_text
-    from analysis.comparison.words import EXPERIMENTS, library_layouts
 else:
     __getattr__, __dir__ = lazy_exports(__name__)
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 from analysis.hearing.listening import Heard, Listener
 from analysis.hearing.paper_tables import PAPER_CELLS, PaperCell
 from analysis.hearing.sensitivity import ArrayErrors, PolarStd, predicted_std
+from analysis.hearing.trial_counts import check_trials
 from diagrams import Scenario, load_scenario
-from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
 __all__ = [
@@ -51,9 +51,6 @@ REALISTIC_TOLERANCES = (
 )
 #: The same of the speed of sound, as a share of it: 1 deg C.
 SOUND_SPEED_TOLERANCE = 0.002
-
-#: Emission and bound of a cell are held in memory.
-_MOST_TRIALS = 100_000
 
 #: Settings of ``tdoa`` by the estimators' names. The papers take every result
 #: of the closed form as it comes: no threshold.
@@ -225,8 +222,7 @@ def prepare_localization(
     Raises:
         InputError: An override, or the number of trials, is wrong.
     """
-    if not 2 <= trials <= _MOST_TRIALS:
-        raise InputError("trials", f"{trials} must lie between 2 and {_MOST_TRIALS}")
+    check_trials(trials)
     own = REALISTIC_TOLERANCES if tolerances else ()
     return LocalizationExperiment(
         scenario=load_scenario("default", [*_SETTING, *own, *overrides]),

@@ -1,18 +1,25 @@
 """What a run did: metrics, pictures, replay, its files."""
 
-from analysis.runs.collision_warning import collision_warning
-from analysis.runs.guarded_motion import GuardedMotion, guarded_motion
-from analysis.runs.known_space import KnownSpace, known_space
-from analysis.runs.metrics import run_metrics
-from analysis.runs.proximity import Proximity
-from analysis.runs.run_report import run_summary, summary_text, write_run
-from analysis.runs.shortest_path import shortest_path_length
-from analysis.runs.smoothness import (
-    jerk,
-    log_dimensionless_jerk,
-    spectral_arc_length,
-    turn_reversals,
-)
+from typing import TYPE_CHECKING
+
+from systems.framework.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from analysis.runs.collision_warning import collision_warning
+    from analysis.runs.guarded_motion import GuardedMotion, guarded_motion
+    from analysis.runs.known_space import KnownSpace, known_space
+    from analysis.runs.metrics import run_metrics
+    from analysis.runs.proximity import Proximity
+    from analysis.runs.run_report import run_summary, summary_text, write_run
+    from analysis.runs.shortest_path import shortest_path_length
+    from analysis.runs.smoothness import (
+        jerk,
+        log_dimensionless_jerk,
+        spectral_arc_length,
+        turn_reversals,
+    )
+else:
+    __getattr__, __dir__ = lazy_exports(__name__)
 
 __all__ = [
     "GuardedMotion",

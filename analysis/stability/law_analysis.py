@@ -18,10 +18,7 @@ from analysis.run_error import failure_text
 from analysis.stability.model_sheet import ModelSheet, model_sheet
 from analysis.stability.verdicts import Verdict
 from diagrams import Scenario
-from diagrams.laws import make_controller
-from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 __all__ = [
     "Finding",
@@ -29,8 +26,6 @@ __all__ = [
     "Part",
     "Study",
     "analyse_law",
-    "chosen_laws",
-    "chosen_robot",
 ]
 
 
@@ -123,87 +118,6 @@ class LawAnalysis:
         """Data object of a part, none if it was left out or failed."""
         finding = self.findings.get(key)
         return finding and finding.data
-
-
-def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
-    """The same scenario under one law after the other.
-
-    Args:
-        scenario: Any scenario.
-        names: Laws; ``all`` stands for those that avoid obstacles, or that drive on a
-            route; none at all: the scenario's own.
-
-    Returns:
-        One a law; a law that is named twice comes once.
-
-    Raises:
-        InputError: There is no such law.
-    """
-    routed = scenario.route is not None
-    every = [
-        name
-        for name, law in LAWS.items()
-        if (law.on_route if routed else name in FORCE_LAWS and name != "none")
-    ]
-    if scenario.searches is not None:
-        every = [scenario.law]
-    laws = [law for name in names for law in (every if name == "all" else [name])]
-    for law in laws or [scenario.law]:
-        if routed and law not in every:
-            raise InputError(
-                "law",
-                f"is {law!r}, but the robot has a route; use {', '.join(every)}",
-            )
-        if scenario.searches is not None:
-            if law != scenario.law:
-                raise InputError(
-                    "law",
-                    f"is {law!r}, but the robot searches by law {scenario.law!r}; "
-                    "leave --law out",
-                )
-            continue
-        if not routed and law in LAWS and LAWS[law].plans:
-            raise InputError(
-                "law",
-                f"{law!r} has no linear model, for it plans and decides; use "
-                f"{', '.join(every)}, with --guard on for what a guard promises",
-            )
-    scenarios = [
-        scenario_from_mapping({**scenario.model_dump(), "law": law})
-        for law in dict.fromkeys(laws or [scenario.law])
-    ]
-    for each in scenarios:
-        make_controller(each)
-    return tuple(scenarios)
-
-
-def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
-    """The robot of a scenario that is analysed, alone with what it follows.
-
-    Args:
-        scenario: Any scenario.
-        name: Of the robot; none: the first one.
-
-    Returns:
-        The scenario as if it were alone, and a line that says so; the line is empty
-        where there are no others.
-
-    Raises:
-        InputError: There is no such robot.
-    """
-    names = list(scenario.all_robots)
-    if name is not None and name not in names:
-        raise InputError("robot", f"{name!r} is none; use {', '.join(names)}")
-    chosen = names[0] if name is None else name
-    others = [each for each in names if each != chosen]
-    if not others:
-        return scenario.of_robot(chosen), ""
-    # Alone there is nobody to hear it.
-    alone = scenario.of_robot(chosen).model_copy(update={"loudspeaker": None})
-    note = f"the report is of robot {chosen!r} alone, without {', '.join(others)}"
-    if name is None:
-        note += "; --robot chooses another"
-    return alone, note
 
 
 def analyse_law(

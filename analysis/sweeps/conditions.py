@@ -8,13 +8,11 @@ from functools import lru_cache
 
 import numpy as np
 
-from analysis.runs.proximity import least_clearances
-from analysis.runs.shortest_path import shortest_path_length
-from diagrams import Scenario
 from diagrams.bodies import Body, Surroundings
+from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
-from systems.world.geometry import beyond_rectangle
+from systems.world.plane import beyond_rectangle
 
 __all__ = ["Conditions"]
 
@@ -69,6 +67,8 @@ class Conditions(Parameters):
         obstacles = [Body(each.path(), each.size_m) for each in scenario.obstacles]
         if not self.source_distance_m or not obstacles:
             return
+        from analysis.runs.proximity import least_clearances  # compiled code
+
         for name, source in scenario.all_sources.items():
             # Where it is to be: it drives there within centimetres.
             plan = Body(source.plan(), (source.length_m, source.width_m))
@@ -120,6 +120,8 @@ def _has_way(
     boxes: tuple[tuple[float, ...], ...],
     radius: float,
 ) -> bool:
+    from analysis.runs.shortest_path import shortest_path_length  # so is this
+
     rectangles = np.array(boxes).reshape(-1, 5)
     # The shortest way begins with less room where the start has no more.
     away = (math.hypot(*beyond_rectangle(start, box)) for box in rectangles)

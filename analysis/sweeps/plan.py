@@ -21,14 +21,15 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from analysis.sweeps.sweep_file import read_sweep
-from diagrams import Scenario, load_scenario
 from diagrams.fields import explain
 from diagrams.loading import (
+    load_scenario,
     resolve_sound,
     scenario_from_mapping,
     set_fields,
 )
 from diagrams.own_code import own_files
+from diagrams.scenario import Scenario
 from diagrams.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
@@ -38,6 +39,8 @@ __all__ = ["SweepPlan", "SweepPoint", "dump_plan", "load_sweep"]
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 #: All are drawn and checked before the first one runs, a millisecond each.
 MOST_RUNS = 1_000_000
+#: So many cells are looked at before all runs are drawn.
+_FIRST_CELLS = 64
 Count = Annotated[int, Field(ge=1, le=MOST_RUNS)]
 
 
@@ -186,6 +189,32 @@ class SweepPlan(Parameters):
                 points += self._draw_run(run, [(cell, fields)], [label])
         return points
 
+    def check(self) -> None:
+        """Refuses values that are valid neither by themselves nor with the first draws.
+
+        It takes a moment; ``points`` finds all that can be wrong.
+
+        Raises:
+            InputError: One of the first cells of the grid has such values.
+        """
+        drawn = dict(self._draws([self.seed, 0, 0]))
+        for cell, fields in enumerate(self.cells()[:_FIRST_CELLS]):
+            alone = SweepPoint(cell, cell, 0, self.seed, fields, 0)
+            both = replace(alone, fields={**fields, **drawn})
+            if self._fault(alone) and (fault := self._fault(both)):
+                raise InputError(
+                    fault.field,
+                    f"{fault.message} (cell {cell} of the grid)",
+                    others=fault.all[1:],
+                )
+
+    def _fault(self, point: SweepPoint) -> InputError | None:
+        try:
+            self.scenario_of(point)
+        except InputError as error:
+            return error
+        return None
+
     def scenario_of(self, point: SweepPoint) -> Scenario:
         """The scenario of a run."""
         data = pickle.loads(self._base_copy)
@@ -254,16 +283,13 @@ class SweepPlan(Parameters):
                     times = f"drawn {self.redraws + 1} times; " if self.redraws else ""
                     where = f"run {point.run}, {where}; {times}narrow the draws, or "
                     where += "raise redraws to replace such runs"
-                return InputError(error.field, f"{error.message} ({where})")
+                message = f"{error.message} ({where})"
+                return InputError(error.field, message, others=error.all[1:])
         return None
 
     def _valid_undrawn(self, point: SweepPoint) -> bool:
         undrawn = replace(point, fields=self.cells()[point.cell])
-        try:
-            self.scenario_of(undrawn)
-        except InputError:
-            return False
-        return bool(self.draw)
+        return bool(self.draw) and self._fault(undrawn) is None
 
     def _draws(self, entropy: list[int]) -> Iterator[tuple[str, Any]]:
         """Each key has a stream of its own: it does not depend on the others."""

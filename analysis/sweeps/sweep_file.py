@@ -1,22 +1,20 @@
-"""The file of a sweep: read and checked before what simulates is loaded."""
+"""The file of a sweep."""
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from diagrams.fields import check_structure
 from diagrams.loading import read_mapping
 from systems.framework.input_files import require_file
 
-__all__ = ["SWEEP_SCHEMA_FILE", "read_sweep", "sweep_schema"]
+__all__ = ["SWEEP_SCHEMA_FILE", "read_sweep"]
 
 SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
 
 def read_sweep(path: str | Path) -> dict[str, Any]:
-    """The fields of a sweep, each checked by itself.
+    """The fields of a sweep, not yet checked.
 
     Args:
         path: A YAML file with the fields of ``SweepPlan``. Relative paths in
@@ -26,7 +24,7 @@ def read_sweep(path: str | Path) -> dict[str, Any]:
         Plain values, with the file's folder.
 
     Raises:
-        InputError: The file cannot be read, or fields are unknown or wrong.
+        InputError: The file cannot be read.
     """
     path = require_file(path, "sweep", "YAML")
     data = read_mapping(path)
@@ -34,11 +32,4 @@ def read_sweep(path: str | Path) -> dict[str, Any]:
         if part in data and data[part] is None:
             del data[part]
     data.setdefault("name", path.stem)
-    check_structure(data, sweep_schema(), "a sweep")
     return {**data, "folder": str(path.parent.absolute())}
-
-
-def sweep_schema() -> dict[str, Any]:
-    """The JSON Schema of a sweep's file, as the package carries it."""
-    schema: dict[str, Any] = json.loads(SWEEP_SCHEMA_FILE.read_text("utf-8"))
-    return schema

@@ -1,20 +1,24 @@
-"""What fields a scenario has: their list, what is most like a name, a first check.
+"""What fields a scenario has: their list, what is most like a name, faults.
 
 All of it reads the schema that is shipped, so that nothing is loaded that simulates.
 """
 
-from diagrams.fields.explain import explain
-from diagrams.fields.field_list import Field, find_fields, list_fields
-from diagrams.fields.joining import begins_anew, joined
-from diagrams.fields.near_miss import did_you_mean, near_field, unknown_law
-from diagrams.fields.shipped import known_laws, scenario_schema, schema_text
-from diagrams.fields.structure import check_fields, check_structure
+from typing import TYPE_CHECKING
+
+from systems.framework.lazy import lazy_exports
+
+if TYPE_CHECKING:
+    from diagrams.fields.explain import explain, single_faults
+    from diagrams.fields.field_list import Field, find_fields, list_fields
+    from diagrams.fields.joining import begins_anew, joined
+    from diagrams.fields.near_miss import did_you_mean, near_field, unknown_law
+    from diagrams.fields.shipped import known_laws, scenario_schema, schema_text
+else:
+    __getattr__, __dir__ = lazy_exports(__name__)
 
 __all__ = [
     "Field",
     "begins_anew",
-    "check_fields",
-    "check_structure",
     "did_you_mean",
     "explain",
     "find_fields",
@@ -24,5 +28,6 @@ __all__ = [
     "near_field",
     "scenario_schema",
     "schema_text",
+    "single_faults",
     "unknown_law",
 ]

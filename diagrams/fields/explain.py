@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from pydantic import BaseModel
 from pydantic_core import ErrorDetails, ValidationError
 
 from diagrams.fields.near_miss import near_field
 from systems.framework.input_error import InputError, shortened
 
-__all__ = ["explain"]
+__all__ = ["explain", "single_faults"]
 
 
 def explain(error: ValidationError, schema: Mapping[str, Any], what: str) -> InputError:
@@ -29,6 +30,31 @@ def explain(error: ValidationError, schema: Mapping[str, Any], what: str) -> Inp
     return InputError.joined(
         each for details in found for each in _faults(details, schema, what)
     )
+
+
+def single_faults(
+    model: type[BaseModel], data: Mapping[str, Any], what: str
+) -> list[InputError]:
+    """What is wrong with single fields of some changes.
+
+    What takes several fields to judge is not: the others are not known here.
+
+    Args:
+        model: Of what is changed.
+        data: Changed fields.
+        what: What the model is to a user, as 'one of robots'.
+
+    Returns:
+        A fault each.
+    """
+    try:
+        model.model_validate(data)
+    except ValidationError as error:
+        found = error.errors(include_url=False)
+        if found := [each for each in found if each["type"] != "value_error"]:
+            schema = model.model_json_schema()
+            return [e for each in found for e in _faults(each, schema, what)]
+    return []
 
 
 def _faults(

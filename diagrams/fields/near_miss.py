@@ -45,13 +45,13 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
     return here or _elsewhere(schema, last)
 
 
-def unknown_law(name: str, known: Collection[str], field: str = "law") -> InputError:
+def unknown_law(name: str, known: Collection[str], field: str = "") -> InputError:
     """The error of a law that there is not.
 
     Args:
         name: What was given.
         known: What could be.
-        field: Where.
+        field: Where; empty: pydantic knows.
 
     Returns:
         The error, to be raised.

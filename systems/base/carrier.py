@@ -52,7 +52,7 @@ def drive_along(
 
     Args:
         robot: Its wheels, mass and top speed.
-        wheel_acceleration_m_s2: Limit of that of each wheel's rim.
+        wheel_acceleration_m_s2: Limit of that of each wheel's rim, m/s^2.
         plan: Where it is to be.
         ticks: The first one, and the one before the last row.
         knot: (8,) at the first tick: pose, velocity in W and speeds of both wheels.

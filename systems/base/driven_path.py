@@ -37,8 +37,8 @@ class DrivenPath:
     Args:
         plan: Where it is to be.
         robot: Its wheels, mass and top speed.
-        wheel_acceleration_m_s2: Limit of that of each wheel's rim.
-        start_time_s: It rests at the first waypoint until then.
+        wheel_acceleration_m_s2: Limit of that of each wheel's rim, m/s^2.
+        start_time_s: It rests at the first waypoint until then, s.
         stops: Whether it rests at the end of its plan.
     """
 

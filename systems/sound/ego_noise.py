@@ -13,15 +13,13 @@ from systems.framework.input_error import InputError
 from systems.framework.noise import BEFORE_THE_RUN, tick_generator
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import MICROPHONE_BAND_HZ, MicArrayParameters
-from systems.sound.sound_file import read_sound
+from systems.sound.sound_file import read_noise
 from systems.sound.waveforms import band_limited
 
 __all__ = ["EgoNoise", "driving_share"]
 
 #: The end of the recording fades into its beginning over this time, s.
 FADE_S = 0.05
-#: A shorter loop would be a tone, s.
-LEAST_SECONDS = 0.2
 
 
 def driving_share(velocity: ArrayLike, robot: RobotParameters) -> float:
@@ -100,19 +98,7 @@ class EgoNoise:
 def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
     """(1 or n, length) samples at a rate, of unit RMS over all channels."""
     field = "microphones.ego_noise_file"
-    channels, rate = read_sound(file, field)
-    if len(channels) not in (1, count):
-        raise InputError(
-            field,
-            f"{file} has {len(channels)} channels for {count} microphones; "
-            "give one for each, or mix it down to one",
-        )
-    if channels.shape[1] < LEAST_SECONDS * rate:
-        raise InputError(
-            field,
-            f"{file} lasts {channels.shape[1] / rate:.3f} s; give at least "
-            f"{LEAST_SECONDS} s",
-        )
+    channels, rate = read_noise(file, count, field)
     centred = channels - channels.mean(axis=1, keepdims=True)
     resampled = soxr.resample(centred.T, rate, SAMPLE_RATE_HZ, quality="VHQ").T
     heard = np.array([band_limited(row, *MICROPHONE_BAND_HZ) for row in resampled])

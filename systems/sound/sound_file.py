@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-__all__ = ["MOST_SAMPLES", "read_sound"]
+__all__ = ["MOST_SAMPLES", "read_noise", "read_played", "read_sound"]
 
 # Programs that write to a pipe cannot know the length and leave one of these.
 _UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
@@ -24,6 +24,9 @@ _UNKNOWN_FRAMES = 2**63 - 1
 
 #: Samples of all channels together, at most: 1 GB of them.
 MOST_SAMPLES = 2**27
+
+#: A shorter loop of noise would be a tone, s.
+_LEAST_NOISE_S = 0.2
 
 # Of a sample, in a file.
 _MOST_BYTES = 8
@@ -70,6 +73,70 @@ def read_sound(path: str | Path, field: str) -> tuple[NDArray[np.float64], int]:
         )
     _check_samples(samples, field, where)
     return samples, rate
+
+
+def read_played(
+    path: str | Path, low_hz: float, field: str
+) -> tuple[NDArray[np.float64], int]:
+    """What a loudspeaker is to play.
+
+    Args:
+        path: The file.
+        low_hz: Lower end of the band that is heard, Hz.
+        field: Name of the parameter that holds the path, for the messages.
+
+    Returns:
+        (n,) samples, full scale 1, and the rate in Hz.
+
+    Raises:
+        InputError: As of ``read_sound``, or it has several channels, or a rate that
+            is too low.
+    """
+    channels, rate = read_sound(path, field)
+    if len(channels) != 1:
+        raise InputError(
+            field, f"{path} has {len(channels)} channels; mix it down to one"
+        )
+    if rate < 2.0 * low_hz:
+        raise InputError(
+            field,
+            f"{path} has a rate of {rate} Hz, below twice low_hz ({low_hz:g} Hz); use "
+            "a recording of a higher rate",
+        )
+    return channels[0], rate
+
+
+def read_noise(
+    path: str | Path, count: int, field: str
+) -> tuple[NDArray[np.float64], int]:
+    """Noise that is to be repeated at each of some microphones.
+
+    Args:
+        path: The file.
+        count: Number of microphones.
+        field: Name of the parameter that holds the path, for the messages.
+
+    Returns:
+        (1 or count, n) samples, full scale 1, and the rate in Hz.
+
+    Raises:
+        InputError: As of ``read_sound``, or it has another number of channels, or is
+            too short.
+    """
+    channels, rate = read_sound(path, field)
+    if len(channels) not in (1, count):
+        raise InputError(
+            field,
+            f"{path} has {len(channels)} channels for {count} microphones; give one "
+            "for each, or mix it down to one",
+        )
+    if channels.shape[1] < _LEAST_NOISE_S * rate:
+        raise InputError(
+            field,
+            f"{path} lasts {channels.shape[1] / rate:.3f} s; give at least "
+            f"{_LEAST_NOISE_S} s",
+        )
+    return channels, rate
 
 
 class _Stream(soundfile.SoundFile):

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
-from systems.sound.sound_file import read_sound
+from systems.sound.sound_file import read_played
 
 __all__ = [
     "LARGEST_CREST",
@@ -116,19 +116,8 @@ def _siren(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
 
 
 def _file(sound: SoundParameters, seed: int) -> NDArray[np.float64]:
-    channels, rate = read_sound(sound.file or "", "sound.file")
-    if len(channels) != 1:
-        raise InputError(
-            "sound.file",
-            f"{sound.file} has {len(channels)} channels; mix it down to one",
-        )
-    if rate < 2.0 * sound.low_hz:
-        raise InputError(
-            "sound.file",
-            f"{sound.file} has a rate of {rate} Hz, below twice low_hz "
-            f"({sound.low_hz:g} Hz); use a recording of a higher rate",
-        )
-    centred = channels[0] - channels[0].mean()
+    samples, rate = read_played(sound.file or "", sound.low_hz, "sound.file")
+    centred = samples - samples.mean()
     mono = soxr.resample(centred, rate, SAMPLE_RATE_HZ, quality="VHQ")
     threshold = np.max(np.abs(mono)) * 10.0 ** (SILENCE_DB / 20.0)
     return mono[np.argmax(np.abs(mono) > threshold) :]

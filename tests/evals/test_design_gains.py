@@ -7,7 +7,7 @@ import json
 import numpy as np
 import pytest
 
-from analysis.comparison.compare import comparison_plan
+from analysis.comparison.plans import comparison_plan
 from analysis.design.requirements import DesignRequirements, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from diagrams import load_scenario, simulate

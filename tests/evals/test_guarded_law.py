@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from analysis.comparison.compare import comparison_plan
+from analysis.comparison.plans import comparison_plan
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 

@@ -7,8 +7,8 @@ import pandas as pd
 import pytest
 
 from analysis.comparison.all_robots import with_all_robots
-from analysis.comparison.compare import comparison_plan
 from analysis.comparison.laws_in_pairs import compare_runs
+from analysis.comparison.plans import comparison_plan
 from analysis.sweeps.one_run import Task, results_table, run_task
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS

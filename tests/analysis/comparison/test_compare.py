@@ -10,13 +10,16 @@ import numpy as np
 import pytest
 
 from analysis.comparison.compare import (
+    prepare_comparison,
+)
+from analysis.comparison.plans import (
+    EXPERIMENTS,
     comparison_plan,
     comparison_plans,
-    prepare_comparison,
+    library_layouts,
 )
 from analysis.comparison.report import compare_summary, write_comparison
 from analysis.comparison.report_text import compare_text
-from analysis.comparison.words import EXPERIMENTS, library_layouts
 from analysis.sweeps.plan import load_sweep
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from analysis.reporting.html_page import paragraph
-from analysis.stability.law_analysis import Part, analyse_law, chosen_laws
+from analysis.stability.choice import chosen_laws
+from analysis.stability.law_analysis import Part, analyse_law
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
 from analysis.stability.verdicts import Criterion, judge

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 from analysis.models.ideal_scenarios import ideal_scenario, require_ideal
-from analysis.stability.law_analysis import analyse_law, chosen_laws, chosen_robot
+from analysis.stability.choice import chosen_laws, chosen_robot
+from analysis.stability.law_analysis import analyse_law
 from analysis.stability.report_files import stability_document, stability_text
 from analysis.stability.report_page import stability_page
 from analysis.stability.report_parts import parts

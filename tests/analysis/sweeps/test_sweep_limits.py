@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.comparison.compare import comparison_plan, prepare_comparison
+from analysis.comparison.compare import prepare_comparison
+from analysis.comparison.plans import comparison_plan
 from analysis.run_error import RunError
 from analysis.sweeps.plan import MOST_RUNS, SweepPlan
 from analysis.sweeps.sweep import MOST_WORKERS, prepare_sweep

@@ -23,7 +23,7 @@ QUESTIONS = """
 import contextlib, io, json
 
 import phonotaxis
-from analysis.comparison.compare import comparison_plans
+from analysis.comparison.plans import comparison_plans
 from analysis.design.gain_search import search_gains
 from analysis.design.requirements import DesignRequirements, check_law
 from analysis.laws.law_curves import law_curves
@@ -31,7 +31,8 @@ from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.laws.radial_law import radial_law
 from analysis.linear.root_locus import root_loci
-from analysis.stability.law_analysis import analyse_law, chosen_laws
+from analysis.stability.choice import chosen_laws
+from analysis.stability.law_analysis import analyse_law
 from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_page import stability_page
 from diagrams import build_sound_follower, load_scenario

@@ -1,0 +1,199 @@
+"""Plans of comparisons: which layouts, laws and further fields."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from pydantic import ValidationError
+
+import diagrams
+from analysis.sweeps.plan import SweepPlan, load_sweep
+from diagrams.fields import explain
+from diagrams.loading import (
+    load_scenario,
+    parse_setting,
+    read_mapping,
+    scenario_from_mapping,
+)
+from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.laws.catalogue import FORCE_LAWS, LAWS
+
+__all__ = [
+    "EXPERIMENTS",
+    "VELOCITY_TERM",
+    "comparison_plan",
+    "comparison_plans",
+    "library_layouts",
+]
+
+#: The papers' experiments.
+EXPERIMENTS = (
+    "obstacle_free",
+    "two_static_obstacles",
+    "one_moving_obstacle",
+    "two_moving_obstacles",
+)
+VELOCITY_TERM = "repulsion.velocity_term"
+_LIBRARY = Path(diagrams.__file__).parent / "layouts"
+#: Fields of a sweep that a comparison sets itself.
+_OURS = ("grid", "runs", "pair")
+
+
+def library_layouts() -> dict[str, Path]:
+    """Names and files of the layouts that come with the package."""
+    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
+
+
+def comparison_plan(
+    scenario: str,
+    *,
+    laws: Iterable[str] | None = None,
+    runs: int = 50,
+    seed: int = 1,
+    settings: dict[str, Any] | None = None,
+    grid: Mapping[str, Sequence[Any]] | None = None,
+) -> SweepPlan:
+    """The paired sweep that compares laws on one experiment's layouts.
+
+    Args:
+        scenario: A library name, whose layouts are those of the library; a YAML
+            file of layouts (a sweep without grid, runs and pair); or a YAML file
+            of a scenario, whose runs differ in noise alone.
+        laws: What to compare, each as that of all robots; none: the papers' and no
+            avoidance, or those for routes.
+        runs: Layouts, each met by every law.
+        seed: Of all layouts and noise.
+        settings: Further fields of the scenario, by dotted path.
+        grid: Further fields to compare, with their values.
+
+    Returns:
+        The sweep: ``law`` is the first axis of its grid, and ``pair`` is set.
+
+    Raises:
+        InputError: Something of that is unknown or no good; names the field.
+    """
+    plan = _layouts(scenario)
+    base = scenario_from_mapping(plan.base)
+    _require_one_law(base)
+    if laws is None:
+        on_route = [name for name, law in LAWS.items() if law.on_route]
+        routed = any(robot.route for robot in base.all_robots.values())
+        laws = on_route if routed else FORCE_LAWS
+    fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
+    fields |= {
+        "set": plan.set | (settings or {}),
+        "grid": {"law": tuple(laws), **{k: tuple(v) for k, v in (grid or {}).items()}},
+        "runs": runs,
+        "seed": seed,
+        "pair": True,
+    }
+    try:
+        return SweepPlan.model_validate(fields)
+    except ValidationError as error:
+        raise explain(error, SweepPlan.model_json_schema(), "a comparison") from None
+
+
+def _require_one_law(base: Scenario) -> None:
+    """Refuses what a comparison could not set: all robots get its law."""
+    if base.searches is not None:
+        raise InputError(
+            "scenario",
+            f"{base.name!r} is a search by law {base.law!r}, for which no other law "
+            "stands in; sweep its fields, as search.rules (docs/olfaction.md)",
+        )
+    for name, changes in base.robots.items():
+        if "law" in changes:
+            raise InputError(
+                f"robots.{name}.law",
+                f"is {changes['law']!r}, but a comparison gives all robots its laws; "
+                "leave it out",
+            )
+
+
+def comparison_plans(
+    scenarios: Sequence[str] = (),
+    *,
+    laws: str | None = None,
+    velocity_terms: str | None = None,
+    runs: int = 50,
+    seed: str | None = None,
+    settings: Iterable[str] = (),
+    grid: Iterable[str] = (),
+) -> dict[str, SweepPlan]:
+    """A plan for each scenario, by its name.
+
+    Args:
+        scenarios: See ``comparison_plan``; none: the papers' experiments.
+        laws: Names parted by commas; none: see ``comparison_plan``.
+        velocity_terms: ``printed``, ``closing``, or both parted by a comma.
+        runs: Layouts a scenario.
+        seed: A whole number.
+        settings: ``key=value``.
+        grid: ``key=[value, ...]``.
+
+    Returns:
+        In the order of ``scenarios``; names without folder and ending.
+
+    Raises:
+        InputError: A word is no good; names the option or the field.
+    """
+    fields = dict(parse_setting(text) for text in settings)
+    varied = dict(_listed_values(text) for text in grid)
+    if velocity_terms is not None:
+        terms = velocity_terms.split(",")
+        if len(terms) == 1:
+            fields[VELOCITY_TERM] = terms[0]
+        else:
+            varied[VELOCITY_TERM] = terms
+    plans: dict[str, SweepPlan] = {}
+    for scenario in scenarios or EXPERIMENTS:
+        name = Path(scenario).stem
+        if name in plans:
+            raise InputError("scenario", f"{name} stands there twice; drop one")
+        plans[name] = comparison_plan(
+            scenario,
+            laws=None if laws is None else laws.split(","),
+            runs=runs,
+            seed=_whole_seed(seed),
+            settings=fields,
+            grid=varied,
+        )
+    return plans
+
+
+def _layouts(scenario: str) -> SweepPlan:
+    library = library_layouts()
+    if scenario in library:
+        return load_sweep(library[scenario])
+    path = Path(scenario)
+    if path.suffix in (".yaml", ".yml") and path.is_file():
+        data = read_mapping(path)
+        if "scenario" in data:
+            for key in _OURS:
+                if key in data:
+                    raise InputError(
+                        f"{scenario}: {key}",
+                        "is for the comparison to set; remove it, or use sweep",
+                    )
+            return load_sweep(path)
+    load_scenario(scenario)
+    return SweepPlan(name=path.stem, scenario=scenario)
+
+
+def _listed_values(text: str) -> tuple[str, list[Any]]:
+    """Key and values of ``key=[value, ...]``."""
+    key, values = parse_setting(text)
+    if not isinstance(values, list):
+        raise InputError(key, f"{values!r} is no list of values; write [a, b]")
+    return key, values
+
+
+def _whole_seed(text: str | None) -> int:
+    if text is None:
+        return 1
+    if not text.isdigit():
+        raise InputError("seed", f"{text!r} is not a whole number; give 0 or more")
+    return int(text)
