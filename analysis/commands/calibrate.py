@@ -37,12 +37,7 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
         require_file(options.geometry, "geometry", "YAML")
     say(f"calibrating by {options.sounds}")
 
-    from analysis.calibration.calibrate import calibrate
     from analysis.calibration.calibration_sounds import load_calibration_sounds
-    from analysis.calibration.calibration_text import (
-        calibration_document,
-        calibration_text,
-    )
     from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
 
     sounds = load_calibration_sounds(Path(options.sounds))
@@ -50,6 +45,12 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
         load_geometry(Path(options.geometry)) if options.geometry else ArrayGeometry()
     )
     place = take(options.out) if options.out is not None else None
+
+    from analysis.calibration.calibrate import calibrate
+    from analysis.calibration.calibration_text import (
+        calibration_document,
+        calibration_text,
+    )
 
     def summary(run: CalibrationRun) -> dict[str, Any]:
         where = {"out": str(place.out)} if place is not None else {}

@@ -72,14 +72,16 @@ def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
         require_file(options.geometry, "geometry", "YAML")
     pipe = _pipe(options) if options.device is None else None
 
-    from analysis.listening.live_hearing import LiveHearing, listen
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
     from analysis.run_error import RunError
 
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
-    teller = _teller(as_json=options.json)
     stream = _stream(options, pipe, max(geometry.columns) + 1)
+
+    from analysis.listening.live_hearing import LiveHearing, listen
+
+    teller = _teller(as_json=options.json)
     hearing = LiveHearing(stream, geometry, teller.name_fault)
 
     def run(progress: Progress) -> HeardStream:

@@ -33,13 +33,18 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
     require_file(options.recording, "recording", "WAV or FLAC")
     if options.geometry:
         require_file(options.geometry, "geometry", "YAML")
+
+    from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
+    from analysis.recordings.array_match import recorded_samples
+
+    given = options.geometry
+    geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
+    recorded = recorded_samples(options.recording, geometry)
+    place = take(options.out) if options.out is not None else None
     say(f"locating what {options.recording} holds")
 
-    from analysis.recordings.locate import load_geometry, locate
+    from analysis.recordings.locate import located
     from analysis.recordings.locate_text import locate_text
-
-    geometry = load_geometry(Path(options.geometry)) if options.geometry else None
-    place = take(options.out) if options.out is not None else None
 
     def summary(result: LocateResult) -> dict[str, Any]:
         where = {"out": str(place.out)} if place is not None else {}
@@ -52,7 +57,7 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
             write_locate(result, document, place.directory)
 
     return Job(
-        run=lambda _: locate(Path(options.recording), geometry),
+        run=lambda _: located(recorded, geometry),
         summary=summary,
         text=lambda result, _: locate_text(result),
         out=place.out if place is not None else None,

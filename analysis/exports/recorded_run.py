@@ -11,11 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams import RunResult, Scenario, load_scenario
+from diagrams.loading import load_scenario
+from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from diagrams.simulation import RunResult
 
 __all__ = ["SCENARIO_FILE", "TABLE_FILE", "RecordedRun"]
 

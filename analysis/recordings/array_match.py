@@ -1,16 +1,97 @@
-"""Whether sound can be of an array, and arrays of some of its microphones."""
+"""Recordings of an array, and arrays of some of its microphones."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from analysis.recordings.array_geometry import ROBOT_ARRAY, ArrayGeometry
+from systems.framework.input_error import InputError
+from systems.sound.sound_file import read_sound
 
-__all__ = ["array_mismatch", "chosen_microphones"]
+__all__ = [
+    "RecordedSamples",
+    "array_mismatch",
+    "chosen_microphones",
+    "recorded_samples",
+]
 
 _RATES_HZ = (8_000, 192_000)
+
+
+class RecordedSamples(NamedTuple):
+    """A recording in memory, which can be of the array that it was read for."""
+
+    samples: NDArray[np.float64]
+    """(channels, samples), full scale 1."""
+    rate: int
+    """Of the samples, Hz."""
+    name: str
+    """What to call it in messages."""
+
+
+def recorded_samples(
+    recording: str | Path | ArrayLike,
+    geometry: ArrayGeometry,
+    sample_rate_hz: float | None = None,
+) -> RecordedSamples:
+    """Reads a recording.
+
+    Args:
+        recording: As of ``analysis.recordings.locate.locate``.
+        geometry: The array.
+        sample_rate_hz: Of samples, Hz; a file has its own.
+
+    Returns:
+        What it holds.
+
+    Raises:
+        InputError: It cannot be read, or this array cannot have made it.
+    """
+    if isinstance(recording, str | Path):
+        if sample_rate_hz is not None:
+            raise InputError(
+                "sample_rate_hz", "is that of samples; leave it out, a file has its own"
+            )
+        samples, rate = read_sound(recording, "recording")
+        found = RecordedSamples(samples, rate, repr(str(recording)))
+    else:
+        found = _given(recording, sample_rate_hz)
+    if complaint := array_mismatch(geometry, len(found.samples), found.rate):
+        raise InputError("recording", f"{found.name} {complaint}")
+    return found
+
+
+def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSamples:
+    if sample_rate_hz is None:
+        raise InputError("sample_rate_hz", "is not said; give that of the samples, Hz")
+    if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
+        raise InputError(
+            "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
+        )
+    given = np.asarray(recording)
+    where = f"array of shape {given.shape}"
+    if given.dtype.kind not in "iuf":
+        raise InputError("recording", f"{where} holds no numbers; give samples")
+    if given.ndim != 2 or len(given) > given.shape[1]:
+        raise InputError(
+            "recording",
+            f"{where}; give (microphones, samples), one row a microphone: transpose "
+            "what soundfile.read returns",
+        )
+    samples = given.astype(np.float64)
+    if given.dtype.kind in "iu":
+        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
+    if not np.isfinite(samples).all() or not samples.any():
+        raise InputError(
+            "recording", f"{where} is silent or not finite; give what was recorded"
+        )
+    return RecordedSamples(samples, round(sample_rate_hz), where)
 
 
 def array_mismatch(geometry: ArrayGeometry, channels: int, rate: int) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +15,11 @@ from analysis.recordings.array_geometry import (
     load_geometry,
     make_geometry,
 )
-from analysis.recordings.array_match import array_mismatch
+from analysis.recordings.array_match import (
+    RecordedSamples,
+    array_mismatch,
+    recorded_samples,
+)
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.clock_drift import recording_drift
 from analysis.recordings.heard_sources import heard_sources
@@ -28,7 +31,6 @@ from analysis.recordings.recording_spectra import RecordingSpectra
 from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
-from systems.sound.sound_file import read_sound
 
 __all__ = [
     "ArrayGeometry",
@@ -38,6 +40,7 @@ __all__ = [
     "hear",
     "load_geometry",
     "locate",
+    "located",
 ]
 
 # Where a geometry names no band.
@@ -99,7 +102,23 @@ def locate(
         InputError: The recording cannot be used; says why, and the remedy.
     """
     geometry = make_geometry(geometry)
-    samples, rate, where = _samples(recording, sample_rate_hz)
+    return located(recorded_samples(recording, geometry, sample_rate_hz), geometry)
+
+
+def located(recorded: RecordedSamples, geometry: ArrayGeometry) -> LocateResult:
+    """``locate`` of what has been read.
+
+    Args:
+        recorded: Of this array.
+        geometry: The microphones.
+
+    Returns:
+        As of ``locate``.
+
+    Raises:
+        InputError: The recording cannot be used; says why, and the remedy.
+    """
+    samples, rate, where = recorded
     heard = hear(samples, rate, geometry, where)
     known, spectra, search = geometry.known, heard.recording, heard.search
     shape = known.shape
@@ -171,43 +190,6 @@ def hear(
     if late is not None and not any(f.kind in _EXPLAINS_LATENESS for f in faults):
         faults.append(late)
     return HeardRecording(recording, search, sightings, estimates, faults)
-
-
-def _samples(
-    recording: str | Path | ArrayLike, sample_rate_hz: float | None
-) -> tuple[NDArray[np.float64], int, str]:
-    """Samples, (n, samples), their rate, Hz, and what to call them."""
-    if isinstance(recording, str | Path):
-        if sample_rate_hz is not None:
-            raise InputError(
-                "sample_rate_hz", "is that of samples; leave it out, a file has its own"
-            )
-        samples, rate = read_sound(recording, "recording")
-        return samples, rate, repr(str(recording))
-    if sample_rate_hz is None:
-        raise InputError("sample_rate_hz", "is not said; give that of the samples, Hz")
-    if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
-        raise InputError(
-            "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
-        )
-    given = np.asarray(recording)
-    where = f"array of shape {given.shape}"
-    if given.dtype.kind not in "iuf":
-        raise InputError("recording", f"{where} holds no numbers; give samples")
-    if given.ndim != 2 or len(given) > given.shape[1]:
-        raise InputError(
-            "recording",
-            f"{where}; give (microphones, samples), one row a microphone: transpose "
-            "what soundfile.read returns",
-        )
-    samples = given.astype(np.float64)
-    if given.dtype.kind in "iu":
-        samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
-    if not np.isfinite(samples).all() or not samples.any():
-        raise InputError(
-            "recording", f"{where} is silent or not finite; give what was recorded"
-        )
-    return samples, round(sample_rate_hz), where
 
 
 def _recording(
