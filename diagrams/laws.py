@@ -8,7 +8,6 @@ from typing import Any
 
 from pydrake.systems.framework import LeafSystem
 
-from diagrams.fields import unknown_law
 from diagrams.own_code import asked_for, import_own, made
 from diagrams.own_laws import checked_law, try_law
 from diagrams.robots.routed_robot import make_trajectory_controller
@@ -88,8 +87,6 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
         if law.controller is not None and law.plans:
             return law.controller(**asked_for(law.controller, {**parts, **more}))
         return _block(law, parts)
-    if ":" not in name:
-        raise unknown_law(name, LAWS)
     law = import_own(name, "law")
     if inspect.isclass(law):
         # One that takes any keyword may hand it on to a law of ours, which does not.

@@ -28,13 +28,13 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
+from diagrams.checks.goal_checks import check_goals, start_note
+from diagrams.checks.guard_checks import check_guard, guard_note
+from diagrams.checks.route_checks import route_notes
+from diagrams.checks.search_checks import check_searches
 from diagrams.fields import explain, joined, single_faults
-from diagrams.goal_checks import check_goals, start_note
-from diagrams.guard_checks import check_guard, guard_note
 from diagrams.participants import FollowerParameters, SourceParameters
-from diagrams.route_checks import route_notes
 from diagrams.run_parameters import RunParameters
-from diagrams.search_checks import check_searches
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.parameters import NonNegative, Parameters

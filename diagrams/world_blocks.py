@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from diagrams.checks.search_checks import address_of_robot
 from diagrams.scenario import Scenario
-from diagrams.search_checks import address_of_robot
 from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
 __all__ = ["radio_nodes", "world_blocks"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from diagrams import Scenario
 from diagrams.bodies import Body
-from diagrams.guard_checks import top_speed
+from diagrams.checks.guard_checks import top_speed
 from systems.base.robot import body_radius
 from systems.base.tyre_grip import GRAVITY_M_S2
 from systems.framework.input_error import InputError

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel
 from pydantic_core import ErrorDetails, ValidationError
 
 from diagrams.fields.near_miss import near_field
 from systems.framework.input_error import InputError, shortened
+
+if TYPE_CHECKING:
+    from pydantic import BaseModel
 
 __all__ = ["explain", "single_faults"]
 

@@ -25,7 +25,7 @@ def float_of(x: Any) -> float:
 
 def cos(x: Any) -> Any:
     """Cosine of x in rad."""
-    if type(x) is float and math.isfinite(x):
+    if isinstance(x, float) and math.isfinite(x):
         return math.cos(x)
     if isinstance(x, np.ndarray):
         return np.cos(x)
@@ -34,7 +34,7 @@ def cos(x: Any) -> Any:
 
 def sin(x: Any) -> Any:
     """Sine of x in rad."""
-    if type(x) is float and math.isfinite(x):
+    if isinstance(x, float) and math.isfinite(x):
         return math.sin(x)
     if isinstance(x, np.ndarray):
         return np.sin(x)
@@ -43,14 +43,14 @@ def sin(x: Any) -> Any:
 
 def exp(x: Any) -> Any:
     """e to the power of x."""
-    if type(x) is float and x < _LARGEST_EXPONENT:
+    if isinstance(x, float) and x < _LARGEST_EXPONENT:
         return math.exp(x)
     return _of_drake().exp(x)
 
 
 def sqrt(x: Any) -> Any:
     """Square root of x."""
-    if type(x) is float and x >= 0.0:
+    if isinstance(x, float) and x >= 0.0:
         return math.sqrt(x)
     return _of_drake().sqrt(x)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from diagrams import build_sound_follower
+from diagrams import build_sound_follower, load_scenario
 from diagrams.laws import LAWS, make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -115,7 +115,7 @@ def test_own_law_is_built_into_the_diagram(own_laws):
 def test_unknown_laws(own_laws, law, message):
     assert own_laws
     with pytest.raises(InputError, match=message) as error:
-        make_controller(Scenario(law=law))
+        make_controller(load_scenario("default", {"law": law}))
     assert error.value.field == "law"
 
 

@@ -1,0 +1,1 @@
+"""What a scenario must have, asked before anything runs."""
