@@ -54,7 +54,7 @@ REFUSALS = (
     ("simulate", "--set", "start.position_m=[1.9, 0]"),
     ("simulate", "--set", "room.size_m=[2, 2, 3]"),
     ("simulate", "u_trap", "--law", "guarded", "--set", "free_space.window_m=2"),
-    ("simulate", "corridor", "--law", "active"),
+    ("simulate", "known_u", "--law", "active"),
     ("simulate", "--law", "law.py:law"),
     ("simulate", "--sound", "cut.wav"),
     ("simulate", "--set", "microphones.ego_noise_file=cut.wav"),
