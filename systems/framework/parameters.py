@@ -1,8 +1,9 @@
 """What every block's parameter set has in common.
 
-A block's parameters are one frozen pydantic model that lives in the block's
-file. A scenario is a tree of these models, so each quantity has one name, one
-default and one legal range, and an error names the field by its whole path.
+A block's parameters are one frozen pydantic model, in ``parameters.py`` of its room:
+scenarios are checked without Drake and compiled code. A scenario is a tree of these
+models, so each quantity has one name, one default and one legal range, and an error
+names the field by its whole path.
 """
 
 from __future__ import annotations
