@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
-import subprocess
 from importlib.metadata import version
 
 import pytest
@@ -12,7 +10,7 @@ import pytest
 import phonotaxis
 from analysis import installation
 from analysis.commands.command_line import COMMANDS, make_parser
-from diagrams import library_scenarios, load_scenario
+from diagrams import load_scenario
 from diagrams.fields import schema_text
 
 
@@ -98,46 +96,6 @@ def test_doctor(capsys, monkeypatch):
     assert status == 1
     assert "BAD  disk" in out
     assert "not ready: disk" in complaint
-
-
-def completed(script: str, *words: str) -> set[str]:
-    """What bash offers for the last of some words."""
-    line = " ".join(f"'{word}'" for word in words)
-    code = (
-        f"{script}\nCOMP_WORDS=({line}); COMP_CWORD={len(words) - 1}\n"
-        "_shtab_phonotaxis\nprintf '%s\\n' \"${COMPREPLY[@]}\""
-    )
-    ran = subprocess.run(
-        ["bash", "--norc", "-c", code], capture_output=True, text=True, check=True
-    )
-    return set(ran.stdout.split())
-
-
-def test_bash_completes_commands_options_scenarios_and_laws(
-    capsys, tmp_path, monkeypatch
-):
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "two_of_mine.yaml").touch()
-    script = call(capsys, "completion", "bash")[1]
-    assert completed(script, "phonotaxis", "s") == {
-        name for name in COMMANDS if name.startswith("s")
-    }
-    assert completed(script, "phonotaxis", "simulate", "two_") == {
-        "two_of_mine.yaml",
-        *(name for name in library_scenarios() if name.startswith("two_")),
-    }
-    assert completed(script, "phonotaxis", "simulate", "--velo") == {"--velocity-term"}
-    assert "active2017" in completed(script, "phonotaxis", "simulate", "--law", "act")
-
-
-@pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_other_shells_complete_scenarios(capsys, shell):
-    status, script, _ = call(capsys, "completion", shell)
-    assert status == 0
-    assert "_phonotaxis_scenario_or_file" in script
-    assert "two_static_obstacles" in script
-    if program := shutil.which(shell):
-        subprocess.run([program, "-n"], input=script, text=True, check=True)
 
 
 def test_result_directory_has_what_an_editor_needs(tmp_path):

@@ -5,7 +5,12 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from collections.abc import Iterable
 
-from analysis.commands.arguments import LAW_WORDS, SCENARIO_WORDS, take_json
+from analysis.commands.arguments import (
+    LAW_WORDS,
+    SCENARIO_WORDS,
+    completed_by,
+    take_json,
+)
 from analysis.commands.command import Command, Job, Take
 
 __all__ = ["COMMAND"]
@@ -31,6 +36,7 @@ def _prepare(options: Namespace, take: Take) -> Job[str]:
     def script() -> str:
         import shtab
 
+        _complete_paths(options.parser)
         functions = [
             _function(options.shell, SCENARIO_WORDS, library_scenarios()),
             _function(options.shell, LAW_WORDS, known_laws()),
@@ -38,13 +44,27 @@ def _prepare(options: Namespace, take: Take) -> Job[str]:
         text: str = shtab.complete(
             options.parser, shell=options.shell, preamble="\n".join(functions)
         )
-        return text
+        # shtab registers the function under eval alone; people source scripts as well.
+        return text.replace("[-1] == eval ]]", "[-1] == (eval|file) ]]")
 
     return Job(
         run=lambda _: script(),
         summary=lambda text: {"schema_version": 1, "script": text},
         text=lambda text, _: text,
     )
+
+
+def _complete_paths(parser: ArgumentParser) -> None:
+    """Files and directories for arguments that say by their names that they are."""
+    for command in parser.below.values():  # type: ignore[attr-defined]
+        for argument in command._actions:
+            name = str(argument.metavar)
+            if hasattr(argument, "complete"):
+                continue
+            if name == "DIR":
+                completed_by(argument, "directory")
+            elif name == "FILE" or name.endswith(".yaml"):
+                completed_by(argument, "file")
 
 
 def _function(shell: str, words: dict[str, str], names: Iterable[str]) -> str:

@@ -235,6 +235,32 @@ def test_markers_are_the_bodies_and_the_room(run, file: Path):
     assert [marker.id for marker in message.markers] == list(range(6))
 
 
+def test_the_file_has_what_loaders_ask_for(file: Path):
+    """Foxglove and PlotJuggler: encodings they parse, a summary, indexes, one time.
+
+    PlotJuggler 3 takes the time of publication and refuses a file without statistics;
+    4 goes by message indexes, and moves times that are outside of the statistics.
+    """
+    with file.open("rb") as stream:
+        reader = make_reader(stream)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        times = [(m.log_time, m.publish_time) for _, _, m in reader.iter_messages()]
+    assert summary is not None
+    assert summary.statistics is not None
+    encodings = {
+        (channel.message_encoding, summary.schemas[channel.schema_id].encoding)
+        for channel in summary.channels.values()
+    }
+    assert encodings == {("cdr", "ros2msg")}
+    assert summary.chunk_indexes
+    assert all(chunk.message_index_length > 0 for chunk in summary.chunk_indexes)
+    assert all(logged == published for logged, published in times)
+    counts = summary.statistics
+    assert (counts.message_start_time, counts.message_end_time) == (0, 1_500_000_000)
+    assert counts.message_count == len(times)
+
+
 def test_the_same_run_gives_the_same_bytes(file: Path, tmp_path: Path):
     again = phonotaxis.simulate(phonotaxis.load_scenario("two_followers", SETTINGS))
     assert again.to_mcap(tmp_path / "again.mcap").read_bytes() == file.read_bytes()
