@@ -1,4 +1,4 @@
-"""What robots and sources have: motors, encoders, carriers of loudspeakers."""
+"""Parameters of motors, tyres and wheel encoders."""
 
 from __future__ import annotations
 

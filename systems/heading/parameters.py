@@ -1,4 +1,4 @@
-"""What compass, heading controller and motor driver have."""
+"""Parameters of compass, heading controller and motor driver."""
 
 from __future__ import annotations
 

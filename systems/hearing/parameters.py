@@ -1,4 +1,4 @@
-"""What estimators, the tracker and ideal hearing have."""
+"""Parameters of estimators, of the tracker and of ideal hearing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The gains of all laws that follow a sound, one set a law."""
+"""Attraction, and the gains of the laws that follow a sound, one set a law."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from systems.framework.noise import (
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock
 from systems.odor.odor_plume import PLUME_SIZE, concentration
-from systems.odor.parameters import _COUNT, GasSensorParameters
+from systems.odor.parameters import GAS_SENSORS, GasSensorParameters
 
 __all__ = [
     "GasSensorArray",
@@ -156,14 +156,14 @@ class GasSensorArray(LeafSystem, StepBlock):
             float,
             self._step(seed),
             (("plume", PLUME_SIZE), ("pose_WB", 3)),
-            (("gas_ratio", _COUNT), ("gas_concentration", _COUNT)),
+            (("gas_ratio", GAS_SENSORS), ("gas_concentration", GAS_SENSORS)),
             tick_s,
         )
 
     def _step(self, seed: int) -> Step:
         own, tick_s = self._own, self._period_s
-        drawn = standard_normals((2, _COUNT), seed, BEFORE_THE_RUN).astype(float)
-        faults = np.zeros((_COUNT, 2))
+        drawn = standard_normals((2, GAS_SENSORS), seed, BEFORE_THE_RUN).astype(float)
+        faults = np.zeros((GAS_SENSORS, 2))
         for fault in own.faults:
             kind = _DEAD if fault.kind == "dead" else _STUCK
             faults[fault.sensor - 1] = kind, fault.start_s
@@ -180,7 +180,7 @@ class GasSensorArray(LeafSystem, StepBlock):
             tick_s,
             tick_noise(seed),
         )
-        return Step(gas_sensor_step, numbers, [1.0] * (2 * _COUNT))
+        return Step(gas_sensor_step, numbers, [1.0] * (2 * GAS_SENSORS))
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each tick of a compiled loop."""

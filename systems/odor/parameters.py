@@ -1,4 +1,4 @@
-"""What the wind, a source of odour and its sensors have."""
+"""Parameters of the wind, of a source of odour and of what senses both."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ from systems.framework.parameters import (
 )
 
 __all__ = [
+    "GAS_SENSORS",
     "AirflowParameters",
     "GasSensorFaultParameters",
     "GasSensorParameters",
@@ -81,7 +82,7 @@ class OdorParameters(Parameters):
     """Of a closed room, m^3, in which the odour gathers evenly; null: an open one."""
 
 
-_COUNT = 3
+GAS_SENSORS = 3
 
 #: Time constants that differ from the paper's.
 _PRESETS = {
@@ -94,7 +95,7 @@ _PRESETS = {
 class GasSensorFaultParameters(Parameters):
     """A gas sensor that fails in a run, and how."""
 
-    sensor: int = Field(default=1, ge=1, le=_COUNT)
+    sensor: int = Field(default=1, ge=1, le=GAS_SENSORS)
     """R1 right front, R2 rear, R3 left front."""
     kind: Literal["dead", "stuck"] = "dead"
     """``dead``: it reads 1, clean air, without noise; ``stuck``: what it read last."""

@@ -1,4 +1,4 @@
-"""What following and the safety filter have."""
+"""Parameters of following and of the safety filter."""
 
 from __future__ import annotations
 

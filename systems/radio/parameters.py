@@ -1,4 +1,4 @@
-"""What the radio has."""
+"""Parameters of the radio."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What range sensors, switches and detectors of objects have."""
+"""Parameters of range sensors, switches, and detectors of objects."""
 
 from __future__ import annotations
 
@@ -42,6 +42,9 @@ __all__ = [
     "ObjectSensorParameters",
     "UltrasonicParameters",
 ]
+
+#: Objects that a port holds, and numbers of each; see ``systems.ranging.objects``.
+OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
 #: Neighbours are sensors next to one another whose directions differ by this at most,
 #: deg.
@@ -305,6 +308,3 @@ class ObjectDetectorParameters(Parameters):
     """What beams do not see any more is still there for this long, s."""
     resting_m_s: NonNegativeSpeed = 0.05
     """What is slower rests, m/s."""
-
-
-OBJECT_SLOTS, OBJECT_SIZE = 8, 8

@@ -1,4 +1,4 @@
-"""What routes and the targets on them have."""
+"""Parameters of routes and of the targets on them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the memory of space and the guard have."""
+"""Parameters of the memory of space and of the guard."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What searches have."""
+"""Parameters of searches."""
 
 from __future__ import annotations
 

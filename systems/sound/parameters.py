@@ -1,4 +1,4 @@
-"""What sounds, microphones, converter and room have."""
+"""Parameters of sounds, microphones, converter and room."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What obstacles have."""
+"""Parameters of obstacles."""
 
 from __future__ import annotations
 

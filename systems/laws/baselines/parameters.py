@@ -1,4 +1,4 @@
-"""Settings of the baselines."""
+"""Parameters of the baselines."""
 
 from __future__ import annotations
 
