@@ -35,8 +35,8 @@ hypothesis.settings.register_profile(
 )
 hypothesis.settings.load_profile("repeatable")
 
-# Compiling makes objects by the million, most of which stay: looked through as often
-# as Python does, they take a tenth of the time of all tests.
+# Compiling makes objects by the million, most of which stay: looking through them as
+# often as Python does takes a tenth of its time.
 gc.set_threshold(20_000, 20)
 
 
