@@ -28,7 +28,7 @@ test-fast: .venv/.installed ## run the tests that take seconds
 	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser"
 
 browser-test: .venv/.installed docs ## run the tests that open a page in Chromium
-	@$(PYTEST) -m browser
+	@$(PYTEST) -n 2 --dist loadfile -m browser tests/test_browser_*.py
 
 lint: .venv/.installed-dev ## check style and format
 	@$(PY) -m ruff check .
