@@ -270,3 +270,16 @@ def test_a_name_means_one_thing() -> None:
         if len(places) > 1 and not name.startswith("_")
     }
     assert not twice
+
+
+def test_browser_tests_are_where_make_looks_for_them() -> None:
+    marked = {
+        path.relative_to(ROOT).as_posix()
+        for path in (ROOT / "tests").rglob("test_*.py")
+        if "mark.browser" in path.read_text("utf-8") and path != Path(__file__)
+    }
+    found = {
+        path.relative_to(ROOT).as_posix()
+        for path in ROOT.glob("tests/test_browser_*.py")
+    }
+    assert marked == found
