@@ -169,17 +169,20 @@
     let path = "", pen = "M";
     series.t.forEach((t, k) => {
       if (series.values[k] === null) { pen = "M"; return; }
-      path += `${pen}${x(t)} ${y(series.values[k])}`;
+      const steps = series.style === "steps" && pen === "L";
+      path += steps ? `H${x(t)}V${y(series.values[k])}`
+        : `${pen}${x(t)} ${y(series.values[k])}`;
       pen = "L";
     });
     return path;
   }
-  function reading(series) {
+  function reading(series, rows) {
     let k = series.t.findIndex((t) => t > time + 1e-9);
     k = (k < 0 ? series.t.length : k) - 1;
     const value = series.values[Math.max(k, 0)];
-    return k < 0 || value === null || value === undefined
-      ? "–" : value.toFixed(2).replace("-", "−");
+    if (k < 0 || value === null || value === undefined) return "–";
+    const named = rows && rows.find(([row]) => row === value);
+    return named ? named[1] : value.toFixed(2).replace("-", "−");
   }
   class Chart {
     constructor(box, first) {
@@ -244,7 +247,7 @@
         swatch.append(make("i", { style: `background:${s.colour}` }));
         const value = make("span");
         const item = make("span", {}, swatch, `${s.label} `, value);
-        item.update = () => { value.textContent = reading(s); };
+        item.update = () => { value.textContent = reading(s, chart.ticks); };
         return item;
       }));
       this.cursor();

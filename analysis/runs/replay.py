@@ -142,7 +142,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
 def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
     """What ``plot_time_series`` shows of each robot, as data.
 
-    Panels without a curve, as of what a guard did, are left out.
+    Panels without a curve are left out.
 
     Args:
         result: The run.

@@ -326,14 +326,24 @@ def _speeds(axes: Axes, result: RunResult) -> None:
         label = f"{side} wheel, command"
         axes.plot(result.time, rim, color=COLOURS[side], lw=1.0, label=label)
     axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
+    if "wanted_speed" in columns:  # a guard may let less through
+        _wanted(axes, result.time, columns["wanted_speed"])
     axes.set_ylabel("speed (m/s)")
 
 
 def _turning(axes: Axes, result: RunResult) -> None:
     rate = np.degrees(result.columns["omega_WB"])
     axes.plot(result.time, rate, color=COLOURS["robot"], label="robot, to the left")
+    if "wanted_turn" in result.columns:
+        _wanted(axes, result.time, np.degrees(result.columns["wanted_turn"]))
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_ylabel("turn rate\n(deg/s)")
+
+
+def _wanted(axes: Axes, time: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """What the law commands."""
+    label = "wanted by the law"
+    axes.plot(time, values, "--", color=COLOURS["law"], lw=1.0, label=label)
 
 
 def _guard_actions(axes: Axes, result: RunResult) -> None:
@@ -351,6 +361,16 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
             zorder=2,
             label=f"{name}: {100.0 * np.mean(done):.0f} %",
         )
+    # From bar to bar; a page that draws curves alone has this one.
+    axes.plot(
+        result.time,
+        actions,
+        color=COLOURS["robot"],
+        drawstyle="steps-pre",
+        linewidth=0.7,
+        label="what it did",
+        zorder=3,
+    )
     axes.set_yticks(range(len(GUARD_ACTIONS)), GUARD_ACTIONS)
     axes.set_ylim(len(GUARD_ACTIONS) - 0.4, -0.6)
     axes.set_ylabel("command,\nby the guard")
