@@ -28,7 +28,6 @@ from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
 from analysis.runs.run_plots import clearance_panel, heard_bursts, time_panels
 from analysis.runs.scene import (
     Look,
-    bounds,
     contact_point,
     followed_sources,
     lightened,
@@ -131,7 +130,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
     return ReplayFacts(
         run_title(result),
         result.simulated_s,
-        bounds(result, margin=0.5),
+        replay_scene.shown_rectangle(result),
         replay_layers(result, paths, estimates),
         time_charts(result, clearance),
         [*robots, *sources, *obstacles],
