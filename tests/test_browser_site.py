@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,3 +84,35 @@ def test_pages_fit_are_legible_and_need_no_network(
     said = [line for line in log.splitlines() if "CONSOLE" in line]
     assert len(said) == 1, "\n".join(said[:40])
     assert f"looked at {len(cases)}" in said[0]
+
+
+def _opened(browser: Any, name: str) -> Any:
+    assert (SITE / name).exists(), f"there is no {name}; run make docs first"
+    page = browser.new_context(offline=True).new_page()
+    page.goto((SITE / name).as_uri())
+    return page
+
+
+def test_every_name_of_the_list_leads_to_what_it_is(browser: Any) -> None:
+    """Constants, too: each link ends at a heading with words below it."""
+    listed = _opened(browser, "api.html")
+    found = listed.evaluate(
+        """[...document.querySelectorAll("article code.py-obj")].map(
+        (code) => [code.textContent, code.closest("a")?.href ?? ""])"""
+    )
+    assert {"LAWS", "TICK_S", "simulate"} <= {name for name, _ in found}
+    assert not [name for name, link in found if not link]
+    by_page: dict[str, list[str]] = {}
+    for _, link in found:
+        page, _, anchor = link.partition("#")
+        by_page.setdefault(page, []).append(anchor)
+    for page, anchors in by_page.items():
+        listed.goto(page)
+        told = listed.evaluate(
+            """(ids) => ids.map((id) => document.getElementById(id)
+            ?.parentElement.querySelector("dd")?.textContent.trim() ?? "")""",
+            anchors,
+        )
+        bare = [a for a, text in zip(anchors, told, strict=True) if len(text) < 10]
+        assert not bare, page
+    listed.context.close()

@@ -209,7 +209,7 @@ _SEARCHES = [
         "(systems/search/search_ending.py)",
     ),
 ]
-#: All of them, in the order of the signal.
+#: All columns that tables of runs can have, in the order of the signal.
 COLUMNS: tuple[Column, ...] = (
     *_MOTION,
     *_HEARING,

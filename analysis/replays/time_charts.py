@@ -34,8 +34,10 @@ class Chart(NamedTuple):
     ticks: list[tuple[float, str]] | None
     """Names of values; none: the values are numbers."""
     series: list[dict[str, Any]]
-    """Label, colour, style, t in s, and values; none is a gap. The style is line, dashes,
-    dots, or steps: each value holds from its t on."""
+    """Label, colour, style, t in s, and values; none is a gap.
+
+    The style is line, dashes, dots, or steps: each value holds from its t on.
+    """
     bursts: list[tuple[float, float]]
     """When what is heard sounds, s."""
 
