@@ -139,7 +139,7 @@ def test_the_keyboard_reaches_every_control_of_a_page(
 #: Where menu and contents are drawers, one of them, and none.
 @pytest.mark.parametrize("width", [390, 1100, 1400])
 def test_a_page_is_used_by_the_keyboard_alone(browser: Any, width: int) -> None:
-    """Over the menu, from drawers or in sight; into the text; by the links of headings."""
+    """Over the menu, from drawers or in sight; into the text; by headings' links."""
     context = browser.new_context(
         viewport={"width": width, "height": 844}, reduced_motion="reduce", offline=True
     )

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.plumes.plume_history import concentration_map, plume_history
 from analysis.plumes.search_panels import call_time, search_panels
+from analysis.reporting.body_labels import spread_labels
 from analysis.reporting.notebook_figure import NotebookFigure
 from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
@@ -83,6 +84,7 @@ def plot_trajectory(result: RunResult) -> Figure:
         draw_estimates(axes, look)
         draw_robot(axes, look, times_apart(look.result))
     draw_collision(axes, result)
+    spread_labels(axes)
     handles, labels = axes.get_legend_handles_labels()
     shown_once = dict(zip(labels, handles, strict=True))
     figure.legend(
