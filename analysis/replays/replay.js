@@ -233,7 +233,9 @@
             : value > 0.97 * facts.end_s ? "end" : "middle" }, `${value} s`));
       for (const [from, to] of chart.bursts)
         curves.append(make("path", { fill: "#F0E442", "fill-opacity": 0.35,
-          d: `M${x(from)} ${TOP}H${x(to)}v${inner}H${x(from)}z` }));
+          d: `M${x(from)} ${TOP}H${x(to)}v${inner}H${x(from)}z` }),
+        make("path", { fill: "#8A7A00",
+          d: `M${x(from)} ${TOP + inner}H${x(to)}v-3H${x(from)}z` }));
       for (const series of chart.series) {
         const dots = series.style === "dots";
         curves.append(make("path", { d: curve(series, x, y), stroke: series.colour,
@@ -277,6 +279,8 @@
     viewer.animator.play();
     viewer.animator.pause();
     ready = true;
+    // Meshcat's mapping greys the white floor, from which colours then stand out less.
+    viewer.renderer.toneMapping = THREE.NoToneMapping;
     // Meshcat's 75 degrees bend what is near the edge.
     viewer.camera.fov = 45;
     viewer.set_3d_pane_size();

@@ -14,6 +14,8 @@ from matplotlib.text import Annotation
 from matplotlib.textpath import TextPath
 from numpy.typing import ArrayLike, NDArray
 
+from analysis.reporting.palette import text_colour
+
 __all__ = ["BodyLabel", "spread_labels"]
 
 _POINTS_PER_INCH = 72.0
@@ -49,7 +51,7 @@ class BodyLabel(Annotation):
             (x + 0.5 * width * unit[0], y + 0.5 * width * unit[1]),
             xytext=(9.0 * unit[0], 7.0 * unit[1]),
             textcoords="offset points",
-            color=colour,
+            color=text_colour(colour),
             fontsize=8,
             ha="center",
             va="center",

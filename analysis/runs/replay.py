@@ -437,7 +437,7 @@ def _record_known_space(
     above = 0.0005 * [*result.robots].index(own.name)
     dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
     for name, cells, colour, height, inset in (
-        ("free", known.free, lightened(look.seen, 0.35), 0.001, 0.0 * dots),
+        ("free", known.free, lightened(look.seen, 0.2), 0.001, 0.0 * dots),
         ("echoes", known.hits > 0.0, look.echoes, 0.006, dots),
     ):
         layers = floor_layers(known, cells, whole=name == "free")
@@ -483,9 +483,9 @@ def _record_guard(
 
 #: Edges of the guarded disc, their colours, and what the guard did meanwhile.
 _EDGES = (
-    ("passed", "empty", (PASSED,)),
-    ("lessened", "echo", (SLOWED, TURNED)),
-    ("braked", "source", (BRAKED, HALTED)),
+    ("passed", "passed", (PASSED,)),
+    ("lessened", "lessened", (SLOWED, TURNED)),
+    ("braked", "hit", (BRAKED, HALTED)),
 )
 
 

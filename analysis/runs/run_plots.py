@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -112,10 +113,15 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
         levels = [0.1, 0.3, 1.0, 3.0, 1e9]
         tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
         axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
+        edge = COLOURS["odor"]
+        axes.contour(
+            x, y, dense, levels=levels[:1], colors=edge, linewidths=0.5, zorder=0.6
+        )
         label = "odour at the end (0.1, 0.3, 1, 3 times C1)"
         axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
     place = odor.position_m
-    axes.plot(*place, "*", color="#772266", ms=12, ls="none", label="source of odour")
+    style: dict[str, Any] = {"color": COLOURS["odor"], "ms": 12, "ls": "none"}
+    axes.plot(*place, "*", label="source of odour", **style)
 
 
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
@@ -206,6 +212,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
+            # Yellow on white is hard to see: a line along the foot is not.
+            axes.axvspan(start, end, ymax=0.025, color=COLOURS["sounding"], linewidth=0)
         draw_grid(axes, "y")
         axes.legend(
             loc="upper left",

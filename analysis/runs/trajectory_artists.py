@@ -12,7 +12,7 @@ from matplotlib.patches import Polygon, Rectangle, Wedge
 from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.body_labels import BodyLabel
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.palette import COLOURS, faintest
 from analysis.runs.known_space import KnownSpace
 from analysis.runs.scene import (
     Look,
@@ -213,7 +213,8 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         return
     colour = look.estimates
     part = result.time[heard] / max(result.simulated_s, 1e-9)
-    colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
+    least = faintest(colour)
+    colours = [(*to_rgb(colour), least + (1.0 - least) * p) for p in part]
     x, y = result.vector("p_WS_estimated")[:, heard]
     axes.scatter(
         x,
@@ -332,7 +333,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
                 axis - half,
                 axis + half,
                 facecolor=(*colour, 0.35 if echo else 0.07),
-                edgecolor=(*colour, 0.5),
+                edgecolor=colour,
                 linewidth=0.5,
                 label=None if echo in labelled else _CONE_LABELS[echo],
                 zorder=1.5,
