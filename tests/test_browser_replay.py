@@ -256,6 +256,23 @@ def test_the_floor_that_is_known_grows(tmp_path: Path, browser: Any) -> None:
     assert shares[1] > 1.5 * shares[0]
 
 
+def test_what_a_guard_did_is_drawn_and_named(tmp_path: Path, browser: Any) -> None:
+    overrides = ["hearing=ideal", "guard={}", "duration_s=2"]
+    result = simulate(load_scenario("two_static_obstacles", overrides))
+    write_replay(result, tmp_path / "replay.html")
+    opened = _opened(browser, tmp_path / "replay.html")
+    chart = opened.locator(".chart").first
+    chart.locator("select").select_option(label="command, by the guard")
+    drawn = chart.locator(".curves path[stroke]").get_attribute("d")
+    assert drawn.startswith("M")
+    assert "H" in drawn
+    opened.evaluate("replay.seek(1.5)")
+    did = result.columns["guard_action"][round(1.5 / 0.025) + 1]
+    name = ("passed", "slowed", "turned", "braked", "halted")[round(did)]
+    assert chart.locator(".readings").inner_text().endswith(name)
+    opened.context.close()
+
+
 @pytest.mark.parametrize(
     "bad",
     [

@@ -23,8 +23,10 @@ def drawn(figure: Figure) -> list[tuple[BodyLabel, np.ndarray]]:
     renderer = canvas.get_renderer()
     axes = figure.axes[0]
     seen = [text for text in axes.texts if isinstance(text, BodyLabel)]
-    boxes = [(text, text.get_window_extent(renderer).extents) for text in seen]
-    edges = axes.get_window_extent(renderer).extents
+    boxes = [
+        (text, np.array(text.get_window_extent(renderer).extents)) for text in seen
+    ]
+    edges = np.array(axes.get_window_extent(renderer).extents)
     low, high = edges[:2] - 1.0, edges[2:] + 1.0
     return [
         (text, box)
@@ -47,7 +49,7 @@ def assert_readable(figure: Figure) -> None:
         if overlap(box_a, box_b) > 0.0
     ]
     assert not covered
-    edges = figure.axes[0].get_window_extent().extents
+    edges = np.array(figure.axes[0].get_window_extent().extents)
     for text, box in labels:
         assert overlap(box, edges) == pytest.approx(np.prod(box[2:] - box[:2])), text
 

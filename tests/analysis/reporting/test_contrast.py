@@ -155,7 +155,7 @@ def _edges(axes: Axes, scheme: str) -> Iterator[tuple[str, float]]:
         yield kind, max(edge, inner) / 3.0
     for marks in axes.collections:
         colours = np.asarray(marks.get_edgecolor())
-        if len(colours) and len(marks.get_offsets()):
+        if len(colours) and np.size(np.asarray(marks.get_offsets())):
             yield str(marks.get_label()), contrast(colours[-1], scheme) / 3.0
 
 
