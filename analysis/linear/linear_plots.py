@@ -124,7 +124,7 @@ def plot_step(check: StepCheck) -> Figure:
     return figure
 
 
-_CYCLE = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#B87A00", "#3A9AD0")
+_CYCLE = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200", "#3A9AD0")
 #: Part of the plane about -1 that is shown.
 _NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
 #: Phases below this are beyond all that a Bode diagram is read for, deg.

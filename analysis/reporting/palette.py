@@ -19,20 +19,21 @@ __all__ = [
 ]
 
 #: Okabe and Ito's palette, told apart with any colour vision; its light ones darker, so
-#: that lines stand out from white by 3 to 1 (WCAG 2.2, 1.4.11). Sound is laid below.
+#: that lines stand out from white by 3 to 1 (WCAG 2.2, 1.4.11). Their orange is brown:
+#: one between would be their vermilion to who sees no green. Sound is laid below.
 COLOURS = {
     "robot": "#0072B2",
     "source": "#D55E00",
     "estimate": "#A8498A",
     "obstacle": "#4D4D4D",
-    "echo": "#B87A00",
+    "echo": "#7A5200",
     "empty": "#858585",
     "attraction": "#D55E00",
     "repulsion": "#4D4D4D",
     "sound": "#F0E442",
     "sounding": "#8A7A00",
     "left": "#3A9AD0",
-    "right": "#B87A00",
+    "right": "#7A5200",
     "seen": "#009E73",
     "echoes": "#9A6A00",
     "tracked": "#882255",
@@ -61,7 +62,7 @@ SERIES_COLOURS = (
     COLOURS["empty"],
     "#D55E00",
     "#0072B2",
-    "#B87A00",
+    "#7A5200",
     "#A8498A",
     "#009E73",
     "#3A9AD0",
@@ -95,6 +96,9 @@ def contrast(first: Any, second: Any) -> float:
     Args:
         first: As matplotlib takes it.
         second: The same.
+
+    Returns:
+        The ratio of their luminances, each with 0.05 of stray light.
     """
     less, more = sorted((luminance(first), luminance(second)))
     return (more + 0.05) / (less + 0.05)

@@ -83,7 +83,7 @@ def write_replay(
 ) -> None:
     """Writes a self-contained page that plays the run.
 
-    The robot with its microphone bar, wheels and cones (a cone is orange
+    The robot with its microphone bar, wheels and cones (a cone is brown
     while it has an echo), the obstacles, the sources, each with a ring that grows
     while it sounds, where the robot takes its source to be (a ball), the forces of
     its law and the way that it commands (arrows), the walls of the room, and

@@ -332,7 +332,7 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
                 result.columns[f"range_{sensor + 1}"][tick],
                 axis - half,
                 axis + half,
-                facecolor=(*colour, 0.35 if echo else 0.07),
+                facecolor=(*colour, 0.2 if echo else 0.07),
                 edgecolor=colour,
                 linewidth=0.5,
                 label=None if echo in labelled else _CONE_LABELS[echo],

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -91,6 +92,53 @@ def test_lines_of_every_kind_stand_out(scheme: str) -> None:
     lines = [colour for name, colour in palette.COLOURS.items() if name != "sound"]
     lines += [*palette.ROBOT_COLOURS, *palette.SERIES_COLOURS]
     assert not [c for c in lines if contrast(c, scheme) < 3.0]
+
+
+#: Linear RGB as who lacks one kind of cones sees it (Machado, Oliveira and Fernandes
+#: 2009, severity 1).
+NO_GREEN = [
+    [0.367322, 0.860646, -0.227968],
+    [0.280085, 0.672501, 0.047413],
+    [-0.011820, 0.042940, 0.968881],
+]
+NO_RED = [
+    [0.152286, 1.052583, -0.204868],
+    [0.114503, 0.786281, 0.099216],
+    [-0.003882, -0.048116, 1.051998],
+]
+
+
+def seen(colour: str, cones: Any) -> NDArray[np.float64]:
+    """CIE L*a*b* of a colour, under the light that white has."""
+    rgb = np.array(to_rgba(colour)[:3])
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
+    to_xyz = np.array(
+        [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    )
+    xyz = to_xyz @ np.clip(np.array(cones) @ linear, 0.0, 1.0) / to_xyz.sum(axis=1)
+    f = np.where(xyz > 0.008856, np.cbrt(xyz), 7.787 * xyz + 16.0 / 116.0)
+    return np.array([116.0 * f[1] - 16.0, 500.0 * (f[0] - f[1]), 200.0 * (f[1] - f[2])])
+
+
+@pytest.mark.parametrize("cones", [np.eye(3), NO_GREEN, NO_RED])
+def test_what_stands_side_by_side_is_told_apart_by_any_eyes(cones: Any) -> None:
+    """A difference of 2.3 is just noticed; Okabe and Ito's own with a grey has 7.1."""
+    names = [
+        ("source", "echo"),
+        ("left", "right"),
+        ("robot", "left"),
+        ("echo", "empty"),
+    ]
+    names += [("passed", "lessened"), ("lessened", "hit"), ("robot", "estimate")]
+    names += [("source", "estimate"), ("attraction", "repulsion")]
+    pairs = [(palette.COLOURS[a], palette.COLOURS[b]) for a, b in names]
+    pairs += combinations(palette.SERIES_COLOURS, 2)
+    alike = [
+        pair
+        for pair in pairs
+        if np.linalg.norm(seen(pair[0], cones) - seen(pair[1], cones)) < 9.0
+    ]
+    assert not alike
 
 
 @pytest.mark.parametrize("scheme", SCHEMES)

@@ -168,7 +168,7 @@ def test_pictures_draw_it_in_a_colour_of_its_own(answers):
     assert answers["lines"] == {
         "conventional": "#D55E00",
         "active 2019": "#0072B2",
-        "conventional 2017": "#B87A00",
+        "conventional 2017": "#7A5200",
         "active 2017": "#A8498A",
     }
 
