@@ -58,7 +58,8 @@ class RunResult:
     ended: float = 0.0
     """Number of the ending of a search, see ``systems.search.search_ending``."""
     world: dict[str, NDArray[np.float64]] = field(default_factory=dict)
-    """Columns of what all robots share: wind, and what the sink has heard."""
+    """What the sink of a search has heard of each robot, which is in its columns, too:
+    ``robot.frames`` here is ``sink_frames`` there."""
 
     @property
     def full_scenario(self) -> Scenario:
@@ -158,7 +159,7 @@ def gather_result(
             own,
             rules[name].final_cause(),
             rules[name].collision,
-            _completed(log, own, around),
+            _completed(log, own, around) | _heard_by_sink(world or {}, name),
             wall_s,
             name,
             engine,
@@ -187,6 +188,18 @@ def gather_result(
         ended=decisive.ended,
         world=world or {},
     )
+
+
+def _heard_by_sink(
+    world: Mapping[str, NDArray[np.float64]], robot: str
+) -> dict[str, NDArray[np.float64]]:
+    """What the sink of a search knows of one robot, as columns of that robot."""
+    begin = f"{robot}."
+    return {
+        f"sink_{key.removeprefix(begin)}": values
+        for key, values in world.items()
+        if key.startswith(begin)
+    }
 
 
 _POSE = ("p_WB_x", "p_WB_y", "theta_WB")

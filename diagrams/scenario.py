@@ -32,7 +32,7 @@ from diagrams.checks.goal_checks import check_goals, start_note
 from diagrams.checks.guard_checks import check_guard, guard_note
 from diagrams.checks.route_checks import route_notes
 from diagrams.checks.search_checks import check_searches
-from diagrams.fields import explain, joined, single_faults
+from diagrams.fields import explain, joined, scenario_schema, single_faults
 from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.run_parameters import RunParameters
 from systems.base.carrier_parameters import SourceRobotParameters
@@ -289,9 +289,11 @@ class Scenario(FollowerParameters, RunParameters):
         robots = info.field_name == "robots"
         model = FollowerParameters if robots else SourceParameters
         faults = [
-            InputError.joined([fault], below=name)
+            fault
             for name, changes in named.items()
-            for fault in single_faults(model, changes, f"one of {info.field_name}")
+            for fault in single_faults(
+                model, changes, scenario_schema(), (str(info.field_name), name)
+            )
         ]
         if faults:
             raise InputError.joined(faults)

@@ -60,6 +60,7 @@ html_title = f"phonotaxis {version}"
 html_static_path = ["_static"]
 html_extra_path = ["building/root"]
 html_css_files = ["site.css"]
+html_js_files = ["scrollers.js"]
 html_show_search_summary = False  # it would be fetched, which files cannot be
 html_show_sphinx = False
 html_copy_source = False

@@ -53,6 +53,7 @@ __all__ = [
     "sweep",
 ]
 
+#: Of the package, as installed.
 __version__: str
 
 #: The module that each public name is in; the imports above tell type checkers.

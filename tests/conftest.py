@@ -184,7 +184,7 @@ _AXE_RULES = (
 #: What a page lets one do, as long as it can be seen.
 _CONTROLS = """() => [...document.querySelectorAll(
     "a[href], button, select, input, textarea, [tabindex='0']")]
-    .filter((e) => e.checkVisibility() && !e.disabled)"""
+    .filter((e) => e.checkVisibility({visibilityProperty: true}) && !e.disabled)"""
 
 
 @pytest.fixture(scope="session")
@@ -231,7 +231,10 @@ def check_page(browser: Any) -> Callable[..., None]:
 
 
 def _check_keyboard(page: Any, where: str) -> None:
-    """Tab comes to every control, and each shows that it has been reached."""
+    """Tab comes to every control, and each shows that it has been reached.
+
+    None is beside the window then, as in a drawer that is closed.
+    """
     controls = page.evaluate(f"({_CONTROLS})().length")
     page.evaluate(f"({_CONTROLS})().forEach((e, k) => e.dataset.control = k)")
     reached: set[str] = set()
@@ -239,7 +242,10 @@ def _check_keyboard(page: Any, where: str) -> None:
         page.keyboard.press("Tab")
         control, shown = page.evaluate(
             """() => { const e = document.activeElement, s = getComputedStyle(e);
-            return [e.dataset.control ?? "", s.outlineStyle !== "none"]; }"""
+            const {left, right, top, bottom} = e.getBoundingClientRect();
+            const inside = right > 0 && left < innerWidth && bottom > 0 &&
+                top < innerHeight;
+            return [e.dataset.control ?? "", s.outlineStyle !== "none" && inside]; }"""
         )
         if control:
             assert shown, (where, control)

@@ -20,6 +20,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 #: Animation times of the two pictures, s; the source is silent in both.
 EARLY_S, LATE_S = 0.8, 5.8
 READY = "body[data-ready=yes]"
+#: Of a telephone, and of two windows, px.
+WIDTHS = (390, 1100, 1400)
 
 
 def _scene(page: Any, time: float) -> np.ndarray:
@@ -149,6 +151,37 @@ def test_the_view_can_follow_the_robot_and_come_back(page):
     np.testing.assert_allclose(_place(_scene(page, EARLY_S), 2), whole, atol=1.0)
 
 
+@pytest.mark.parametrize("width", WIDTHS)
+def test_no_number_of_the_floor_is_cut(browser, replay, width):
+    """Every corner of every number is in the first view; its letters can be read."""
+    context = browser.new_context(viewport={"width": width, "height": 844})
+    opened = context.new_page()
+    opened.goto(replay.as_uri())
+    opened.wait_for_selector(READY)
+    numbers = opened.evaluate(
+        """() => { viewer.scene.updateMatrixWorld();
+        const {Box3, Vector3} = MeshCat.THREE, found = {};
+        const pane = document.getElementById("meshcat-pane");
+        const wanted = /^x -?\\d+$/, floor = replay.shown("floor");
+        const named = floor.children.filter((child) => wanted.test(child.name));
+        for (const number of named) {
+          const {min, max} = new Box3().setFromObject(number);
+          const ends = [[min.x, min.z], [max.x, min.z], [min.x, max.z], [max.x, max.z]]
+            .map(([x, z]) => new Vector3(x, min.y, z).project(viewer.camera));
+          const far = ends.flatMap(({x, y}) => [Math.abs(x), Math.abs(y)]);
+          const rows = ends.map(({y}) => y * pane.clientHeight / 2);
+          found[number.name] = [Math.max(...far),
+            Math.max(...rows) - Math.min(...rows)];
+        }
+        return found; }"""
+    )
+    # The robot starts with its axle at 0, and the source drives 1.8 m ahead of it.
+    assert {"x 0", "x 1", "x 2"} <= numbers.keys()
+    assert max(edge for edge, _ in numbers.values()) < 1.0
+    assert min(height for _, height in numbers.values()) > 6.0
+    context.close()
+
+
 @pytest.mark.parametrize("width", [390, 1100])
 def test_the_whole_run_is_in_view(browser, replay, width):
     context = browser.new_context(viewport={"width": width, "height": 844})
@@ -221,6 +254,23 @@ def test_the_floor_that_is_known_grows(tmp_path: Path, browser: Any) -> None:
     opened.context.close()
     assert shares[0] > 0.02
     assert shares[1] > 1.5 * shares[0]
+
+
+def test_what_a_guard_did_is_drawn_and_named(tmp_path: Path, browser: Any) -> None:
+    overrides = ["hearing=ideal", "guard={}", "duration_s=2"]
+    result = simulate(load_scenario("two_static_obstacles", overrides))
+    write_replay(result, tmp_path / "replay.html")
+    opened = _opened(browser, tmp_path / "replay.html")
+    chart = opened.locator(".chart").first
+    chart.locator("select").select_option(label="command, by the guard")
+    drawn = chart.locator(".curves path[stroke]").get_attribute("d")
+    assert drawn.startswith("M")
+    assert "H" in drawn
+    opened.evaluate("replay.seek(1.5)")
+    did = result.columns["guard_action"][round(1.5 / 0.025) + 1]
+    name = ("passed", "slowed", "turned", "braked", "halted")[round(did)]
+    assert chart.locator(".readings").inner_text().endswith(name)
+    opened.context.close()
 
 
 @pytest.mark.parametrize(

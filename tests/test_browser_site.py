@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from itertools import product
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -83,3 +84,121 @@ def test_pages_fit_are_legible_and_need_no_network(
     said = [line for line in log.splitlines() if "CONSOLE" in line]
     assert len(said) == 1, "\n".join(said[:40])
     assert f"looked at {len(cases)}" in said[0]
+
+
+def _opened(browser: Any, name: str) -> Any:
+    assert (SITE / name).exists(), f"there is no {name}; run make docs first"
+    page = browser.new_context(offline=True).new_page()
+    page.goto((SITE / name).as_uri())
+    return page
+
+
+def test_every_name_of_the_list_leads_to_what_it_is(browser: Any) -> None:
+    """Constants, too: each link ends at a heading with words below it."""
+    listed = _opened(browser, "api.html")
+    found = listed.evaluate(
+        """[...document.querySelectorAll("article code.py-obj")].map(
+        (code) => [code.textContent, code.closest("a")?.href ?? ""])"""
+    )
+    assert {"LAWS", "TICK_S", "simulate"} <= {name for name, _ in found}
+    assert not [name for name, link in found if not link]
+    by_page: dict[str, list[str]] = {}
+    for _, link in found:
+        page, _, anchor = link.partition("#")
+        by_page.setdefault(page, []).append(anchor)
+    for page, anchors in by_page.items():
+        listed.goto(page)
+        told = listed.evaluate(
+            """(ids) => ids.map((id) => document.getElementById(id)
+            ?.parentElement.querySelector("dd")?.textContent.trim() ?? "")""",
+            anchors,
+        )
+        bare = [a for a, text in zip(anchors, told, strict=True) if len(text) < 10]
+        assert not bare, page
+    listed.context.close()
+
+
+#: Prose with tables and formulas, a notebook, a long list, and the search.
+REACHED = (
+    "index.html",
+    "model.html",
+    "notebooks/first_run.html",
+    "api.html",
+    "reference/systems.laws.html",
+    "../search.html",
+)
+
+
+@pytest.mark.parametrize("name", REACHED)
+def test_the_keyboard_reaches_every_control_of_a_page(
+    check_page: Callable[..., None], name: str
+) -> None:
+    check_page(SITE / name)
+
+
+#: Where menu and contents are drawers, one of them, and none.
+@pytest.mark.parametrize("width", [390, 1100, 1400])
+def test_a_page_is_used_by_the_keyboard_alone(browser: Any, width: int) -> None:
+    """Over the menu, from drawers or in sight; into the text; by headings' links."""
+    context = browser.new_context(
+        viewport={"width": width, "height": 844}, reduced_motion="reduce", offline=True
+    )
+    page = context.new_page()
+    page.goto((SITE / "model.html").as_uri())
+
+    def reach(wanted: str, most: int = 30) -> None:
+        for _ in range(most):
+            page.keyboard.press("Tab")
+            if page.evaluate("(w) => document.activeElement.matches(w)", wanted):
+                return
+        pytest.fail(f"{width} px: Tab does not reach {wanted}")
+
+    if width == 390:
+        reach("#__navigation", 1)
+        assert page.evaluate("getComputedStyle(document.activeElement).opacity") == "1"
+        page.keyboard.press("Space")
+    reach(".sidebar-search")
+    assert page.locator(".sidebar-search").is_visible()
+    box = page.locator(".sidebar-search").bounding_box()
+    assert 0.0 <= box["x"] < width
+    page.goto((SITE / "model.html").as_uri())
+    reach(".skip-to-content", 3)
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    inside = "document.querySelector('article').contains(document.activeElement)"
+    assert page.evaluate(inside)
+    page.goto((SITE / "model.html").as_uri())
+    if width < 1300:
+        reach("#__toc", 2)
+        page.keyboard.press("Space")
+        reach(".toc-drawer a", 400)
+        left, right = page.evaluate(
+            """(({left, right}) => [left, right])(
+            document.activeElement.getBoundingClientRect())"""
+        )
+        assert 0.0 <= left < right <= width
+    hidden = page.evaluate(
+        """[...document.querySelectorAll(".headerlink")].filter(
+        (link) => getComputedStyle(link).visibility !== "visible").length"""
+    )
+    assert not hidden
+    context.close()
+
+
+def test_the_search_finds_by_the_keyboard_alone(browser: Any) -> None:
+    page = _opened(browser, "index.html")
+    page.locator(".sidebar-search").focus()
+    page.keyboard.type("guard")
+    page.keyboard.press("Enter")
+    page.wait_for_selector("ul.search li a")
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        if page.evaluate("document.activeElement.matches('ul.search a')"):
+            break
+    else:
+        pytest.fail("Tab does not reach what was found")
+    assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") in {
+        "auto",
+        "solid",
+    }
+    page.context.close()

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import ast
 import re
+import runpy
 import sys
 import tomllib
 from importlib.metadata import packages_distributions
 from pathlib import Path
+
+import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
@@ -67,3 +70,43 @@ def test_every_file_that_is_no_code_goes_along() -> None:
     }
     assert len(files) > 40
     assert files == declared
+
+
+def index_page(readme: str) -> str:
+    """What ``setup.py`` makes of it."""
+    page: str = runpy.run_path(str(ROOT / "setup.py"))["index_page"](readme)
+    return page
+
+
+def prose(markdown: str) -> str:
+    return re.sub(r"(?ms)^```.*?^```$", "", markdown)
+
+
+def test_the_page_of_an_index_has_no_link_into_the_repository() -> None:
+    readme = (ROOT / "README.md").read_text("utf-8")
+    page = index_page(readme)
+    relative = r"\]\((?!https?://)[^)]*\)"
+    assert len(re.findall(relative, prose(readme))) > 20
+    assert not re.findall(relative, prose(page))
+    assert "https://drake.mit.edu" in page
+    # No word and no code is lost, but for the words of pictures.
+    assert re.findall(r"(?ms)^```.*?^```$", page) == re.findall(
+        r"(?ms)^```.*?^```$", readme
+    )
+    shown = re.sub(r"!\[[^]]*\]\([^)]*\)", "", prose(readme))
+    words = re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", shown).split()
+    left = re.sub(r"\[([^]]*)\]\((http[^)]*)\)", r"\1", prose(page)).split()
+    note = left.index(">")
+    assert left[:note] == words[:note]
+    assert left[-300:] == words[-300:]
+    assert len(left) - len(words) == pytest.approx(20, abs=10)
+
+
+def test_links_to_other_sites_and_code_stay() -> None:
+    page = index_page(
+        "# a\n\nSee [b](docs/b.md#c), ![d](e.png)[f](https://f.example).\n\n"
+        "```python\nheard[0](x)\n```\n\nLast [g\nh](g.md).\n"
+    )
+    assert "See b, [f](https://f.example)." in page
+    assert "```python\nheard[0](x)\n```" in page
+    assert page.endswith("Last g\nh.\n")

@@ -63,6 +63,7 @@ def claims_table(summaries: Sequence[dict[str, Any]]) -> str:
     return markdown_table(("claim", "source", "our figure", "verdict"), rows)
 
 
+#: What the papers say of their laws, each with who judges it by figures of ours.
 CLAIMS = (
     Claim("The robot tracks the moving source", "Han 5.1, figure 11", follows),
     Claim(

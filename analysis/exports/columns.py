@@ -207,9 +207,16 @@ _SEARCHES = [
         search_steps="steps begun",
         search_fault="what was found to be broken, a bit each "
         "(systems/search/search_ending.py)",
+        sink_frames="frames of the robot that the sink has heard",
+        sink_function="what the last of them tells, a number of the protocol; -1: none "
+        "yet (systems/radio/codec.py)",
+        sink_value="value of the last of them",
+        sink_result="what the sink has heard of the search: -1 nothing, 0 not found, "
+        "1 found",
     ),
+    *_of("s", sink_age_s="time since the sink heard the last of them"),
 ]
-#: All of them, in the order of the signal.
+#: All columns that tables of runs can have, in the order of the signal.
 COLUMNS: tuple[Column, ...] = (
     *_MOTION,
     *_HEARING,

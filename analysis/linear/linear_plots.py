@@ -51,7 +51,7 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
     x, y = np.meshgrid(np.linspace(x0, x1, 90), np.linspace(y0, y1, 80))
     force = field.forces(np.column_stack([x.ravel(), y.ravel()])).reshape(*x.shape, 2)
     axes.streamplot(
-        x, y, force[..., 0], force[..., 1], color="#C8C8C8", linewidth=0.6,
+        x, y, force[..., 0], force[..., 1], color="#8C8C8C", linewidth=0.6,
         arrowsize=0.7, density=1.6,
     )  # fmt: skip
     for name, body in search.scenario.bodies().items():
@@ -124,7 +124,7 @@ def plot_step(check: StepCheck) -> Figure:
     return figure
 
 
-_CYCLE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+_CYCLE = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200", "#3A9AD0")
 #: Part of the plane about -1 that is shown.
 _NYQUIST_X, _NYQUIST_Y = (-3.2, 1.2), (-2.2, 2.2)
 #: Phases below this are beyond all that a Bode diagram is read for, deg.

@@ -132,7 +132,7 @@ def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
         rate,
         np.broadcast_to(rate[:, None], (len(rate), len(c))),
         portrait.accelerations_m_s2.T,
-        color="#BBBBBB",
+        color="#8C8C8C",
         linewidth=0.6,
         density=1.1,
         arrowsize=0.7,
@@ -163,7 +163,7 @@ def plot_phase_portrait(portrait: PhasePortrait) -> Figure:
     figure.legend(
         handles=[
             Patch(color="#DCEBF7", label="certified"),
-            Patch(facecolor="white", edgecolor="#BBBBBB", label="safe, not certified"),
+            Patch(facecolor="white", edgecolor="#8C8C8C", label="safe, not certified"),
             Patch(color="#F6D3BF", label="touches"),
         ],
         loc="outside lower center",

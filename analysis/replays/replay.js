@@ -169,17 +169,20 @@
     let path = "", pen = "M";
     series.t.forEach((t, k) => {
       if (series.values[k] === null) { pen = "M"; return; }
-      path += `${pen}${x(t)} ${y(series.values[k])}`;
+      const steps = series.style === "steps" && pen === "L";
+      path += steps ? `H${x(t)}V${y(series.values[k])}`
+        : `${pen}${x(t)} ${y(series.values[k])}`;
       pen = "L";
     });
     return path;
   }
-  function reading(series) {
+  function reading(series, rows) {
     let k = series.t.findIndex((t) => t > time + 1e-9);
     k = (k < 0 ? series.t.length : k) - 1;
     const value = series.values[Math.max(k, 0)];
-    return k < 0 || value === null || value === undefined
-      ? "–" : value.toFixed(2).replace("-", "−");
+    if (k < 0 || value === null || value === undefined) return "–";
+    const named = rows && rows.find(([row]) => row === value);
+    return named ? named[1] : value.toFixed(2).replace("-", "−");
   }
   class Chart {
     constructor(box, first) {
@@ -230,7 +233,9 @@
             : value > 0.97 * facts.end_s ? "end" : "middle" }, `${value} s`));
       for (const [from, to] of chart.bursts)
         curves.append(make("path", { fill: "#F0E442", "fill-opacity": 0.35,
-          d: `M${x(from)} ${TOP}H${x(to)}v${inner}H${x(from)}z` }));
+          d: `M${x(from)} ${TOP}H${x(to)}v${inner}H${x(from)}z` }),
+        make("path", { fill: "#8A7A00",
+          d: `M${x(from)} ${TOP + inner}H${x(to)}v-3H${x(from)}z` }));
       for (const series of chart.series) {
         const dots = series.style === "dots";
         curves.append(make("path", { d: curve(series, x, y), stroke: series.colour,
@@ -244,7 +249,7 @@
         swatch.append(make("i", { style: `background:${s.colour}` }));
         const value = make("span");
         const item = make("span", {}, swatch, `${s.label} `, value);
-        item.update = () => { value.textContent = reading(s); };
+        item.update = () => { value.textContent = reading(s, chart.ticks); };
         return item;
       }));
       this.cursor();
@@ -274,6 +279,8 @@
     viewer.animator.play();
     viewer.animator.pause();
     ready = true;
+    // Meshcat's mapping greys the white floor, from which colours then stand out less.
+    viewer.renderer.toneMapping = THREE.NoToneMapping;
     // Meshcat's 75 degrees bend what is near the edge.
     viewer.camera.fov = 45;
     viewer.set_3d_pane_size();

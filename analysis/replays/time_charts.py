@@ -34,7 +34,10 @@ class Chart(NamedTuple):
     ticks: list[tuple[float, str]] | None
     """Names of values; none: the values are numbers."""
     series: list[dict[str, Any]]
-    """Label, colour, style (line, dashes, dots), t in s, and values; none is a gap."""
+    """Label, colour, style, t in s, and values; none is a gap.
+
+    The style is line, dashes, dots, or steps: each value holds from its t on.
+    """
     bursts: list[tuple[float, float]]
     """When what is heard sounds, s."""
 
@@ -54,7 +57,7 @@ def time_chart(
         bursts: When what it hears sounds, s.
 
     Returns:
-        Its curves and dots; without any, as of what a guard did, ``series`` is empty.
+        Its curves and dots; without any ``series`` is empty.
     """
     axes = Figure().subplots()
     panel(axes, own)
@@ -88,18 +91,37 @@ def _series(line: Line2D, across_s: float | None) -> dict[str, Any]:
     elif dots:
         t, values = t[np.isfinite(values)], values[np.isfinite(values)]
     step = max(1, math.ceil(len(t) / MOST_POINTS))
+    style = _style(line)
+    if style == "steps":
+        # Thinned, it would lose what lasts for a tick.
+        (t, values), step = _steps(t, values), 1
     label = str(line.get_label())
     return {
         "label": "" if label.startswith("_") else label,
         "colour": to_hex(line.get_color()),
-        "style": "dots"
-        if dots
-        else "line"
-        if line.get_linestyle() == "-"
-        else "dashes",
+        "style": style,
         "t": _short(t[::step], 3),
         "values": _short(values[::step], 4),
     }
+
+
+def _style(line: Line2D) -> str:
+    if line.get_drawstyle() == "steps-pre":
+        return "steps"
+    styles = {"None": "dots", "-": "line"}
+    return styles.get(str(line.get_linestyle()), "dashes")
+
+
+def _steps(
+    t: NDArray[np.float64], values: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The begin of each value, and the end of the last.
+
+    A row tells of the time since the row before it.
+    """
+    new = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
+    begins = np.r_[t[:1], t[np.maximum(new[1:] - 1, 0)]]
+    return np.r_[begins, t[-1:]], np.r_[values[new], values[-1:]]
 
 
 def _short(values: NDArray[np.float64], digits: int) -> list[float | None]:

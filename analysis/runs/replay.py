@@ -28,7 +28,6 @@ from analysis.runs.replay_scene import OBSTACLE_HEIGHT_M, upright
 from analysis.runs.run_plots import clearance_panel, heard_bursts, time_panels
 from analysis.runs.scene import (
     Look,
-    bounds,
     contact_point,
     followed_sources,
     lightened,
@@ -84,7 +83,7 @@ def write_replay(
 ) -> None:
     """Writes a self-contained page that plays the run.
 
-    The robot with its microphone bar, wheels and cones (a cone is orange
+    The robot with its microphone bar, wheels and cones (a cone is brown
     while it has an echo), the obstacles, the sources, each with a ring that grows
     while it sounds, where the robot takes its source to be (a ball), the forces of
     its law and the way that it commands (arrows), the walls of the room, and
@@ -131,7 +130,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
     return ReplayFacts(
         run_title(result),
         result.simulated_s,
-        bounds(result, margin=0.5),
+        replay_scene.shown_rectangle(result),
         replay_layers(result, paths, estimates),
         time_charts(result, clearance),
         [*robots, *sources, *obstacles],
@@ -142,7 +141,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
 def time_charts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> list[Chart]:
     """What ``plot_time_series`` shows of each robot, as data.
 
-    Panels without a curve, as of what a guard did, are left out.
+    Panels without a curve are left out.
 
     Args:
         result: The run.
@@ -438,7 +437,7 @@ def _record_known_space(
     above = 0.0005 * [*result.robots].index(own.name)
     dots = 0.25 * known.cell_m * np.array([1.0, -1.0, 1.0, -1.0])
     for name, cells, colour, height, inset in (
-        ("free", known.free, lightened(look.seen, 0.35), 0.001, 0.0 * dots),
+        ("free", known.free, lightened(look.seen, 0.2), 0.001, 0.0 * dots),
         ("echoes", known.hits > 0.0, look.echoes, 0.006, dots),
     ):
         layers = floor_layers(known, cells, whole=name == "free")
@@ -484,9 +483,9 @@ def _record_guard(
 
 #: Edges of the guarded disc, their colours, and what the guard did meanwhile.
 _EDGES = (
-    ("passed", "empty", (PASSED,)),
-    ("lessened", "echo", (SLOWED, TURNED)),
-    ("braked", "source", (BRAKED, HALTED)),
+    ("passed", "passed", (PASSED,)),
+    ("lessened", "lessened", (SLOWED, TURNED)),
+    ("braked", "hit", (BRAKED, HALTED)),
 )
 
 

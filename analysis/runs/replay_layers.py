@@ -115,7 +115,7 @@ def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     if not guarded:
         return []
     circles = tuple(f"guard/{paths[name]}" for name in guarded)
-    colours = COLOURS["empty"], COLOURS["echo"], COLOURS["source"]
+    colours = COLOURS["passed"], COLOURS["lessened"], COLOURS["hit"]
     found = [Layer("guard", "passed on, gave less, braked", colours, circles)]
     if any(has_known_space(own) for own in guarded.values()):
         own_looks = [look for look in looks(result) if look.result.name in guarded]

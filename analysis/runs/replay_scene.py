@@ -37,6 +37,7 @@ __all__ = [
     "add_trail",
     "floor_rectangle",
     "set_stage",
+    "shown_rectangle",
     "upright",
 ]
 
@@ -49,6 +50,8 @@ SENSOR_HEIGHT_M = 0.14
 WHEEL_WIDTH_M = 0.035
 #: The body carries the microphone bar, which is wider; m of the bar's width.
 BODY_WIDTH_FRACTION = 0.45
+#: Size of the numbers on the floor, of the width of what is shown: on a telephone, too.
+NUMBER_SHARE = 0.028
 #: Radii of the ring that grows while the source sounds, m.
 RINGS = (0.28, 0.38, 0.48, 0.58, 0.68)
 
@@ -107,7 +110,10 @@ def _ribbon(
 
 
 def add_floor(meshcat: Meshcat, result: RunResult) -> None:
-    """A floor that holds the whole run, and a line a metre.
+    """A floor that holds the whole run, a line a metre, and numbers of x.
+
+    The numbers stand where the view of the whole run has its near edge: the floor goes
+    on beyond, and is cut there.
 
     Args:
         meshcat: The scene.
@@ -122,10 +128,22 @@ def add_floor(meshcat: Meshcat, result: RunResult) -> None:
     starts = [(x, y_low) for x in along] + [(x_low, y) for y in across]
     ends = [(x, y_high) for x in along] + [(x_high, y) for y in across]
     _segments(meshcat, "floor/grid", starts, ends, Rgba(0.55, 0.55, 0.55))
-    for x in along[:-1]:
-        _write(
-            meshcat, f"floor/x {x:.0f}", f"{x:.0f} m", (x + 0.05, y_low + 0.06), 0.13
-        )
+    left, right, near, _ = shown_rectangle(result)
+    size = NUMBER_SHARE * (right - left)
+    for x in along:
+        text = f"{x:.0f} m".replace("-", "\u2212")
+        outline = TextPath((x + 0.4 * size, near + 0.4 * size), text, size=size)
+        if x >= left and outline.get_extents().x1 <= right:
+            _write(meshcat, f"floor/x {x:.0f}", outline)
+
+
+def shown_rectangle(result: RunResult) -> tuple[float, float, float, float]:
+    """Least x, greatest x, least y, greatest y of what the first view holds, m.
+
+    Args:
+        result: The run.
+    """
+    return bounds(result, margin=0.5)
 
 
 def floor_rectangle(result: RunResult) -> tuple[float, float, float, float]:
@@ -155,13 +173,11 @@ def _segments(
     meshcat.SetLineSegments(path, lifted(starts), lifted(ends), 1.0, rgba)
 
 
-def _write(
-    meshcat: Meshcat, path: str, text: str, place: tuple[float, float], size: float
-) -> None:
+def _write(meshcat: Meshcat, path: str, text: TextPath) -> None:
     """Outlines of letters on the floor: Meshcat has no text."""
     starts: list[NDArray[np.float64]] = []
     ends: list[NDArray[np.float64]] = []
-    for polygon in TextPath(place, text, size=size).to_polygons():
+    for polygon in text.to_polygons():
         outline = np.asarray(polygon)
         starts.extend(outline[:-1])
         ends.extend(outline[1:])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.plumes.plume_history import concentration_map, plume_history
 from analysis.plumes.search_panels import call_time, search_panels
+from analysis.reporting.body_labels import spread_labels
 from analysis.reporting.notebook_figure import NotebookFigure
 from analysis.reporting.palette import COLOURS, draw_grid
 from analysis.runs.guarded_motion import GUARD_ACTIONS, guarded_motion
@@ -83,6 +85,7 @@ def plot_trajectory(result: RunResult) -> Figure:
         draw_estimates(axes, look)
         draw_robot(axes, look, times_apart(look.result))
     draw_collision(axes, result)
+    spread_labels(axes)
     handles, labels = axes.get_legend_handles_labels()
     shown_once = dict(zip(labels, handles, strict=True))
     figure.legend(
@@ -110,10 +113,15 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
         levels = [0.1, 0.3, 1.0, 3.0, 1e9]
         tints = ["#F3E6EF", "#E7CCDF", "#D9AECB", "#C98BB5"]
         axes.contourf(x, y, dense, levels=levels, colors=tints, zorder=0.5)
+        edge = COLOURS["odor"]
+        axes.contour(
+            x, y, dense, levels=levels[:1], colors=edge, linewidths=0.5, zorder=0.6
+        )
         label = "odour at the end (0.1, 0.3, 1, 3 times C1)"
         axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
     place = odor.position_m
-    axes.plot(*place, "*", color="#772266", ms=12, ls="none", label="source of odour")
+    style: dict[str, Any] = {"color": COLOURS["odor"], "ms": 12, "ls": "none"}
+    axes.plot(*place, "*", label="source of odour", **style)
 
 
 def heard_bursts(result: RunResult) -> list[tuple[float, float]]:
@@ -204,6 +212,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     for axes in all_axes:
         for start, end in bursts:
             axes.axvspan(start, end, color=COLOURS["sound"], alpha=0.25, linewidth=0)
+            # Yellow on white is hard to see: a line along the foot is not.
+            axes.axvspan(start, end, ymax=0.025, color=COLOURS["sounding"], linewidth=0)
         draw_grid(axes, "y")
         axes.legend(
             loc="upper left",
@@ -326,14 +336,24 @@ def _speeds(axes: Axes, result: RunResult) -> None:
         label = f"{side} wheel, command"
         axes.plot(result.time, rim, color=COLOURS[side], lw=1.0, label=label)
     axes.plot(result.time, forward, color=COLOURS["robot"], label="robot, forward")
+    if "wanted_speed" in columns:  # a guard may let less through
+        _wanted(axes, result.time, columns["wanted_speed"])
     axes.set_ylabel("speed (m/s)")
 
 
 def _turning(axes: Axes, result: RunResult) -> None:
     rate = np.degrees(result.columns["omega_WB"])
     axes.plot(result.time, rate, color=COLOURS["robot"], label="robot, to the left")
+    if "wanted_turn" in result.columns:
+        _wanted(axes, result.time, np.degrees(result.columns["wanted_turn"]))
     axes.axhline(0.0, color="black", lw=0.6)
     axes.set_ylabel("turn rate\n(deg/s)")
+
+
+def _wanted(axes: Axes, time: NDArray[np.float64], values: NDArray[np.float64]) -> None:
+    """What the law commands."""
+    label = "wanted by the law"
+    axes.plot(time, values, "--", color=COLOURS["law"], lw=1.0, label=label)
 
 
 def _guard_actions(axes: Axes, result: RunResult) -> None:
@@ -351,6 +371,16 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
             zorder=2,
             label=f"{name}: {100.0 * np.mean(done):.0f} %",
         )
+    # From bar to bar; a page that draws curves alone has this one.
+    axes.plot(
+        result.time,
+        actions,
+        color=COLOURS["robot"],
+        drawstyle="steps-pre",
+        linewidth=0.7,
+        label="what it did",
+        zorder=3,
+    )
     axes.set_yticks(range(len(GUARD_ACTIONS)), GUARD_ACTIONS)
     axes.set_ylim(len(GUARD_ACTIONS) - 0.4, -0.6)
     axes.set_ylabel("command,\nby the guard")

@@ -9,10 +9,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb, to_rgba
 from matplotlib.patches import Polygon, Rectangle, Wedge
-from matplotlib.patheffects import withStroke
 from numpy.typing import ArrayLike, NDArray
 
-from analysis.reporting.palette import COLOURS
+from analysis.reporting.body_labels import BodyLabel
+from analysis.reporting.palette import COLOURS, faintest
 from analysis.runs.known_space import KnownSpace
 from analysis.runs.scene import (
     Look,
@@ -27,7 +27,7 @@ from analysis.runs.scene import (
 from diagrams import RunResult
 from diagrams.bodies import microphones_W, robot_rectangle
 from diagrams.participants import SourceParameters
-from systems.world.geometry import rectangle_corners, rotate
+from systems.world.geometry import rectangle_corners
 
 __all__ = [
     "draw_collision",
@@ -102,7 +102,7 @@ def draw_robot(axes: Axes, look: Look, times: list[float]) -> None:
         if scenario.route is None and scenario.searches != "odor":
             bar = microphones_W(pose, scenario.robot).T
             axes.plot(*bar, "-o", color=colour, markersize=3.2, linewidth=2.0, zorder=5)
-        _write_time(axes, pose, -0.5 * scenario.robot.width_m, time, colour)
+        _write_time(axes, robot_rectangle(pose, scenario.robot), time, colour)
 
 
 def _draw_target(axes: Axes, look: Look) -> None:
@@ -133,25 +133,9 @@ def _draw_body(axes: Axes, rectangle: ArrayLike, **style: Any) -> None:
     axes.add_patch(Polygon(rectangle_corners(rectangle), **style))
 
 
-def _write_time(
-    axes: Axes, pose: NDArray[np.float64], aside: float, time: float, colour: str
-) -> None:
-    """The time beside a body, on its right; aside is the distance along y, m."""
-    dx, dy = rotate(pose[2], 0.0, aside)
-    unit_x, unit_y = dx / abs(aside), dy / abs(aside)
-    axes.annotate(
-        f"{round(time, 1):g} s",
-        (pose[0] + dx, pose[1] + dy),
-        xytext=(9.0 * unit_x, 7.0 * unit_y),
-        textcoords="offset points",
-        color=colour,
-        fontsize=8,
-        ha="center",
-        va="center",
-        annotation_clip=True,
-        path_effects=[withStroke(linewidth=2.0, foreground="white")],
-        zorder=7,
-    )
+def _write_time(axes: Axes, rectangle: ArrayLike, time: float, colour: str) -> None:
+    """The time beside a body, on its right until all labels are spread."""
+    axes.add_artist(BodyLabel(f"{round(time, 1):g} s", rectangle, colour))
 
 
 def draw_sources(axes: Axes, result: RunResult, times: list[float]) -> None:
@@ -210,7 +194,8 @@ def _draw_source(
         pose = path[tick_at(result, time)]
         axes.plot(*pose[:2], "o", color=colour, markersize=4, zorder=4)
         if moves:
-            _write_time(axes, pose, -0.5 * source.width_m, time, colour)
+            body = [*pose, source.length_m, source.width_m]
+            _write_time(axes, body, time, colour)
 
 
 def draw_estimates(axes: Axes, look: Look) -> None:
@@ -228,7 +213,8 @@ def draw_estimates(axes: Axes, look: Look) -> None:
         return
     colour = look.estimates
     part = result.time[heard] / max(result.simulated_s, 1e-9)
-    colours = [(*to_rgb(colour), 0.25 + 0.75 * p) for p in part]
+    least = faintest(colour)
+    colours = [(*to_rgb(colour), least + (1.0 - least) * p) for p in part]
     x, y = result.vector("p_WS_estimated")[:, heard]
     axes.scatter(
         x,
@@ -317,7 +303,7 @@ def draw_obstacles(axes: Axes, result: RunResult) -> None:
                 label="moving obstacle" if index == 0 and time == 0.0 else None,
                 zorder=3.5,
             )
-            _write_time(axes, pose, -0.5 * obstacle.size_m[1], time, colour)
+            _write_time(axes, [*pose, *obstacle.size_m], time, colour)
 
 
 def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
@@ -346,8 +332,8 @@ def draw_cones(axes: Axes, result: RunResult, times: list[float]) -> None:
                 result.columns[f"range_{sensor + 1}"][tick],
                 axis - half,
                 axis + half,
-                facecolor=(*colour, 0.35 if echo else 0.07),
-                edgecolor=(*colour, 0.5),
+                facecolor=(*colour, 0.2 if echo else 0.07),
+                edgecolor=colour,
                 linewidth=0.5,
                 label=None if echo in labelled else _CONE_LABELS[echo],
                 zorder=1.5,

@@ -27,7 +27,7 @@ __all__ = [
     "plot_root_loci",
 ]
 
-_LINES = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00")
+_LINES = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200")
 #: The mark of the scenario's own design.
 _CURRENT: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
 #: Exponents beyond these look alike in a chart, 1/s.

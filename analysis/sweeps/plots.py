@@ -31,7 +31,7 @@ WIDTH_IN = 9.0
 #: Cells beside one another that have room for their numbers, and values for names.
 MOST_NUMBERS, MOST_TICKS = 8, 20
 #: Okabe and Ito's colours, which the colour-blind can tell apart.
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7")
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#A8498A")
 
 
 def grid_axes(plan: SweepPlan) -> list[str]:

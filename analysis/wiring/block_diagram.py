@@ -302,7 +302,7 @@ def _drawn(box: _Box, read: set[tuple[str, str]]) -> str:
         parts.append(_text(x + 6, y + 4, escape(name), 12, "start", "black"))
     for name in box.outputs:
         x, y = box.port(name, output=True)
-        colour = "black" if (box.name, name) in read else "#999999"
+        colour = "black" if (box.name, name) in read else "#6B6B6B"
         parts.append(_text(x - 6, y + 4, escape(name), 12, "end", colour))
     return "".join([*parts, "</g>"])
 

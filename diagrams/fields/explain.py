@@ -35,7 +35,10 @@ def explain(error: ValidationError, schema: Mapping[str, Any], what: str) -> Inp
 
 
 def single_faults(
-    model: type[BaseModel], data: Mapping[str, Any], what: str
+    model: type[BaseModel],
+    data: Mapping[str, Any],
+    schema: Mapping[str, Any],
+    place: tuple[str, str],
 ) -> list[InputError]:
     """What is wrong with single fields of some changes.
 
@@ -44,26 +47,36 @@ def single_faults(
     Args:
         model: Of what is changed.
         data: Changed fields.
-        what: What the model is to a user, as 'one of robots'.
+        schema: JSON Schema of a scenario.
+        place: Where in it they are: group and name.
 
     Returns:
-        A fault each.
+        A fault each, whose field begins with the name.
     """
     try:
         model.model_validate(data)
     except ValidationError as error:
         found = error.errors(include_url=False)
-        if found := [each for each in found if each["type"] != "value_error"]:
-            schema = model.model_json_schema()
-            return [e for each in found for e in _faults(each, schema, what)]
+        single = [each for each in found if each["type"] != "value_error"]
+        return [
+            fault
+            for each in single
+            for fault in _faults(each, schema, "a scenario", place)
+        ]
     return []
 
 
 def _faults(
-    details: ErrorDetails, schema: Mapping[str, Any], what: str
+    details: ErrorDetails,
+    schema: Mapping[str, Any],
+    what: str,
+    above: tuple[str, ...] = (),
 ) -> Iterator[InputError]:
-    place = [str(part) for part in details["loc"] if part != "[key]"]
-    field, kind, message = ".".join(place), details["type"], details["msg"]
+    """The faults; fields begin below the first part of what is ``above`` them."""
+    below = [str(part) for part in details["loc"] if part != "[key]"]
+    place = [*above, *below]
+    field, kind = ".".join([*above[1:], *below]), details["type"]
+    message = details["msg"]
     if kind == "extra_forbidden":
         near = near_field(schema, place)
         yield InputError(field, f"is not a field of {what}; remove it{near}")

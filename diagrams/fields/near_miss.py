@@ -11,6 +11,14 @@ from systems.framework.input_error import InputError
 
 __all__ = ["did_you_mean", "near_field", "unknown_law"]
 
+#: Words for one thing, which letters do not show: scenarios call it by one of them.
+_SAME_THING = (
+    ("position", "location", "place", "pose", "centre", "center", "xy", "waypoints"),
+    ("size", "dimensions", "extent", "extents"),
+    ("speed", "velocity"),
+    ("heading", "angle", "yaw", "orientation", "theta"),
+)
+
 
 def did_you_mean(name: str, known: Iterable[str], most: int = 1) -> str:
     """The end of a message that names what is most like a name.
@@ -38,11 +46,16 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
         place: Parts of its path.
 
     Returns:
-        A field at the same place; without one, a field of that name elsewhere.
+        A field at the same place, by its letters or by what it tells; without one, a
+        field of that name below that place, or else anywhere.
     """
     *parents, last = place
-    here = did_you_mean(last, at_place(schema, parents))
-    return here or _elsewhere(schema, last)
+    siblings = at_place(schema, parents)
+    return (
+        did_you_mean(last, siblings)
+        or _of_that_meaning(last, siblings)
+        or _elsewhere(schema, place)
+    )
 
 
 def unknown_law(name: str, known: Collection[str], field: str = "") -> InputError:
@@ -63,10 +76,24 @@ def unknown_law(name: str, known: Collection[str], field: str = "") -> InputErro
     )
 
 
-def _elsewhere(schema: Mapping[str, Any], name: str) -> str:
+def _of_that_meaning(name: str, siblings: Iterable[str]) -> str:
+    """A sibling that tells the same in another word: the unit is no part of it."""
+
+    def told(field: str) -> str:
+        return field.casefold().partition("_")[0]
+
+    alike = next((words for words in _SAME_THING if told(name) in words), ())
+    found = next((field for field in siblings if told(field) in alike), "")
+    return f" (did you mean {found!r}?)" if found else ""
+
+
+def _elsewhere(schema: Mapping[str, Any], place: Sequence[str]) -> str:
     """One of that name, or of that name and a unit: those are often left out."""
-    paths = list(leaf_paths(schema))
-    named = [path for path in paths if path[-1] == name]
-    found = named or [path for path in paths if path[-1].startswith(f"{name}_")]
-    shortest = min(map(".".join, found), key=len, default="")
-    return f" (did you mean {shortest!r}?)" if shortest else ""
+    *parents, name = place
+    below = ((*parents, *path) for path in leaf_paths(schema, parents))
+    for paths in (list(below), list(leaf_paths(schema))):
+        named = [path for path in paths if path[-1] == name]
+        found = named or [path for path in paths if path[-1].startswith(f"{name}_")]
+        if found:
+            return f" (did you mean {min(map('.'.join, found), key=len)!r}?)"
+    return ""

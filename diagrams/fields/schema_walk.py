@@ -71,9 +71,17 @@ def _below(node: Schema, part: str) -> Iterator[Schema]:
         yield from node.get("patternProperties", {}).values()
 
 
-def leaf_paths(schema: Schema) -> Iterator[tuple[str, ...]]:
-    """Paths of all fields, groups included, of lists those of the first element."""
-    yield from _leaf_paths(schema, schema, ())
+def leaf_paths(schema: Schema, place: Sequence[str] = ()) -> Iterator[tuple[str, ...]]:
+    """Paths of all fields, groups included, of lists those of the first element.
+
+    Args:
+        schema: The whole.
+        place: Below which, as of ``at_place``; none: below the top.
+
+    Yields:
+        Each from there.
+    """
+    yield from _leaf_paths(schema, {"properties": at_place(schema, place)}, ())
 
 
 def _leaf_paths(

@@ -1,18 +1,23 @@
 """Pages of the reference, one for each room that docs/api.md names.
 
-In the site each name of that page leads to its docstring.
+In the site each name of that page leads to its docstring, that of a constant to the
+comment ``#:`` above it.
 """
 
 from __future__ import annotations
 
+import ast
 import inspect
 import re
+from collections.abc import Collection, Mapping
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from sphinx.errors import ExtensionError
 from sphinx.ext.napoleon import GoogleDocstring
+from sphinx.pycode import ModuleAnalyzer
 
 __all__ = ["page_of", "setup"]
 
@@ -63,14 +68,66 @@ def _write_pages(_app: Any) -> None:
     homes = _homes()
     for room, names in _rooms().items():
         own = [name for name in names if homes[name] == room]
+        constants = [name for name in own if _is_constant(room, name)]
+        told = [name for name in own if name not in constants]
         lines = [room, "=" * len(room), "", f".. automodule:: {room}"]
-        lines += [f"   :members: {', '.join(own)}", ""] if own else [""]
+        lines += [f"   :members: {', '.join(told)}", ""] if told else [""]
+        for name in constants:
+            lines += _constant(room, name)
         others = [f":py:obj:`{n} <{homes[n]}.{n}>`" for n in names if n not in own]
         if others:
             lines += [f"Exported here as well: {', '.join(others)}.", ""]
         page, text = _PAGES / f"{room}.rst", "\n".join(lines)
         if not page.exists() or page.read_text("utf-8") != text:
             page.write_text(text, "utf-8")
+
+
+def _is_constant(room: str, name: str) -> bool:
+    """Whether a name is of a value, which has no docstring of its own."""
+    value = getattr(import_module(room), name)
+    return not (inspect.isclass(value) or inspect.isroutine(value))
+
+
+def _constant(room: str, name: str) -> list[str]:
+    """What is known of a constant: its value, or what it holds, and its comment.
+
+    Autodoc looks for that comment in the room alone, which imports the constant.
+    """
+    value = getattr(import_module(room), name)
+    lines = [f".. py:data:: {name}", f"   :module: {room}"]
+    if isinstance(value, int | float | str):
+        lines.append(f"   :value: {value!r}")
+    lines += ["", *(f"   {line}" for line in _comment(room, name)), ""]
+    if isinstance(value, Mapping):
+        keys = ", ".join(f"``{key}``" for key in value)
+        lines += [f"   Holds: {keys}.", ""]
+    elif isinstance(value, Collection) and not isinstance(value, str):
+        if all(isinstance(each, str) for each in value):
+            lines += [f"   Holds: {', '.join(f'``{each}``' for each in value)}.", ""]
+        else:
+            kinds = dict.fromkeys(type(each).__name__ for each in value)
+            lines += [f"   Holds {len(value)} of {' and '.join(kinds)}.", ""]
+    return lines
+
+
+def _comment(room: str, name: str) -> list[str]:
+    """The comment ``#:`` above a constant, where the room has it from.
+
+    Raises:
+        ExtensionError: There is none.
+    """
+    code = Path(str(import_module(room).__file__)).read_text("utf-8")
+    homes = {
+        alias.name: node.module
+        for node in ast.walk(ast.parse(code))
+        if isinstance(node, ast.ImportFrom) and node.module
+        for alias in node.names
+    }
+    home = homes.get(name, room)
+    comments = ModuleAnalyzer.for_module(home).find_attr_docs()
+    if not comments.get(("", name)):
+        raise ExtensionError(f"{home}.{name} has no comment '#:' that says what it is")
+    return comments["", name]
 
 
 def _name_blocks(_app: Any) -> None:

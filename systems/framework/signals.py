@@ -26,7 +26,7 @@ TICK_S = 0.025
 #: say another (Han 2019, section 4.1).
 SAMPLE_RATE_HZ = 100_000
 
-#: Samples a channel in a frame of a tick at that rate.
+#: Samples a channel in a frame of ``TICK_S`` at ``SAMPLE_RATE_HZ``.
 FRAME_SAMPLES = round(TICK_S * SAMPLE_RATE_HZ)
 
 

@@ -24,7 +24,7 @@ from systems.laws.trajectory.trajectory_laws import (
 
 __all__ = ["FORCE_LAWS", "LAWS", "law_title"]
 
-#: By name.
+#: The laws that come with the package, by name.
 LAWS: Mapping[str, Law] = {
     law.name: law
     for law in (

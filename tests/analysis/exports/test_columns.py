@@ -32,6 +32,16 @@ IN_WORDS = {
 }
 
 
+#: What the sink tells of each robot; its port has them all in one.
+SINK = {
+    "sink_frames": "number",
+    "sink_function": "number",
+    "sink_value": "number",
+    "sink_age_s": "s",
+    "sink_result": "number",
+}
+
+
 def builds() -> Iterator[Any]:
     """Robots of the library's scenarios, and of every law."""
     chosen: list[tuple[str, dict[str, Any]]] = [
@@ -62,7 +72,7 @@ def declared() -> dict[str, str]:
                     if name in logged:
                         assert units.setdefault(name, unit) == unit
         assert logged <= units.keys()
-    return units
+    return units | SINK
 
 
 def port_units(block: Any, port: str, names: tuple[str, ...]) -> tuple[str, ...]:

@@ -281,3 +281,29 @@ def test_definitions_are_those_of_ros_2_jazzy():
         ours = get_typestore(Stores.EMPTY)
         ours.register(get_types_from_msg(message_definition(name), kind))
         assert ours.hash_rihs01(kind) == jazzy.hash_rihs01(kind), name
+
+
+@pytest.mark.parametrize("name", ["odor_search", "odor_then_sound"])
+def test_what_the_sink_of_a_search_has_heard_goes_along(name: str, tmp_path: Path):
+    """It is no robot's log: every file must have it, and as it was logged."""
+    import pandas as pd
+
+    # A frame every 2 s from each robot, and the first after its gas sensors are warm.
+    run = phonotaxis.simulate(
+        phonotaxis.load_scenario(name, {"duration_s": 20.0}), engine="compiled"
+    )
+    assert run.world
+    parquet = pd.read_parquet(run.to_parquet(tmp_path / "run.parquet"))
+    text = pd.read_csv(run.to_csv(tmp_path / "run.csv"))
+    heard = read_by_mcap(run.to_mcap(tmp_path / "run.mcap"))
+    frames = 0.0
+    for robot in run.robots:
+        for field in ("frames", "function", "value", "age_s", "result"):
+            logged = run.world[f"{robot}.{field}"]
+            column = f"{robot}.sink_{field}" if run.several else f"sink_{field}"
+            assert parquet[column].tolist() == logged.tolist()
+            assert text[column].tolist() == logged.tolist()
+            told = [message.data for _, message in heard[f"/{robot}/sink_{field}"]]
+            assert told == logged.tolist()
+        frames += run.world[f"{robot}.frames"][-1]
+    assert frames > 0.0

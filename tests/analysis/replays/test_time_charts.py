@@ -75,3 +75,40 @@ def test_phases_of_a_search_keep_their_names():
         "3 gradient",
         "4 local",
     ]
+
+
+@pytest.fixture(scope="module")
+def planned_run():
+    """By the guarded law, which the guard slows and turns at times."""
+    overrides = ["law=guarded", "hearing=ideal", "duration_s=8"]
+    return simulate(load_scenario("u_trap", overrides), engine="compiled")
+
+
+def test_what_a_guard_did_is_a_curve_of_its_column(planned_run):
+    """At every tick, however short: a row of the table tells of the tick before it."""
+    charts = {chart.title: chart for chart in time_charts(planned_run, {})}
+    chart = charts["command, by the guard"]
+    did = _series(chart, "what it did")
+    assert did["style"] == "steps"
+    actions = planned_run.columns["guard_action"]
+    assert len(np.unique(actions)) > 1
+    middles = planned_run.time[1:] - 0.5 * planned_run.scenario.tick_s
+    at = np.searchsorted(did["t"], middles) - 1
+    np.testing.assert_array_equal(np.array(did["values"])[at], actions[1:])
+    assert chart.ticks is not None
+    assert dict(chart.ticks) == {
+        0: "passed", 1: "slowed", 2: "turned", 3: "braked", 4: "halted"
+    }  # fmt: skip
+
+
+def test_what_the_law_wanted_stands_beside_what_the_robot_did(planned_run):
+    charts = {chart.title: chart for chart in time_charts(planned_run, {})}
+    for title, column, unit in (
+        ("speed (m/s)", "wanted_speed", 1.0),
+        ("turn rate (deg/s)", "wanted_turn", 180.0 / np.pi),
+    ):
+        wanted = _series(charts[title], "wanted by the law")
+        assert wanted["style"] == "dashes"
+        expected = unit * planned_run.columns[column]
+        found = np.interp(wanted["t"], planned_run.time, expected)
+        np.testing.assert_allclose(wanted["values"], found, atol=1e-3)

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import pytest
 
 from diagrams import InputError, load_scenario
+from diagrams.loading import scenario_from_mapping
 
 
 def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
@@ -28,6 +31,47 @@ def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:
     }.items():
         assert f"did you mean {meant!r}?" in told.pop(field)
     assert not told
+
+
+@pytest.mark.parametrize(
+    ("data", "meant", "instead"),
+    [
+        # What places an obstacle is one point of its way, not the place of an odour.
+        (
+            {"obstacles": [{"position_m": [3, 1]}]},
+            "waypoints_m",
+            {"obstacles": [{"waypoints_m": [[3, 1]]}]},
+        ),
+        (
+            {"source": {"position": [3, 1]}},
+            "waypoints_m",
+            {"source": {"waypoints_m": [[3, 1]]}},
+        ),
+        (
+            {"obstacles": [{"velocity_m_s": 1}]},
+            "speed_m_s",
+            {"obstacles": [{"speed_m_s": 1}]},
+        ),
+        (
+            {"obstacles": [{"dimensions_m": [1, 1]}]},
+            "size_m",
+            {"obstacles": [{"size_m": [1, 1]}]},
+        ),
+        # The robot's own start, not another robot's or the odour's.
+        (
+            {"robots": {"one": {"position_m": [0, 1]}}},
+            "robots.one.start.position_m",
+            {"robots": {"one": {"start": {"position_m": [0, 1]}}}},
+        ),
+    ],
+    ids=str,
+)
+def test_a_field_near_by_is_meant_before_a_far_namesake(
+    data: dict[str, Any], meant: str, instead: dict[str, Any]
+) -> None:
+    with pytest.raises(InputError, match=rf"did you mean '{meant}'\?"):
+        scenario_from_mapping(data)
+    scenario_from_mapping(instead)
 
 
 def test_faults_of_several_fields_are_told_at_once() -> None:

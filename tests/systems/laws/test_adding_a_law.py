@@ -169,8 +169,8 @@ def test_pictures_draw_it_in_a_colour_of_its_own(answers):
     assert answers["lines"] == {
         "conventional": "#D55E00",
         "active 2019": "#0072B2",
-        "conventional 2017": "#E69F00",
-        "active 2017": "#CC79A7",
+        "conventional 2017": "#7A5200",
+        "active 2017": "#A8498A",
     }
 
 

@@ -1,0 +1,208 @@
+"""Words beside bodies in a picture, put where they can be read."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon
+from matplotlib.patheffects import withStroke
+from matplotlib.text import Annotation
+from matplotlib.textpath import TextPath
+from numpy.typing import ArrayLike, NDArray
+
+from analysis.reporting.palette import text_colour
+
+__all__ = ["BodyLabel", "spread_labels"]
+
+_POINTS_PER_INCH = 72.0
+#: From a body to its words, pt, and from which on a line leads to it.
+_GAPS_PT, _LEAD_FROM_PT = (2.0, 8.0, 15.0, 24.0, 34.0, 46.0), 8.0
+#: About a body, the first on the side that is preferred.
+_DIRECTIONS = 16
+#: Free about words, pt.
+_MARGIN_PT = 1.0
+#: What a place costs: words below words (none are put there if it can be helped), a
+#: point of a line below them, a point of distance, a step round the body, and another
+#: body, whose they would seem to be.
+_WORDS, _INK, _FAR, _ROUND, _IN_ANOTHER = 1e4, 1.0, 0.35, 0.6, 8.0
+_Box = tuple[float, float, float, float]
+
+
+class BodyLabel(Annotation):
+    """Words beside a rectangle, at its right until ``spread_labels`` has seen all."""
+
+    def __init__(self, text: str, rectangle: ArrayLike, colour: str) -> None:
+        """Begins on the right of the body.
+
+        Args:
+            text: In one line.
+            rectangle: (5,) x, y, theta, length, width, m and rad.
+            colour: Of the words.
+        """
+        x, y, theta, length, width = map(float, np.asarray(rectangle))
+        unit = math.sin(theta), -math.cos(theta)
+        self.rectangle = x, y, theta, length, width
+        super().__init__(
+            text,
+            (x + 0.5 * width * unit[0], y + 0.5 * width * unit[1]),
+            xytext=(9.0 * unit[0], 7.0 * unit[1]),
+            textcoords="offset points",
+            color=text_colour(colour),
+            fontsize=8,
+            ha="center",
+            va="center",
+            annotation_clip=True,
+            path_effects=[withStroke(linewidth=2.0, foreground="white")],
+            zorder=7,
+        )
+
+    def size_pt(self) -> tuple[float, float]:
+        """Width and height of the words, pt."""
+        size = float(self.get_fontsize())
+        box = TextPath((0.0, 0.0), self.get_text(), size=size).get_extents()
+        return float(box.width) + 2.0 * _MARGIN_PT, size + 2.0 * _MARGIN_PT
+
+
+def spread_labels(axes: Axes) -> None:
+    """Puts all labels where none covers another, and little else, if it can be.
+
+    One that is away from its body is tied to it by a thin line. The limits of the axes
+    must be those of the picture.
+
+    Args:
+        axes: With all that is drawn on them.
+    """
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    scale = _POINTS_PER_INCH / figure.dpi
+    labels = [text for text in axes.texts if isinstance(text, BodyLabel)]
+    edges = np.asarray(axes.bbox.extents) * scale
+    ink = _ink(axes, scale)
+    taken: list[_Box] = _marks(axes, scale)
+    for label in labels:
+        x, y, theta, length, width = label.rectangle
+        middle = axes.transData.transform((x, y)) * scale
+        along = axes.transData.transform((x + 1.0, y))[0] * scale - middle[0]
+        if not _inside((*middle, *middle), edges):
+            continue
+        half = np.array(label.size_pt()) / 2.0
+        best: tuple[float, Any] = (math.inf, None)
+        for turn in range(_DIRECTIONS):
+            # To the right first, then a step to either side, and on to the left.
+            step = (turn + 1) // 2 * (1 if turn % 2 else -1)
+            angle = theta - math.pi / 2.0 + 2.0 * math.pi * step / _DIRECTIONS
+            unit = np.array([math.cos(angle), math.sin(angle)])
+            body = (
+                0.5
+                * along
+                * (
+                    length * abs(math.cos(angle - theta))
+                    + width * abs(math.sin(angle - theta))
+                )
+            )
+            reach = body + float(half @ np.abs(unit))
+            for gap in _GAPS_PT:
+                place = middle + (reach + gap) * unit
+                box = (*(place - half), *(place + half))
+                if not _inside(box, edges):
+                    continue
+                cost = _FAR * gap + _ROUND * abs(step) + _INK * _within(ink, box)
+                cost += _WORDS * sum(_overlap(box, other) > 0.0 for other in taken)
+                at = axes.transData.inverted().transform(place / scale)
+                cost += _IN_ANOTHER * any(
+                    other is not label and _contains(other.rectangle, at)
+                    for other in labels
+                )
+                if cost < best[0]:
+                    best = cost, (place, box, gap, body, unit)
+        if best[1] is None:
+            continue
+        place, box, gap, body, unit = best[1]
+        taken.append(box)
+        label.xy = x, y
+        label.set_position(tuple(place - middle))
+        if gap >= _LEAD_FROM_PT:
+            ends = np.array([middle + body * unit, place - _to_edge(half, unit)])
+            where = axes.transData.inverted().transform(ends / scale)
+            colour = label.get_color()
+            line = Line2D(*where.T, color=colour, lw=0.6, zorder=6.9, gid="leader")
+            axes.add_line(line)
+
+
+def _to_edge(half: NDArray[np.float64], unit: NDArray[np.float64]) -> Any:
+    """From the middle of words to their edge."""
+    return unit * np.min(half / np.maximum(np.abs(unit), 1e-9))
+
+
+def _inside(box: ArrayLike, edges: NDArray[np.float64]) -> bool:
+    low_x, low_y, high_x, high_y = np.asarray(box)
+    return bool(
+        low_x >= edges[0]
+        and low_y >= edges[1]
+        and high_x <= edges[2]
+        and high_y <= edges[3]
+    )
+
+
+def _contains(rectangle: tuple[float, ...], point: NDArray[np.float64]) -> bool:
+    x, y, theta, length, width = rectangle
+    dx, dy = float(point[0]) - x, float(point[1]) - y
+    ahead = dx * math.cos(theta) + dy * math.sin(theta)
+    aside = dy * math.cos(theta) - dx * math.sin(theta)
+    return abs(ahead) < 0.5 * length and abs(aside) < 0.5 * width
+
+
+def _overlap(a: _Box, b: _Box) -> float:
+    width = min(a[2], b[2]) - max(a[0], b[0])
+    height = min(a[3], b[3]) - max(a[1], b[1])
+    return max(width, 0.0) * max(height, 0.0)
+
+
+def _within(points: NDArray[np.float64], box: _Box) -> int:
+    """How many points lie below words."""
+    x, y = points.T
+    inside = (x > box[0]) & (x < box[2]) & (y > box[1]) & (y < box[3])
+    return int(np.count_nonzero(inside))
+
+
+def _ink(axes: Axes, scale: float) -> NDArray[np.float64]:
+    """(n, 2) points of lines and edges of bodies, one a point of length, pt."""
+    found = [np.zeros((0, 2))]
+    for line in axes.get_lines():
+        data = line.get_transform().contains_branch_seperately(axes.transData)
+        xy = np.asarray(line.get_xydata())
+        if all(data) and len(xy):
+            drawn = line.get_linestyle() != "None"
+            found.append(_dots(axes.transData.transform(xy) * scale, drawn=drawn))
+    for patch in axes.patches:
+        if isinstance(patch, Polygon):
+            corners = axes.transData.transform(patch.get_xy()) * scale
+            found.append(_dots(corners, drawn=True))
+    return np.concatenate(found)
+
+
+def _dots(points: NDArray[np.float64], *, drawn: bool) -> NDArray[np.float64]:
+    """Points along a line, one a point of length; of marks alone themselves."""
+    points = points[np.isfinite(points).all(axis=1)]
+    if not drawn or len(points) < 2:
+        return points
+    way = np.r_[0.0, np.cumsum(np.hypot(*np.diff(points, axis=0).T))]
+    at = np.arange(0.0, way[-1] + 1.0)
+    return np.column_stack([np.interp(at, way, points[:, k]) for k in (0, 1)])
+
+
+def _marks(axes: Axes, scale: float) -> list[_Box]:
+    """Large marks, as of a collision: words under them cannot be read."""
+    found = []
+    for line in axes.get_lines():
+        size = float(line.get_markersize())
+        if line.get_linestyle() == "None" and size > 8.0:
+            points = axes.transData.transform(np.asarray(line.get_xydata())) * scale
+            for x, y in points:
+                half = 0.5 * size
+                found.append((x - half, y - half, x + half, y + half))
+    return found
