@@ -10,7 +10,9 @@ import sys
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
+import soundfile
 
 import phonotaxis
 
@@ -57,7 +59,7 @@ def fail(*_args, **_options):
         (["simulate", *SHORT], "diagrams.simulate"),
         (["stability"], "analysis.stability.law_analysis.analyse_law"),
         (["accuracy"], "analysis.hearing.localization.prepare_localization"),
-        (["locate", __file__], "analysis.recordings.locate.locate"),
+        (["locate", "heard.wav"], "analysis.recordings.locate.located"),
         (["scenarios"], "diagrams.library_scenarios"),
         (["compare", "wall"], "analysis.comparison.compare.prepare_comparison"),
     ],
@@ -65,6 +67,8 @@ def fail(*_args, **_options):
 def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
     """One line with kind and place, status 1; --debug prints the traceback."""
     monkeypatch.chdir(tmp_path)
+    noise = np.random.default_rng(1).standard_normal((4_800, 3))
+    soundfile.write("heard.wav", 0.1 * noise, 48_000)
     module, _, function = place.rpartition(".")
     monkeypatch.setattr(import_module(module), function, fail)
     status, printed, complaint = call(capsys, *words)

@@ -17,7 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from analysis.comparison.compare import comparison_plan
+from analysis.comparison.plans import comparison_plan
 from analysis.runs.run_plots import plot_trajectory
 from diagrams import Scenario, load_scenario, simulate
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     )
     from systems.base.driven_path import DrivenPath
     from systems.base.parameters import OdometryParameters, PlantParameters
-    from systems.base.robot import RobotParameters
+    from systems.base.robot import RobotParameters, body_radius, microphones_B
     from systems.base.source_robot import SourceRobot, SourceRobot_
     from systems.base.tyre_grip import grip_accelerations
     from systems.base.wheel_odometry import WheelOdometry, WheelOdometry_, advance_pose
@@ -49,7 +49,9 @@ __all__ = [
     "WheelSpeedCommand",
     "WheelSpeedCommand_",
     "advance_pose",
+    "body_radius",
     "grip_accelerations",
     "hand_position_twist",
+    "microphones_B",
     "plant_derivatives",
 ]

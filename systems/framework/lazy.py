@@ -10,6 +10,7 @@ import sys
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 __all__ = ["lazy_exports"]
@@ -32,6 +33,15 @@ def lazy_exports(package: str) -> tuple[Callable[[str], Any], Callable[[], list[
     for node in ast.walk(ast.parse(Path(str(module.__file__)).read_text("utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module:
             homes |= {alias.name: node.module for alias in node.names}
+
+    class Package(ModuleType):
+        """Where a file has the name of what it exports, that keeps the name."""
+
+        def __setattr__(self, name: str, value: Any) -> None:
+            if not (name in homes and isinstance(value, ModuleType)):
+                super().__setattr__(name, value)
+
+    module.__class__ = Package
 
     def __getattr__(name: str) -> Any:  # noqa: N807  # it becomes the package's
         if name not in homes:

@@ -5,7 +5,6 @@ from typing import TYPE_CHECKING
 from systems.framework.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from systems.base.robot import microphones_B
     from systems.sound.acoustics import AcousticParameters, sound_speed
     from systems.sound.adc import convert
     from systems.sound.array_shape import ArrayShape
@@ -42,7 +41,6 @@ __all__ = [
     "convert",
     "make_emission",
     "make_waveform",
-    "microphones_B",
     "propagate",
     "read_sound",
     "record_frame",
