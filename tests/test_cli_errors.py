@@ -79,7 +79,7 @@ def test_a_bug_is_no_bad_input(capsys, tmp_path, monkeypatch, words, place):
     status, _, complaint = call(capsys, *words, "--debug")
     assert status == 1
     assert "Traceback" in complaint
-    assert list(tmp_path.iterdir()) == []
+    assert [path.name for path in tmp_path.iterdir()] == ["heard.wav"]
 
 
 def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
