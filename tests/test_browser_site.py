@@ -118,12 +118,12 @@ def test_every_name_of_the_list_leads_to_what_it_is(browser: Any) -> None:
     listed.context.close()
 
 
-#: Prose with tables and formulas, a notebook, a long list, and the search.
+#: Prose with tables and formulas, a notebook, a reference, and the search: one of each
+#: kind, for a page of hundreds of links takes a minute.
 REACHED = (
     "index.html",
-    "model.html",
+    "certificates.html",
     "notebooks/first_run.html",
-    "api.html",
     "reference/systems.laws.html",
     "../search.html",
 )
