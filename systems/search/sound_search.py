@@ -143,21 +143,13 @@ def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
 
 
 @register_jitable
-def _holds(state: Any, numbers: SoundSearchNumbers) -> bool:
-    """Whether it stays for the one that goes first, as far as it knows where it is."""
+def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
+    """Listens, or holds for the one that goes first."""
     own = numbers.own
+    state[MOVES] = 0.0
     near = 0.0 < state[_AWAY] < own.hold_within_m
     if own.waits_for > 0 and state[_ARRIVED] < 0.5 and near:
         state[ACTIVITY], state[LEFT] = _HOLDS, numbers.hold
-        return True
-    return False
-
-
-@register_jitable
-def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
-    """Listens, or holds."""
-    state[MOVES] = 0.0
-    if _holds(state, numbers):
         return
     state[ACTIVITY], state[LEFT] = _LISTENS, numbers.listen
     state[FLAG] = _SOUND
@@ -200,8 +192,6 @@ def _decide(
     near = own.stop == "range" and ranged > 0.5 and away < own.radio_gate_m
     if near and distance < own.stop_range_m:
         _end(state, FOUND)
-        return
-    if _holds(state, numbers):
         return
     if state[STEPS] >= own.most_steps:
         _end(state, STEPS_GONE)

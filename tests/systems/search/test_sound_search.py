@@ -151,18 +151,8 @@ def test_the_second_holds_until_the_first_has_reported():
     assert run.go(2, away=1.0, sent=(Frame(2, 16, 1.0),)).phase == 3
 
 
-def test_the_second_holds_as_soon_as_it_finds_itself_near():
-    """A step of 3 s leads 0.4 m on: it does not take one more from within."""
-    run = called(waits_for=2, hold_within_m=1.2).go(38, away=1.5)
-    moved = [row[1] for row in run.log].count(1.0)
-    assert moved == pytest.approx(20, abs=1)
-    run.go(60, away=1.1)
-    assert run.phase == 2
-    assert [row[1] for row in run.log].count(1.0) == pytest.approx(moved, abs=2)
-
-
 def test_it_holds_for_so_long_at_most():
-    run = called(waits_for=2, hold_s=1.0).go(40, away=1.0)
+    run = called(waits_for=2, hold_s=1.0).go(60, away=1.0)
     assert run.phase == 2
     assert run.go(42, away=1.0).phase != 2
 
