@@ -72,6 +72,14 @@ REFUSALS = (
     ("listen", "cut.wav", "--geometry", "list.yaml"),
     ("calibrate", "list.yaml"),
     ("export", "missing", "--csv"),
+    ("columns", "nosuch"),
+    ("simulate", "--movie", "film.avi"),
+    ("simulate", "--movie", "missing/film.mp4"),
+    ("simulate", "--save-audio", "."),
+    ("simulate", "--save-audio", "ears", "--set", "hearing=ideal"),
+    ("compare", "--resume"),
+    ("compare", "--workers", "0"),
+    ("compare", "--out", "."),
 )
 
 

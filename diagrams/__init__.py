@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING
 from systems.framework.lazy import lazy_exports
 
 if TYPE_CHECKING:
-    from diagrams.audio.run_audio import RunAudio, check_audible
+    from diagrams.audio.audible import check_audible
+    from diagrams.audio.run_audio import RunAudio
     from diagrams.builder import SoundFollower, build_sound_follower
     from diagrams.loading import (
         dump_scenario,

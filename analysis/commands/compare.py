@@ -65,7 +65,9 @@ def _prepare(
     options: Namespace, take: Take
 ) -> Job[tuple[dict[str, Comparison], list[Pair]]]:
     from analysis.comparison.plans import comparison_plans
+    from analysis.sweeps.options import check_options
 
+    check_options(options.out, workers=options.workers, resume=options.resume)
     plans = comparison_plans(
         options.scenario,
         laws=options.laws,

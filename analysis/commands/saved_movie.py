@@ -32,7 +32,7 @@ class SavedMovie:
         self, file: str, scenario: Scenario, directory: Path, saved: SavedAudio | None
     ) -> None:
         from analysis.movies import MovieFile
-        from diagrams import check_audible
+        from diagrams.audio.audible import check_audible
         from systems.framework.input_error import InputError
 
         self._shown, self._movie = file, MovieFile(file)

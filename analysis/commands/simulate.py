@@ -63,6 +63,12 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     place, exports = take(options.out), Exports.chosen(options)
     scenario = load_scenario(options.scenario, _settings(options))
     check_files(scenario)
+    saved: SavedAudio | None = None
+    if options.save_audio is not None:
+        saved = SavedAudio(options.save_audio, place.out, scenario)
+    movie: SavedMovie | None = None
+    if options.movie is not None:
+        movie = SavedMovie(options.movie, scenario, place.directory, saved)
     say(f"simulating {scenario.name}")
 
     from analysis.exports.recorded_run import RecordedRun
@@ -71,12 +77,6 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
 
     for note in scenario.notes():
         logging.getLogger("phonotaxis").warning("%s", note)
-    saved: SavedAudio | None = None
-    if options.save_audio is not None:
-        saved = SavedAudio(options.save_audio, place.out, scenario)
-    movie: SavedMovie | None = None
-    if options.movie is not None:
-        movie = SavedMovie(options.movie, scenario, place.directory, saved)
     listening = movie or saved
     follower = None
     if scenario.engine == "compiled":

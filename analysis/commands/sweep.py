@@ -30,8 +30,15 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
+    from analysis.sweeps.options import check_options
     from analysis.sweeps.plan import load_sweep
 
+    check_options(
+        options.out,
+        workers=options.workers,
+        scheduler=options.scheduler,
+        resume=options.resume,
+    )
     plan = load_sweep(options.sweep)
     plan.check()
     say(f"sweeping {options.sweep}")

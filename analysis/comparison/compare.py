@@ -16,9 +16,9 @@ from analysis.comparison.laws_in_pairs import (
 )
 from analysis.reporting.result_directory import ResultDirectory, take_directory
 from analysis.sweeps.one_run import require_runs
+from analysis.sweeps.options import check_options
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
-from systems.framework.input_error import InputError
 
 __all__ = [
     "PreparedComparison",
@@ -97,8 +97,7 @@ def prepare_comparison(
     Raises:
         InputError: Something of that is no good; says what, and the remedy.
     """
-    if resume and out is None:
-        raise InputError("out", "--resume needs the directory to go on with; name it")
+    check_options(out, workers=workers, resume=resume)
     directory = Path(out).expanduser() if out is not None else None
     taken: ResultDirectory | None = None
     if directory is None or not (resume and directory.exists()):

@@ -10,12 +10,12 @@ import re
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, NamedTuple
 
-from diagrams import RunResult
-from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from diagrams import RunResult
 
 __all__ = ["COLUMNS", "Column", "column_of", "columns"]
 
@@ -262,6 +262,8 @@ def columns(of: RunResult | Iterable[str] | None = None) -> pd.DataFrame:
         InputError: A scenario is no run.
     """
     import pandas as pd
+
+    from diagrams import RunResult, Scenario
 
     if isinstance(of, Scenario | str):
         raise InputError("of", "give a run, as simulate returns it, or its columns")

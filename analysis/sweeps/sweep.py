@@ -14,8 +14,8 @@ from pathlib import Path
 
 import pandas as pd
 
-from analysis.reporting.result_directory import check_directory
 from analysis.sweeps.one_run import Outcome, Task
+from analysis.sweeps.options import check_options
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.processes import run_locally
 from analysis.sweeps.store import StoreError, SweepStore, load_results
@@ -91,10 +91,6 @@ class PreparedSweep:
         return "compiled" if self.compiled else "drake"
 
 
-#: Processes, each of some 300 MB.
-MOST_WORKERS = 256
-
-
 def prepare_sweep(
     plan: SweepPlan,
     out: str | Path | None = None,
@@ -118,16 +114,8 @@ def prepare_sweep(
     Raises:
         InputError: Something of that is no good; says what, and the remedy.
     """
-    if workers is not None and not 1 <= workers <= MOST_WORKERS:
-        raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
-    if scheduler is not None and workers is not None:
-        raise InputError("workers", "a cluster has its own; leave out --workers")
-    if resume and out is None:
-        raise InputError("out", "--resume needs the directory to go on with; name it")
+    check_options(out, workers=workers, scheduler=scheduler, resume=resume)
     directory = Path(out).expanduser() if out is not None else None
-    begun = directory is not None and directory.is_dir() and any(directory.iterdir())
-    if directory is not None and not (resume and begun):
-        check_directory(directory)
     points = plan.points()
     compiled = _build_each_kind(plan, points)
     runner: Runner

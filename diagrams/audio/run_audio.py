@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from diagrams.audio.audible import HEARD_BYTES, PLAYED_BYTES, check_audible
 from diagrams.audio.geometry_file import geometry_text
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
@@ -18,20 +19,20 @@ from systems.framework.signals import SAMPLE_RATE_HZ, AudioFrame, Emission
 from systems.hearing.audio_port import check_rate
 from systems.sound.parameters import MicArrayParameters
 from systems.sound.wav_writer import (
-    LARGEST_WAV_BYTES,
     WavWriter,
     loudest_pa,
     pcm_of_counts,
     pcm_of_pressure,
 )
 
-__all__ = ["LISTENING", "RunAudio", "check_audible", "played_in_a_tick"]
+__all__ = [
+    "LISTENING",
+    "RunAudio",
+    "played_in_a_tick",
+]
 
 #: Port by which a block says whether it listens; without one, robots always do.
 LISTENING = "listening"
-
-# Of a sample in a file.
-_HEARD_BYTES, _PLAYED_BYTES = 2, 4
 
 
 def played_in_a_tick(emission: Emission, tick_s: float) -> NDArray[np.float32]:
@@ -47,51 +48,6 @@ def played_in_a_tick(emission: Emission, tick_s: float) -> NDArray[np.float32]:
     now = float(emission.knot_times[-1]) - emission.start_time
     end, count = (round(t * emission.sample_rate_hz) for t in (now, tick_s))
     return emission.samples[end - count : end]
-
-
-def check_audible(scenario: Scenario) -> None:
-    """Refuses a scenario of which there is no sound to save.
-
-    Args:
-        scenario: To be run.
-
-    Raises:
-        InputError: No robot hears sound waves, a rate is no whole number of Hz, or a
-            file would be longer than WAV files can be.
-    """
-    robots = scenario.all_robots
-    listening = [name for name, own in robots.items() if own.listens]
-    if not listening:
-        ideal = any(not own.has_goal for own in robots.values())
-        why = " (hearing is 'ideal')" if ideal else ""
-        remedy = "set hearing=audio" if ideal else "run one that follows a sound"
-        raise InputError(
-            "save_audio",
-            f"no robot hears sound waves{why}; {remedy}, or leave --save-audio out",
-        )
-    _check_size("of loudspeakers", SAMPLE_RATE_HZ * _PLAYED_BYTES, scenario.duration_s)
-    for name in listening:
-        own = robots[name]
-        rate = own.microphones.sample_rate_hz
-        if rate != round(rate):
-            field = f"robots.{name}." if scenario.robots else ""
-            raise InputError(
-                f"{field}microphones.sample_rate_hz",
-                f"{rate} Hz is no whole number, which sound files need; use "
-                f"{round(rate)}, or leave --save-audio out",
-            )
-        a_second = len(own.robot.microphones_m) * rate * _HEARD_BYTES
-        _check_size(f"of {name}", a_second, scenario.duration_s)
-
-
-def _check_size(whose: str, bytes_a_second: float, duration_s: float) -> None:
-    longest = LARGEST_WAV_BYTES / bytes_a_second
-    if duration_s > longest:
-        raise InputError(
-            "duration_s",
-            f"{duration_s:g} s of the sound {whose} are more than the 4 GB that a WAV "
-            f"file can hold; set {int(longest)} or less, or leave --save-audio out",
-        )
 
 
 class _Heard(NamedTuple):
@@ -163,7 +119,7 @@ class RunAudio:
                 channels = len(own.robot.microphones_m)
                 rate = round(own.microphones.sample_rate_hz)
                 recording = f"{prefix}heard.wav"
-                writer = self._writer(recording, channels, rate, _HEARD_BYTES)
+                writer = self._writer(recording, channels, rate, HEARD_BYTES)
                 geometry = f"{prefix}array.yaml"
                 self._heard[name] = _Heard(writer, geometry, own.microphones, channels)
                 text = geometry_text(self.scenario, name, recording)
@@ -173,7 +129,7 @@ class RunAudio:
         for name, sound in sounds.items():
             prefix = f"{name}." if len(sounds) > 1 else ""
             writer = self._writer(
-                f"{prefix}played.wav", 1, SAMPLE_RATE_HZ, _PLAYED_BYTES
+                f"{prefix}played.wav", 1, SAMPLE_RATE_HZ, PLAYED_BYTES
             )
             self._played[name] = _Played(writer, loudest_pa(sound.level_pa))
 

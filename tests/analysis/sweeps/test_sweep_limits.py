@@ -12,8 +12,9 @@ import soundfile
 from analysis.comparison.compare import prepare_comparison
 from analysis.comparison.plans import comparison_plan
 from analysis.run_error import RunError
+from analysis.sweeps.options import MOST_WORKERS
 from analysis.sweeps.plan import MOST_RUNS, SweepPlan
-from analysis.sweeps.sweep import MOST_WORKERS, prepare_sweep
+from analysis.sweeps.sweep import prepare_sweep
 from systems.framework.input_error import InputError
 
 QUICK = {"hearing": "ideal", "duration_s": 0.1}

@@ -1,0 +1,45 @@
+"""Where a sweep's results go, and who does the runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from analysis.reporting.result_directory import check_directory
+from systems.framework.input_error import InputError
+
+__all__ = ["MOST_WORKERS", "check_options"]
+
+#: Processes, each of some 300 MB.
+MOST_WORKERS = 256
+
+
+def check_options(
+    out: str | Path | None,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    resume: bool = False,
+) -> None:
+    """Refuses what no sweep can be run with.
+
+    Args:
+        out: As of ``prepare_sweep``.
+        workers: The same.
+        scheduler: The same.
+        resume: The same.
+
+    Raises:
+        InputError: One of them is no good, or two are not together.
+    """
+    if workers is not None and not 1 <= workers <= MOST_WORKERS:
+        raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
+    if scheduler is not None and workers is not None:
+        raise InputError("workers", "a cluster has its own; leave out --workers")
+    if resume and out is None:
+        raise InputError("out", "--resume needs the directory to go on with; name it")
+    if out is None:
+        return
+    directory = Path(out).expanduser()
+    begun = directory.is_dir() and any(directory.iterdir())
+    if not (resume and begun):
+        check_directory(directory)
