@@ -30,13 +30,6 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
-    from systems.framework.input_files import require_file
-
-    require_file(options.sounds, "sounds", "YAML")
-    if options.geometry:
-        require_file(options.geometry, "geometry", "YAML")
-    say(f"calibrating by {options.sounds}")
-
     from analysis.calibration.calibration_sounds import load_calibration_sounds
     from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
 
@@ -45,6 +38,7 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
         load_geometry(Path(options.geometry)) if options.geometry else ArrayGeometry()
     )
     place = take(options.out) if options.out is not None else None
+    say(f"calibrating by {options.sounds}")
 
     from analysis.calibration.calibrate import calibrate
     from analysis.calibration.calibration_text import (

@@ -63,20 +63,17 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[HeardStream]:
     from systems.framework.input_error import InputError
-    from systems.framework.input_files import require_file
 
     for name in ("rate", "channels"):
         if (value := getattr(options, name)) is not None and value < 1:
             raise InputError(f"--{name}", f"is {value}; give a number above 0")
-    if options.geometry:
-        require_file(options.geometry, "geometry", "YAML")
-    pipe = _pipe(options) if options.device is None else None
 
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
     from analysis.run_error import RunError
 
     given = options.geometry
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
+    pipe = _pipe(options) if options.device is None else None
     stream = _stream(options, pipe, max(geometry.columns) + 1)
 
     from analysis.listening.live_hearing import LiveHearing, listen

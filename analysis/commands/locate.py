@@ -28,12 +28,6 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
-    from systems.framework.input_files import require_file
-
-    require_file(options.recording, "recording", "WAV or FLAC")
-    if options.geometry:
-        require_file(options.geometry, "geometry", "YAML")
-
     from analysis.recordings.array_geometry import ROBOT_ARRAY, load_geometry
     from analysis.recordings.array_match import recorded_samples
 

@@ -57,7 +57,12 @@ def single_faults(
         model.model_validate(data)
     except ValidationError as error:
         found = error.errors(include_url=False)
-        single = [each for each in found if each["type"] != "value_error"]
+        single = [
+            each
+            for each in found
+            # Of a validator of several fields the input is all of them.
+            if each["type"] != "value_error" or not isinstance(each["input"], Mapping)
+        ]
         return [
             fault
             for each in single

@@ -58,20 +58,19 @@ def near_field(schema: Mapping[str, Any], place: Sequence[str]) -> str:
     )
 
 
-def unknown_law(name: str, known: Collection[str], field: str = "") -> InputError:
+def unknown_law(name: str, known: Collection[str]) -> InputError:
     """The error of a law that there is not.
 
     Args:
         name: What was given.
         known: What could be.
-        field: Where; empty: pydantic knows.
 
     Returns:
         The error, to be raised.
     """
     near = did_you_mean(name, known)
     return InputError(
-        field,
+        "",  # the model that has the field knows where it is
         f"{name!r} is not known; use {', '.join(known)}, or file.py:Name{near}",
     )
 
