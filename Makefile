@@ -13,7 +13,7 @@ FIND_GLIB := import ctypes; ctypes.CDLL("libglib-2.0.so.0")
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-fast browser-test lint typecheck docs package bench attack mutate clean
+.PHONY: help demo test test-fast test-long coverage browser-test lint typecheck docs results package bench attack mutate schemas clean
 
 help: ## list the targets
 	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "make %-13s %s\n", $$1, $$2 }' Makefile
@@ -21,39 +21,57 @@ help: ## list the targets
 demo: .venv/.installed ## run the default scenario, with full audio, into results/
 	@$(PY) -m phonotaxis simulate
 
-test: .venv/.installed ## run all tests but those that need a browser
+test: .venv/.installed ## run all tests but the long ones and those that need a browser
 	@$(PYTEST) -n 2 --dist worksteal
 
 test-fast: .venv/.installed ## run the tests that take seconds
-	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser"
+	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser and not long"
+
+test-long: .venv/.installed ## run the checks that take minutes to hours
+	@$(PYTEST) -n 2 --dist worksteal -m long
+
+coverage: .venv/.installed-dev ## measure which lines and branches the fast tests reach
+	@$(PYTEST) -n 2 --dist worksteal -m "not slow and not browser and not long" \
+	  --cov --cov-report=term:skip-covered | tail -n 200
 
 browser-test: .venv/.installed docs ## run the tests that open a page in Chromium
 	@$(PYTEST) -n 2 --dist loadfile -m browser tests/test_browser_*.py
 
-lint: .venv/.installed-dev ## check style and format
+lint: .venv/.installed-dev ## check style, format, docstrings, imports and prose
 	@$(PY) -m ruff check .
 	@$(PY) -m ruff format --check .
+	@.venv/bin/pydoclint -q systems diagrams analysis phonotaxis
+	@.venv/bin/lint-imports
+	@.venv/bin/codespell
+	@$(PY) -m tools.prose
+	@.venv/bin/hadolint Dockerfile
 
 typecheck: .venv/.installed-dev ## check types
 	@$(PY) -m mypy
 
-docs: .venv/.installed-docs ## build the documentation into build/site, notebooks executed, links checked
+docs: .venv/.installed-docs ## build the documentation into build/site, links checked
 	@$(PY) -m sphinx -q -W --keep-going -c docs . build/site
 	@echo "Open build/site/index.html; it needs no network."
+
+results: .venv/.installed ## write the numbers of README and docs from docs/results
+	@$(PY) -m docs.building.result_blocks
 
 package: .venv/.installed-dev ## build the package, and use it where the sources are not
 	@.ci/check_package
 
 bench: .venv/.installed ## measure speed, memory and the time a frame takes to hear
 	@$(PY) -m benchmarks
-	@echo "More: $(PY) -m benchmarks.hearing, .free_field, .peers (minutes each)"
+	@echo "More: $(PY) -m benchmarks.listen, .several_robots, .sweeps (minutes each)"
 
 attack: .venv/.installed ## give the command line thousands of bad inputs
-	@$(PY) -m benchmarks.attack
+	@$(PY) -m tests.fuzz.attack
 
 mutate: .venv/.installed ## make small faults in the code and count those that tests notice
 	@$(PIP_INSTALL) -e '.[mutate]'
-	@$(PY) -m benchmarks.mutants
+	@$(PY) -m tools.mutants
+
+schemas: .venv/.installed ## write the JSON Schemas of scenarios and sweeps anew
+	@$(PY) -m tools.schemas
 
 clean: ## remove the environment, caches and builds; keep results/
 	@rm -rf .venv .venv-newest build dist docs/reference phonotaxis.egg-info

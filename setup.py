@@ -11,7 +11,7 @@ from pathlib import Path
 
 #: A link or a picture of Markdown.
 _LINK = re.compile(r"(!?)\[([^]]*)\]\(([^)\s]+)\)")
-_NOTE = """> Pages that are named here, as `localization.md`, and pictures are in the
+_NOTE = """> Pages that are named here, as `results_hearing.md`, and pictures are in the
 > folder `docs` of the sources.
 """
 

@@ -13,8 +13,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Literal
 
-__all__ = ["Diagnosis", "examine"]
-
 #: A run's files take some MB, compiled code some hundred.
 LEAST_FREE_MB = 500
 #: Packages by the module whose loading shows that they work.
@@ -86,15 +84,12 @@ def _compiled_code() -> Diagnosis:
     from systems.framework.compiling import cache_folder
 
     folder = cache_folder()
-    beside = folder.is_relative_to(_ROOT)
-    folders = _ROOT.glob("*/**/__pycache__") if beside else [folder]
-    files = [file for each in folders for file in each.glob("**/*.nb[ci]")]
+    files = [*folder.glob("**/*.nb[ci]")]
     size_mb = sum(file.stat().st_size for file in files) / 1e6
-    where = f"beside the code in {_ROOT}" if beside else f"in {folder}"
-    found = f"{len(files)} files, {size_mb:.0f} MB, {where}"
+    found = f"{len(files)} files, {size_mb:.0f} MB, in {folder}"
     remedy = "set NUMBA_CACHE_DIR to a folder that can be written"
     if folder.name.startswith("phonotaxis-numba-"):
-        return Diagnosis("compiled code", "note", "is kept by no folder", remedy)
+        return Diagnosis("compiled code", "note", "is not kept in any folder", remedy)
     if not os.access(next(p for p in (folder, *folder.parents) if p.exists()), os.W_OK):
         return Diagnosis("compiled code", "bad", f"{found}, read-only", remedy)
     return Diagnosis("compiled code", "ok", found)
@@ -104,7 +99,7 @@ def _free_disk() -> Diagnosis:
     free_mb = shutil.disk_usage(Path.cwd()).free / 1e6
     found = f"{free_mb / 1e3:.1f} GB free here"
     if not os.access(Path.cwd(), os.W_OK):
-        remedy = "go where files can be written, or use --out"
+        remedy = "change to a directory that can be written, or use --out"
         return Diagnosis("disk", "note", f"{found}, but read-only", remedy)
     if free_mb < LEAST_FREE_MB:
         return Diagnosis("disk", "bad", found, f"make {LEAST_FREE_MB} MB free")
@@ -118,7 +113,7 @@ def _sound_card() -> Diagnosis:
         return Diagnosis(
             "sound card",
             "note",
-            f"cannot be asked ({error})",
+            f"cannot be queried ({error})",
             "phonotaxis listen takes a pipe; for a card: pip install 'phonotaxis[live]'"
             " and PortAudio",
         )
@@ -146,6 +141,6 @@ def _browser() -> Diagnosis:
                 "browser",
                 "note",
                 "none found",
-                "copy replay.html and reports to where one is",
+                "copy replay.html and reports to a computer that has one",
             )
     return Diagnosis("browser", "ok", found)

@@ -10,8 +10,6 @@ from pathlib import Path
 
 from systems.framework.input_error import LONGEST_MESSAGE, shortened
 
-__all__ = ["RunError", "failure_text", "no_exit"]
-
 _ROOT = Path(__file__).resolve().parents[1]
 _OURS = ("systems", "diagrams", "analysis", "phonotaxis")
 
@@ -22,15 +20,20 @@ class RunError(Exception):
 
 @contextlib.contextmanager
 def no_exit() -> Iterator[None]:
-    """Within it, what calls ``sys.exit`` has failed.
+    """Within it, whatever raises something that is no Exception has failed.
 
     Raises:
-        RunError: Something did, a user's law or Drake.
+        RunError: Something did, as ``sys.exit`` in a user's block or in Drake. An
+            interrupt becomes one, too: ``Interrupts.watched`` knows it.
     """
     try:
         yield
-    except SystemExit as error:
-        text = f"the command was ended from within, by {_where(error)}"
+    except Exception:
+        raise
+    except BaseException as error:
+        kind, last = type(error).__name__, traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{_inside(Path(last.filename))}:{last.lineno}"
+        text = f"the command was ended from within, by {kind} in {place}"
         raise RunError(text) from error
 
 
@@ -40,7 +43,10 @@ def failure_text(error: Exception) -> str:
         text = str(error)
     elif isinstance(error, OSError) and error.errno in (errno.ENOSPC, errno.EDQUOT):
         where = f" {error.filename}" if error.filename else ""
-        text = f"cannot write{where} ({error.strerror}); make room, and try again"
+        text = (
+            f"cannot write{where} ({error.strerror}); free space on the disk, and try "
+            "again"
+        )
     else:
         text = f"{type(error).__name__} in {_where(error)}: {error}"
         text = f"{shortened(text, LONGEST_MESSAGE - 60)} (--debug prints the traceback)"

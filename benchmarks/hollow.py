@@ -23,8 +23,6 @@ from diagrams import SoundFollower
 from diagrams.robot import connect_by_name
 from systems.framework.block_facts import block_facts
 
-__all__ = ["hollow_diagram"]
-
 
 class _Hollow(LeafSystem):
     """A block with the ports, states and events of another, and nothing else."""

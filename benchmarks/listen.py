@@ -21,11 +21,12 @@ import threading
 import time
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from analysis.talkers.talker_trials import TALKER_ARRAYS, draw_talkers, record_talkers
-from systems.hearing.voting import vote_plan
+from studies.support.talker_trials import TALKER_ARRAYS, draw_talkers, record_talkers
+from systems.hearing.voting.listening_plan import vote_plan
 from systems.hearing.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
@@ -59,7 +60,7 @@ class Listened:
     sent_s: float = 0.0
     core_s: float = 0.0
     """Time on a processor."""
-    end: dict = field(default_factory=dict)
+    end: dict[str, Any] = field(default_factory=dict)
     """The last line."""
 
 

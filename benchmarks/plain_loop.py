@@ -14,9 +14,15 @@ from numpy.typing import NDArray
 
 from diagrams import Scenario
 from diagrams.robot import block_seed
-from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
+from systems.base.diff_drive_plant import (
+    SCHEMES,
+    PlantNumbers,
+    body_twist,
+    plant_derivatives,
+)
+from systems.base.lagged_motion import advance_pose, lagged_motion
 from systems.base.robot import microphones_B
-from systems.base.wheel_odometry import advance_pose, encoder_angle
+from systems.base.wheel_odometry import encoder_angle
 from systems.base.wheel_speed_command import (
     hand_position_twist,
     integrate_velocity,
@@ -40,8 +46,6 @@ from systems.sound.recorder import record_frame
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M, history_ticks, make_emission
 from systems.sound.waveforms import make_waveform
 from systems.world.geometry import control_point, rotate
-
-__all__ = ["PlainLoop"]
 
 T = TICK_S
 
@@ -81,6 +85,7 @@ class PlainLoop:
         odometry, angles = list(scenario.start.pose), [0.0, 0.0]
         track = self.tracker.start(odometry)
         v_WP: tuple[float, float] = (0.0, 0.0)
+        wheels: tuple[float, float] = (0.0, 0.0)
         fix: SourceFix | None = None
         before: dict[int, list[float]] = {}
         x, y, _ = self.path.pose(0.0)
@@ -90,7 +95,7 @@ class PlainLoop:
         states = [state]
         for tick in range(round(scenario.duration_s / T)):
             time = tick * T
-            odometry, angles = self._odometry(odometry, angles, state[3:5])
+            odometry, angles = self._odometry(odometry, angles, state[3:5], wheels)
             track, target = self._track(track, fix, odometry)
             vectors = self._obstacles(time, tick, state, odometry[2])
             acceleration = self._law(odometry, v_WP, track, target, vectors, before)
@@ -107,11 +112,14 @@ class PlainLoop:
             states.append(state)
         return np.array(states)
 
-    def _odometry(self, pose: Any, angles: Any, true_angles: Any) -> Any:
+    def _odometry(self, pose: Any, angles: Any, true_angles: Any, wheels: Any) -> Any:
         pulses = self.scenario.odometry.pulses_per_revolution
         now = [encoder_angle(angle, pulses) for angle in true_angles]
         steps = (now[0] - angles[0], now[1] - angles[1])
-        return list(advance_pose(pose, steps, self.scenario.robot)), now
+        robot = self.scenario.robot
+        steady = body_twist((T * wheels[0], T * wheels[1]), robot)
+        motion = lagged_motion(T, self.scenario.plant.motor_lag_s)
+        return list(advance_pose(pose, body_twist(steps, robot), steady, motion)), now
 
     def _track(self, track: Track, fix: Any, pose: Any) -> Any:
         if fix is not None:
@@ -185,15 +193,11 @@ class PlainLoop:
         return fix, now
 
     def _drive(self, state: Any, wheels: Any) -> Any:
-        """One third-order Runge-Kutta step, the one that Drake takes."""
+        """The steps of the scenario's integrator, those that Drake takes."""
         numbers = PlantNumbers.of(self.scenario.robot, self.scenario.plant)
-        commanded = np.array(wheels)
-
-        def slope(at: NDArray[np.float64]) -> NDArray[np.float64]:
-            return plant_derivatives(at, commanded, *numbers)
-
-        start = np.array(state)
-        k1 = slope(start)
-        k2 = slope(start + 0.5 * T * k1)
-        k3 = slope(start + T * (2.0 * k2 - k1))
-        return (start + T * (k1 + 4.0 * k2 + k3) / 6.0).tolist()
+        commanded, moved = np.array(wheels), np.array(state)
+        integrator = self.scenario.integrator
+        advance = SCHEMES[integrator.scheme]
+        for _ in range(round(T / integrator.step_s)):
+            advance(moved, integrator.step_s, commanded, plant_derivatives, numbers)
+        return moved.tolist()

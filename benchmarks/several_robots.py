@@ -13,10 +13,8 @@ import argparse
 import sys
 from statistics import median
 
-from benchmarks.figures import Figure, print_figures, stay_on_one_core
 from diagrams import build_sound_follower, load_scenario, simulate
-
-__all__ = ["speed_ratio"]
+from studies.support.figures import Figure, print_figures, stay_on_one_core
 
 
 def speed_ratio(hearing: str, runs: int) -> float:

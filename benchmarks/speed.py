@@ -19,13 +19,6 @@ from diagrams import (
 from diagrams.run_parameters import Engine
 from diagrams.simulation import simulator_config
 
-__all__ = [
-    "compiled_speed",
-    "overhead_of_a_run",
-    "overhead_of_the_diagram",
-    "real_time_factor",
-]
-
 #: Runs of each; the fastest counts, since a machine only ever adds time.
 REPEATS = 3
 

@@ -15,72 +15,12 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
 
-from benchmarks.figures import Figure, print_figures, stay_on_one_core
-
-__all__ = ["BROKEN", "REFUSALS", "start_figures"]
+from studies.support.figures import Figure, print_figures, stay_on_one_core
+from tests.refusals import BROKEN, REFUSALS
 
 #: The fastest counts, since a machine only ever adds time.
 REPEATS = 5
 _PHONOTAXIS = (sys.executable, "-m", "phonotaxis")
-#: Files that refusals are of, by name.
-BROKEN = {
-    "law.py": b"import no_such_module",
-    "cut.wav": b"RIFF\0\0\0\0WAVE",
-    "list.yaml": b"microphones: 3",
-}
-#: Bad input of every kind, of which nothing is loaded that simulates.
-REFUSALS = (
-    ("simulat",),
-    ("simulate", "--laww", "none"),
-    ("simulate", "two_static_obstacle"),
-    ("simulate", "missing.yaml"),
-    ("simulate", "--set", "room.reverberation_time=1", "--set", "seed=x"),
-    ("simulate", "--law", "activ"),
-    ("simulate", "--law", "missing.py:law"),
-    ("simulate", "--sound", "missing.wav"),
-    ("simulate", "--out", "/proc/out"),
-    ("stability", "--law", "activ"),
-    ("design", "--set", "robot.mass_kg=heavy"),
-    ("compare", "no_such"),
-    ("compare", "--laws", "activ"),
-    ("compare", "--runs", "0"),
-    ("sweep", "missing.yaml"),
-    ("locate", "missing.wav"),
-    ("calibrate", "missing.yaml"),
-    ("listen", "missing.wav"),
-    ("accuracy", "--seed", "x"),
-    ("fields", "reverberatoin_time_s"),
-    ("simulate", "--set", "tick_s=0.0333333"),
-    ("simulate", "--set", "start.position_m=[1.9, 0]"),
-    ("simulate", "--set", "room.size_m=[2, 2, 3]"),
-    ("simulate", "u_trap", "--law", "guarded", "--set", "free_space.window_m=2"),
-    ("simulate", "known_u", "--law", "active"),
-    ("simulate", "--law", "law.py:law"),
-    ("simulate", "--sound", "cut.wav"),
-    ("simulate", "--set", "microphones.ego_noise_file=cut.wav"),
-    ("design", "--set", "tick_s=0.0333333"),
-    ("stability", "--robot", "second"),
-    ("stability", "--law", "guarded"),
-    ("stability", "--law", "law.py:law"),
-    ("compare", "--set", "tick_s=0.0333333"),
-    ("compare", "two_static_obstacles", "--grid", "tick_s=[0.025, 0.0333333]"),
-    ("sweep", "list.yaml"),
-    ("accuracy", "--trials", "1"),
-    ("locate", "cut.wav"),
-    ("locate", "cut.wav", "--geometry", "list.yaml"),
-    ("listen", "cut.wav"),
-    ("listen", "cut.wav", "--geometry", "list.yaml"),
-    ("calibrate", "list.yaml"),
-    ("export", "missing", "--csv"),
-    ("columns", "nosuch"),
-    ("simulate", "--movie", "film.avi"),
-    ("simulate", "--movie", "missing/film.mp4"),
-    ("simulate", "--save-audio", "."),
-    ("simulate", "--save-audio", "ears", "--set", "hearing=ideal"),
-    ("compare", "--resume"),
-    ("compare", "--workers", "0"),
-    ("compare", "--out", "."),
-)
 
 
 def start_figures() -> list[Figure]:

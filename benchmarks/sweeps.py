@@ -23,19 +23,10 @@ from numpy.typing import NDArray
 from analysis.sweeps.one_run import Task, run_task
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import run_sweep
-from benchmarks.figures import Figure, print_figures
 from benchmarks.process_tree import tree_usage
 from diagrams import simulate
 from diagrams.run_parameters import Engine
-
-__all__ = [
-    "SweepTrace",
-    "memory_growth_mb",
-    "row_ratio",
-    "run_cost",
-    "speed_up",
-    "trace_sweep",
-]
+from studies.support.figures import Figure, print_figures
 
 ENGINES: tuple[Engine, ...] = ("drake", "compiled")
 

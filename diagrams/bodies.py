@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -12,17 +13,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters, microphones_B
 from systems.world.plane import rotate
-
-__all__ = [
-    "Body",
-    "LivePath",
-    "Path",
-    "RecordedPath",
-    "Surroundings",
-    "microphones_W",
-    "rectangles_at",
-    "robot_rectangle",
-]
 
 
 class Path(Protocol):
@@ -80,6 +70,11 @@ class LivePath:
         """
         x, y, theta = pose
         self._then, self._now = self._now, (time, (x, y, theta))
+
+    @property
+    def step_m(self) -> float:
+        """How far it went from the last tick to this one, m."""
+        return math.dist(self._then[1][:2], self._now[1][:2])
 
     def pose(self, time: float) -> tuple[float, float, float]:
         """(x, y, theta) at a time in s since the last tick, by a straight line."""

@@ -23,8 +23,6 @@ from diagrams.scenario import ODOR, WORLD, Scenario
 from systems import Obstacles
 from systems.framework.input_error import InputError
 
-__all__ = ["SoundFollower", "build_sound_follower"]
-
 
 @dataclass(frozen=True)
 class SoundFollower:
@@ -55,8 +53,8 @@ class SoundFollower:
         if len(self.robots) > 1:
             raise InputError(
                 "robots",
-                f"there are {len(self.robots)}: {', '.join(self.robots)}; ask for one "
-                "by its name (SoundFollower.robots)",
+                f"there are {len(self.robots)}: {', '.join(self.robots)}; select "
+                "a robot by its name (SoundFollower.robots)",
             )
         return next(iter(self.robots.values()))
 

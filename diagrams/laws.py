@@ -26,8 +26,6 @@ from systems.laws.catalogue import LAWS
 from systems.laws.law import Law
 from systems.ranging.collision_vector import SLOTS
 
-__all__ = ["LAWS", "commanded", "make_command", "make_controller"]
-
 #: What a controller may command, each of size 2, and the block that obeys.
 _COMMANDS: dict[str, Callable[..., Any]] = {
     "acceleration_W": WheelSpeedCommand,
@@ -112,8 +110,8 @@ def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
     if not issubclass(law, LeafSystem):
         raise InputError(
             "law",
-            f"{name!r} is a class, but no LeafSystem; write a function "
-            "law(c, s, repulsion), or derive it from a controller of ours",
+            f"{name!r} is a class, but not a LeafSystem; write a function law(c, "
+            "s, repulsion), or derive it from a controller of phonotaxis",
         )
     block = made(name, "law", law, parts)
     commanded(block, name)

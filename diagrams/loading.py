@@ -10,25 +10,15 @@ from typing import TYPE_CHECKING, Any
 
 from pydantic_core import ValidationError
 
-from diagrams.fields import begins_anew, did_you_mean, explain, scenario_schema
-from diagrams.fields.shipped import SCHEMA_FILE
+from diagrams.fields.explain import explain
+from diagrams.fields.joining import begins_anew
+from diagrams.fields.near_miss import did_you_mean
+from diagrams.fields.shipped import SCHEMA_FILE, scenario_schema
 from diagrams.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     from diagrams.scenario import Scenario
-
-__all__ = [
-    "dump_scenario",
-    "library_scenarios",
-    "load_scenario",
-    "parse_setting",
-    "read_mapping",
-    "resolve_sound",
-    "scenario_from_mapping",
-    "set_fields",
-    "write_scenario",
-]
 
 _LIBRARY = Path(__file__).parent / "scenarios"
 
@@ -86,8 +76,8 @@ def _plain(key: str, value: Any) -> Any:
     except (TypeError, ValueError):
         raise InputError(
             key,
-            f"{value!r} is no plain value; give a number, a text, a truth value, or a "
-            "list or mapping of them",
+            f"{value!r} is not a plain value; give a number, a text, a truth "
+            "value, or a list or mapping of them",
         ) from None
 
 
@@ -155,7 +145,7 @@ def read_mapping(path: Path) -> dict[str, Any]:
         return {}
     if not isinstance(data, dict):
         raise InputError(
-            str(path), "must hold a mapping of fields, as 'duration_s: 40'"
+            str(path), "must hold a mapping of fields, for example 'duration_s: 40'"
         )
     return data
 
@@ -196,7 +186,9 @@ def parse_setting(text: str) -> tuple[str, Any]:
     """
     key, equals, value_text = text.partition("=")
     if not equals or not all(key.split(".")):
-        raise InputError(text or "--set", "is not of the form key=value, as seed=2")
+        raise InputError(
+            text or "--set", "is not of the form key=value, for example seed=2"
+        )
     return key, parse_yaml(value_text, key)
 
 

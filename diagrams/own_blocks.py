@@ -12,8 +12,6 @@ from diagrams.own_code import import_own, made
 from systems.framework.block_facts import BlockFacts
 from systems.framework.input_error import InputError
 
-__all__ = ["with_own_blocks"]
-
 
 def with_own_blocks(
     blocks: Mapping[str, Any], names: tuple[str, ...], parts: Mapping[str, Any]
@@ -39,7 +37,8 @@ def with_own_blocks(
         part = block.FACTS.part
         if part in own:
             raise InputError(
-                "blocks", f"{name!r} is a second {part!r}; give each a part of its own"
+                "blocks",
+                f"{name!r} is a second {part!r}; give each block a part of its own",
             )
         own.add(part)
         joined[part] = block
@@ -49,11 +48,13 @@ def with_own_blocks(
 def _own_block(name: str, parts: Mapping[str, Any]) -> Any:
     found = import_own(name, "blocks")
     if not (inspect.isclass(found) and issubclass(found, LeafSystem)):
-        raise InputError("blocks", f"{name!r} is no LeafSystem; derive it from that")
+        raise InputError(
+            "blocks", f"{name!r} is not a LeafSystem; derive it from LeafSystem"
+        )
     if not isinstance(getattr(found, "FACTS", None), BlockFacts):
         raise InputError(
             "blocks",
-            f"{name!r} does not say what it is; give it an attribute FACTS, "
+            f"{name!r} does not state its part; give it an attribute FACTS, "
             "BlockFacts(part, stage)",
         )
     block = made(name, "blocks", found, parts)

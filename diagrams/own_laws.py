@@ -10,11 +10,9 @@ from typing import Any
 import numpy as np
 from pydrake.autodiffutils import AutoDiffXd
 
-from diagrams.own_code import why
+from diagrams.own_code import is_interrupt, why
 from systems.framework.input_error import InputError, shortened
 from systems.laws.repulsion import RepulsionParameters
-
-__all__ = ["checked_law", "try_law"]
 
 
 def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
@@ -33,7 +31,9 @@ def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
     def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
         try:
             force = law(c, s, repulsion)
-        except (Exception, SystemExit) as error:
+        except BaseException as error:  # a user's law raises what it likes
+            if is_interrupt(error):
+                raise
             raise _failed(name, c, s, f"raises {why(error)}") from error
         if isinstance(force, np.ndarray) and force.shape == ():
             force = force.item()

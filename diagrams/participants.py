@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Strict, field_validator, model_validator
 
-from diagrams.fields import unknown_law
+from diagrams.fields.near_miss import unknown_law
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
@@ -40,12 +40,6 @@ from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
 from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
 
-__all__ = [
-    "FollowerParameters",
-    "SourceParameters",
-    "StartParameters",
-]
-
 
 class StartParameters(Parameters):
     """Where the robot starts, at rest."""
@@ -62,7 +56,7 @@ class StartParameters(Parameters):
 
 
 class FollowerParameters(Parameters):
-    """One robot that follows a sound: its law, ears, sensors and body."""
+    """One robot that follows a sound: its law, hearing, sensors and body."""
 
     law: str = Field(default="active", min_length=1)
     """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
@@ -72,8 +66,9 @@ class FollowerParameters(Parameters):
     obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
     """Cones, or exact nearest points."""
     blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
-    """Blocks of a user's own, ``package.module:Name`` or ``path/to/file.py:Name``, that
-    the robot has besides, or in the place of the block of the same part."""
+    """A user's own blocks, ``package.module:Name`` or ``path/to/file.py:Name``, that
+    the robot has in addition to its blocks, or instead of the block with the same
+    part."""
     follows: str = ""
     """Name of the source, or of a robot with a loudspeaker; empty: the first source."""
     loudspeaker: SoundParameters | None = None
@@ -92,12 +87,12 @@ class FollowerParameters(Parameters):
     plant: PlantParameters = PlantParameters()
     odometry: OdometryParameters = OdometryParameters()
     route: RouteParameters | None = None
-    """A goal to drive to on a planned way, in the place of a sound to follow."""
+    """A goal to drive to on a planned route, instead of a sound to follow."""
     objects: ObjectSensorParameters = ObjectSensorParameters()
     detector: ObjectDetectorParameters = ObjectDetectorParameters()
     guard: GuardParameters | None = None
-    """Keeps the robot in space that its sensors have seen free, whatever the law; null:
-    nothing does, unless the law is ``guarded``."""
+    """Keeps the robot in space that its sensors have seen as free, with any law; null:
+    no guard, unless the law is ``guarded``."""
     free_space: FreeSpaceParameters = FreeSpaceParameters()
     search: PlumeSearchParameters = PlumeSearchParameters()
     gas_sensors: GasSensorParameters = GasSensorParameters()
@@ -160,4 +155,5 @@ class SourceParameters(SourceRobotParameters):
     sound: SoundParameters = SoundParameters()
     """What it plays."""
     body: bool = True
-    """Whether it can be hit and seen; off: a loudspeaker in the air."""
+    """Whether it has a body that robots can hit and see; off: a loudspeaker in the
+    air."""

@@ -32,27 +32,10 @@ from systems import (
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
+from systems.framework.step_block import StepBlock
 from systems.laws.impedance import ImpedanceLoop
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
-
-__all__ = [
-    "OUTSIDE",
-    "Parts",
-    "block_seed",
-    "columns_of",
-    "connect_by_name",
-    "make_robot",
-    "make_source",
-    "make_world",
-    "multiplexed",
-    "naming_sounds",
-    "parts_of",
-    "require_published",
-    "robot_blocks",
-    "seed_of",
-    "world_seeds",
-]
 
 #: What a robot takes from the world around it; of emissions, all.
 OUTSIDE = "pose_WS", "poses_WO", "sizes", "emission", "wind", "plume", "air"
@@ -110,6 +93,23 @@ def columns_of(blocks: Mapping[str, Any]) -> dict[tuple[str, str], tuple[str, ..
         for part, block in blocks.items()
         for port, names in _columns(block).items()
     }
+
+
+def publishes_state(block: Any, port: str) -> bool:
+    """Whether an output of a block is part of its state: what its last update made.
+
+    Args:
+        block: Of a robot or the world.
+        port: Name of its output.
+
+    Returns:
+        False where it is made of the present inputs, or moves between ticks.
+    """
+    if isinstance(block, StepBlock) or block.num_continuous_states():
+        return False
+    if not (block.num_discrete_state_groups() or block.num_abstract_states()):
+        return False
+    return not block.HasDirectFeedthrough(block.GetOutputPort(port).get_index())
 
 
 def block_seed(seed: int, name: str) -> int:
@@ -203,6 +203,7 @@ def robot_blocks(
         WheelOdometry(
             robot=scenario.robot,
             odometry=scenario.odometry,
+            plant=scenario.plant,
             initial_pose=scenario.start.pose,
             tick_s=scenario.tick_s,
         ),
@@ -504,8 +505,8 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
             if counts[name] != 1 and (counts[name] or not given):
                 raise InputError(
                     block.get_name(),
-                    f"{counts[name]} blocks publish {name!r}, which it needs; give "
-                    "one block an output port of that name",
+                    f"{counts[name]} blocks publish {name!r}, which it needs; "
+                    "give exactly one block an output port of that name",
                 )
     return outputs
 

@@ -14,13 +14,13 @@ from diagrams.bodies import RecordedPath, Surroundings
 from diagrams.robot import Parts
 from diagrams.run_parameters import Engine
 from diagrams.scenario import ROBOT, Scenario
+from diagrams.scenario_warnings.scenario_warning import ScenarioWarning
+from diagrams.scenario_warnings.warnings_of import warnings_of
 from diagrams.stop_rules import Collision, RobotRules, decisive_robot
 from systems.search.search_ending import SEARCH_REASONS
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["RunResult", "gather_result", "logged_columns"]
 
 
 @dataclass(frozen=True)
@@ -65,6 +65,11 @@ class RunResult:
     def full_scenario(self) -> Scenario:
         """The whole scenario that was run."""
         return self.whole or self.scenario
+
+    @cached_property
+    def warnings(self) -> tuple[ScenarioWarning, ...]:
+        """What a user must know of the whole scenario, although it could be run."""
+        return warnings_of(self.full_scenario)
 
     @property
     def robots(self) -> dict[str, Self]:

@@ -28,11 +28,12 @@ from diagrams.bodies import (
     microphones_W,
     robot_rectangle,
 )
-from diagrams.checks.goal_checks import check_goals, start_note
-from diagrams.checks.guard_checks import check_guard, guard_note
-from diagrams.checks.route_checks import route_notes
+from diagrams.checks.goal_checks import check_goals
+from diagrams.checks.guard_checks import check_guard
 from diagrams.checks.search_checks import check_searches
-from diagrams.fields import explain, joined, scenario_schema, single_faults
+from diagrams.fields.explain import explain, single_faults
+from diagrams.fields.joining import joined
+from diagrams.fields.shipped import scenario_schema
 from diagrams.participants import FollowerParameters, SourceParameters
 from diagrams.run_parameters import RunParameters
 from systems.base.carrier_parameters import SourceRobotParameters
@@ -43,8 +44,6 @@ from systems.laws.catalogue import LAWS
 from systems.sound.parameters import SoundParameters
 from systems.world.paths import WaypointPath
 from systems.world.plane import rectangle_clearance
-
-__all__ = ["GOAL", "ODOR", "ROBOT", "SOURCE", "WORLD", "Scenario"]
 
 #: Names of the robot and of the source where there is one of each.
 ROBOT, SOURCE = "robot", "source"
@@ -61,8 +60,8 @@ _P = TypeVar("_P", bound=Parameters)
 class Scenario(FollowerParameters, RunParameters):
     """One run. Every field has a default: the default scenario is complete.
 
-    What it says of a robot goes for all of them, but for what ``robots`` says
-    of one; so for sources.
+    Its fields of a robot apply to all robots, except where ``robots`` sets them for one
+    robot; the same rule applies to sources.
     """
 
     @cached_property
@@ -176,8 +175,8 @@ class Scenario(FollowerParameters, RunParameters):
             if named:
                 raise InputError(
                     field,
-                    f"has {', '.join(named)}, but {purpose} is of one robot and one "
-                    f"source; leave {field} out",
+                    f"has {', '.join(named)}, but {purpose} needs one robot and "
+                    f"one source; leave {field} out",
                 )
 
     def require_one_rate(self, purpose: str) -> None:
@@ -196,8 +195,8 @@ class Scenario(FollowerParameters, RunParameters):
             if period != self.tick_s:
                 raise InputError(
                     field,
-                    f"is {period:g} s, but {purpose} is of one rate; set it to tick_s, "
-                    f"{self.tick_s:g} s",
+                    f"is {period:g} s, but {purpose} needs one rate; set it to "
+                    f"tick_s, {self.tick_s:g} s",
                 )
 
     def surroundings(
@@ -248,21 +247,6 @@ class Scenario(FollowerParameters, RunParameters):
             if obstacle.known and not obstacle.path().moves
         ]
         return np.reshape(still, (-1, 5))
-
-    def notes(self) -> list[str]:
-        """What a user should know before a run, a line each.
-
-        What guards do not promise, starts within the clearance of a route, and gains
-        beyond what sampling permits.
-        """
-        notes = [
-            guard_note(n, robot, self.surroundings(n).bodies, self.duration_s)
-            for n, robot in self.all_robots.items()
-        ]
-        for prefix, robot in self.robot_fields():
-            notes.append(start_note(prefix, robot, self.mapped()))
-            notes += route_notes(prefix, robot, self.tick_s)
-        return [note for note in notes if note]
 
     @property
     def source_size(self) -> tuple[float, float]:
@@ -355,8 +339,8 @@ class Scenario(FollowerParameters, RunParameters):
                 can = [each for each in played if each != name]
                 raise InputError(
                     field,
-                    f"{target!r} is no source, nor another robot with a loudspeaker; "
-                    f"use {', '.join(can)}",
+                    f"{target!r} is neither a source nor another robot with a "
+                    f"loudspeaker; use {', '.join(can)}",
                 )
             if target in sources and not sources[target].body:
                 raise InputError(
@@ -380,8 +364,9 @@ class Scenario(FollowerParameters, RunParameters):
                 field = f"robots.{name}.loudspeaker" if self.robots else "loudspeaker"
                 raise InputError(
                     field if name in robots else f"sources.{name}",
-                    "nobody hears its sound: no robot follows it, and none has hearing "
-                    "'audio'; let one, or make it an obstacle",
+                    "no robot hears its sound: no robot follows it, and none has "
+                    "hearing 'audio'; let a robot follow it, or make it an "
+                    "obstacle",
                 )
 
     def _check_routes(self) -> None:
@@ -414,8 +399,8 @@ class Scenario(FollowerParameters, RunParameters):
         if not whole(tick * SAMPLE_RATE_HZ):
             raise InputError(
                 "tick_s",
-                f"{tick:g} s is no multiple of {1.0 / SAMPLE_RATE_HZ:g} s, a sample of "
-                "sound; round it",
+                f"{tick:g} s is not a multiple of {1.0 / SAMPLE_RATE_HZ:g} s, "
+                "one sample of sound; round it",
             )
         periods = []
         for prefix, robot in self.robot_fields():
@@ -430,7 +415,7 @@ class Scenario(FollowerParameters, RunParameters):
                 ticks = max(1, round(period / tick))
                 raise InputError(
                     field,
-                    f"{period:g} s is no multiple of tick_s, {tick:g} s; use "
+                    f"{period:g} s is not a multiple of tick_s, {tick:g} s; use "
                     f"{ticks * tick:g}, or another tick_s",
                 )
 
@@ -482,8 +467,8 @@ class Scenario(FollowerParameters, RunParameters):
             if rectangle_clearance(a, b) < 0.0:
                 raise InputError(
                     f"{prefix}start.position_m",
-                    f"robot {second!r} at {robot.start.position_m} stands in robot "
-                    f"{first!r}; move one",
+                    f"robot {second!r} at {robot.start.position_m} overlaps "
+                    f"robot {first!r}; move one of them",
                 )
         still = {o.name: Body(o.path(), o.size_m) for o in self.obstacles}
         fields = [f"obstacles.{k}" for k in range(len(self.obstacles))]
@@ -496,7 +481,7 @@ class Scenario(FollowerParameters, RunParameters):
                 if rectangle_clearance(footprint, body.rectangle(0.0)) < 0.0:
                     raise InputError(
                         field,
-                        f"{name!r} stands on the robot's start at "
+                        f"{name!r} is on the robot's start at "
                         f"{robot.start.position_m}; move its first waypoint or "
                         f"{prefix}start.position_m",
                     )
@@ -515,8 +500,8 @@ def _check_schedule(
     if sound.on_s >= sound.period_s:
         raise InputError(
             field.removesuffix("follows") + "tdoa.schedule_known",
-            f"{target!r} sounds without a pause, so that its schedule tells nothing; "
-            "set it to false",
+            f"{target!r} sounds without a pause, so that its schedule has no "
+            "effect; set it to false",
         )
 
 

@@ -11,8 +11,6 @@ from systems.framework.input_error import InputError
 if TYPE_CHECKING:
     from diagrams.scenario import Scenario
 
-__all__ = ["check_files"]
-
 
 def check_files(scenario: Scenario) -> None:
     """Refuses files that a run could not use, before what simulates is loaded.

@@ -9,6 +9,7 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from diagrams.audio.diagram_audio import DiagramAudio
@@ -16,20 +17,12 @@ from diagrams.audio.run_audio import RunAudio
 from diagrams.builder import SoundFollower, build_sound_follower
 from diagrams.compiled.loop import CompiledLoop, compile_loop
 from diagrams.compiled.loop_blocks import shared_blocks, shared_world
+from diagrams.robot import publishes_state
 from diagrams.run_parameters import Engine
 from diagrams.run_result import RunResult, gather_result, logged_columns
 from diagrams.scenario import WORLD, Scenario
 from diagrams.stop_rules import RunRules, StopRules
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "RunResult",
-    "load_compiled_code",
-    "make_simulator",
-    "prepared_loop",
-    "simulate",
-    "simulator_config",
-]
 
 # Until then a source that sounds from the first instant has been heard and followed.
 _FIRST_TICKS_S = 0.15
@@ -108,18 +101,40 @@ def simulate(
             break
     wall_s = perf_counter() - start
     views.clear()
-    columns = {}
-    for name, parts in follower.robots.items():
-        assert parts.log is not None
-        log = parts.log.FindLog(simulator.get_context())
-        times, rows = np.array(log.sample_times()), np.array(log.data())
-        columns[name] = logged_columns(parts, times, rows)
-    world = {}
-    if follower.world is not None and follower.world.log is not None:
-        log = follower.world.log.FindLog(simulator.get_context())
-        times, rows = np.array(log.sample_times()), np.array(log.data())
-        world = logged_columns(follower.world, times, rows)
+    columns = _logged(follower, simulator)
+    world = columns.pop(WORLD, {})
     return gather_result(scenario, rules.robots, columns, wall_s, world=world)
+
+
+def _logged(
+    follower: SoundFollower, simulator: Simulator
+) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Columns of each robot, and of the world if it has any, when a run has ended.
+
+    Drake logs at an instant before the updates at that instant. What a block publishes
+    of its state is in the row of the next tick, for it changes at ticks alone; so it is
+    moved to the row before, that of the tick at which the block made it.
+    """
+    context = simulator.get_context()
+    every = {**follower.robots}
+    if follower.world is not None:
+        every[WORLD] = follower.world
+    logs = {}
+    for name, parts in every.items():
+        assert parts.log is not None
+        log = parts.log.FindLog(context)
+        logs[name] = np.array(log.sample_times()), np.array(log.data())
+    simulator.AdvancePendingEvents()  # the updates at the last tick
+    for name, parts in every.items():
+        rows, first = logs[name][1], 0
+        for (part, port), columns in parts.logged.items():
+            block, own = parts.blocks[part], rows[first : first + len(columns)]
+            if publishes_state(block, port):
+                own[:, :-1] = own[:, 1:]
+                last = block.GetMyContextFromRoot(context)
+                own[:, -1] = parts.port(part, port).Eval(last)
+            first += len(columns)
+    return {name: logged_columns(every[name], *logs[name]) for name in every}
 
 
 def _monitor(

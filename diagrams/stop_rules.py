@@ -19,29 +19,9 @@ from diagrams.scenario import Scenario
 from systems.world.geometry import (
     control_point,
     control_point_velocity,
+    first_overlap,
     rectangle_clearance,
 )
-
-__all__ = [
-    "BETWEEN_TICKS",
-    "CONTACT",
-    "DIVERGED",
-    "GIVES_UP",
-    "ROUNDING_S",
-    "SEARCH_REPORT",
-    "SUCCESSFUL",
-    "TOUCHED",
-    "UNJUDGED",
-    "Collision",
-    "JudgedTick",
-    "RobotRules",
-    "RunRules",
-    "Seen",
-    "StopRules",
-    "decisive_robot",
-    "judge_search",
-    "judge_tick",
-]
 
 #: Causes of runs that did what they should.
 SUCCESSFUL = ("reached", "completed", "found")
@@ -52,11 +32,9 @@ INTERRUPTED = "interrupted"
 
 #: A rest of exactly ``stop.rest_time_s`` counts: instants of ticks are rounded, s.
 ROUNDING_S = 1e-9
-#: Contacts are looked for between ticks when the last clearance was below this:
-#: more than robot and obstacle cover in a tick.
-NEAR_M = 0.1
-#: Instants looked at between two ticks.
-BETWEEN_TICKS = 5
+#: Parts into which a tick is cut for contacts, and how far a body on a path of its own
+#: may go in one, m: a body that goes farther has its tick cut into more.
+BETWEEN_TICKS, _PART_M = 5, 0.02
 
 #: Port of a law that says when it has found that there is no way, 0 or 1.
 GIVES_UP = "gives_up"
@@ -80,6 +58,17 @@ class Collision:
     come nearer since the last tick; turning counts, a body at rest never is."""
     time: float
     """First contact, s, to a fifth of a tick."""
+
+
+class NearBody(NamedTuple):
+    """A body that a robot can touch."""
+
+    name: str
+    body: Body
+    reach_m: float
+    """With centres farther apart than this they do not touch, m."""
+    step_m: float
+    """The most that it moves in a tick on a path of its own, m; a robot: 0."""
 
 
 def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
@@ -239,6 +228,21 @@ class _View:
         )
 
 
+def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    """Instants at which bodies are looked at.
+
+    Args:
+        times: (n + 1,) of ticks, s.
+        parts: Into which each tick is cut.
+
+    Returns:
+        (n parts + 1,) s, the ticks among them.
+    """
+    shares = np.arange(1, parts + 1) / parts
+    between = times[:-1, None] + shares * np.diff(times)[:, None]
+    return np.concatenate([times[:1], between.ravel()])
+
+
 class RuleNumbers(NamedTuple):
     """What ends a robot's run, but for contacts."""
 
@@ -374,8 +378,9 @@ class JudgedTick(NamedTuple):
     """Of ``judge_tick``."""
     found: int
     """What that has returned, at this tick or before."""
-    touched: bool
-    """Whether a body was touched since the tick before."""
+    touched: tuple[int, float] | None
+    """Number of the first body that was touched since the tick before, and the part of
+    the tick that had passed."""
     ended: float = 0.0
     """Number of the ending of a search."""
 
@@ -409,12 +414,23 @@ class RobotRules:
             self._source_rests,
             {None: 0, "odor": 1, "sound": 2}[scenario.searches],
         )
-        # Farther than this from the robot's centre, a body does not touch it.
-        size = scenario.size
-        self.reach = [
-            (name, body, 0.5 * (math.hypot(*size) + math.hypot(*body.size)) + NEAR_M)
-            for name, body in self.surroundings.bodies.items()
-        ]
+        self.parts, self.near = self._near_bodies()
+
+    def _near_bodies(self) -> tuple[int, list[NearBody]]:
+        """Parts into which ticks are cut, and what the robot can touch."""
+        size, tick_s = self.scenario.size, self.scenario.tick_s
+        times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
+        instants, farthest, near = instants_of(times, BETWEEN_TICKS), 0.0, []
+        for name, body in self.surroundings.bodies.items():
+            step = 0.0
+            if body.path.moves and not isinstance(body.path, LivePath):
+                ways = np.diff(body.path.poses(instants)[:, :2], axis=0)
+                farthest_part = float(np.hypot(*ways.T).max(initial=0.0))
+                step = BETWEEN_TICKS * farthest_part
+                farthest = max(farthest, farthest_part)
+            reach = 0.5 * (math.hypot(*size) + math.hypot(*body.size))
+            near.append(NearBody(name, body, reach, step))
+        return BETWEEN_TICKS * max(1, math.ceil(farthest / _PART_M)), near
 
     def judge(self, time: float, seen: Seen) -> None:
         """Decides at a tick; what has ended stays as it ended.
@@ -425,7 +441,7 @@ class RobotRules:
             time: s.
             seen: What the robot does.
         """
-        places = {name: body.path.pose(time) for name, body, _ in self.reach}
+        places = {name: body.path.pose(time) for name, body, *_ in self.near}
         ended, self._valid = self.cause, seen.valid
         self.collision = None
         if not seen.feels:  # what the bumper feels is no accident
@@ -460,9 +476,11 @@ class RobotRules:
         self._state, self._valid = tick.state, tick.valid
         self._pose, self._time = tick.pose_before, tick.time_before
         self.cause, self.ended = FOUND[tick.found], tick.ended
-        if tick.touched:
-            places = {name: body.path.pose(tick.time) for name, body, _ in self.reach}
-            self.collision = self._find_collision(tick.time, tick.pose, places)
+        if tick.touched is not None:
+            number, part = tick.touched
+            self.collision = self._collide(
+                self.near[number], part, tick.time, tick.pose
+            )
             self.cause = "collision"
 
     def final_cause(self) -> str:
@@ -487,31 +505,35 @@ class RobotRules:
     def _find_collision(
         self, time: float, pose: Sequence[float], places: _Places
     ) -> Collision | None:
-        """First contact since the last tick, looked for between ticks if near."""
-        first = None
-        mine = robot_rectangle(pose, self.scenario.robot)
-        for name, body, reach in self.reach:
-            x, y, theta = places[name]
-            if math.hypot(x - pose[0], y - pose[1]) > reach:
+        """First contact since the last tick."""
+        first = math.inf
+        touched: NearBody | None = None
+        before = pose if self._pose is None else self._pose
+        gone = math.dist(pose[:2], before[:2])
+        for near in self.near:
+            body, step = near.body, near.step_m
+            if isinstance(body.path, LivePath):
+                step = body.path.step_m
+            x, y, _ = places[near.name]
+            if math.hypot(x - pose[0], y - pose[1]) > near.reach_m + gone + step:
                 continue
-            now = np.array([x, y, theta, *body.size])
-            if rectangle_clearance(mine, now) > NEAR_M:  # as of a long wall
-                continue
-            instant = self._first_contact(time, pose, body)
-            if instant is not None and (first is None or instant < first.time):
-                fault = self._fault(instant, time, pose, body)
-                first = Collision(name, fault, instant)
-        return first
+            instants = instants_of(np.array([self._time, time]), self.parts)
+            poses = body.path.poses(instants if time > self._time else instants[:1])
+            size = self.scenario.size
+            part = first_overlap(tuple(before), tuple(pose), size, poses, body.size)
+            if part < first:
+                first, touched = part, near
+        if touched is None:
+            return None
+        return self._collide(touched, first, time, pose)
 
-    def _first_contact(
-        self, time: float, pose: Sequence[float], body: Body
-    ) -> float | None:
-        for part in np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS:
-            instant = self._time + part * (time - self._time)
-            footprint = self._footprint(instant, time, pose)
-            if rectangle_clearance(footprint, body.rectangle(instant)) < 0.0:
-                return float(instant)
-        return None
+    def _collide(
+        self, near: NearBody, part: float, time: float, pose: Sequence[float]
+    ) -> Collision:
+        """The contact with a body when a part of the tick had passed."""
+        instant = self._time + part * (time - self._time)
+        fault = self._fault(instant, time, pose, near.body)
+        return Collision(near.name, fault, instant)
 
     def _fault(
         self, instant: float, time: float, pose: Sequence[float], body: Body

@@ -9,8 +9,6 @@ from diagrams.checks.search_checks import address_of_robot
 from diagrams.scenario import Scenario
 from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
 
-__all__ = ["radio_nodes", "world_blocks"]
-
 
 def radio_nodes(scenario: Scenario) -> dict[str, int]:
     """Robots with a radio, and their addresses.

@@ -18,8 +18,6 @@ from ruamel.yaml.parser import Parser
 
 from systems.framework.input_error import InputError
 
-__all__ = ["LARGEST_BYTES", "dump_yaml", "parse_yaml"]
-
 #: The parser takes some seconds for so much.
 LARGEST_BYTES = 100_000
 DEEPEST = 20
@@ -56,11 +54,13 @@ def parse_yaml(text: str | bytes, field: str) -> Any:
         mark = error.problem_mark
         where = f" in line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         what = error.problem or error.context or "it cannot be parsed"
-        raise InputError(field, f"is not valid YAML{where}: {what}; mend it") from None
+        raise InputError(
+            field, f"is not valid YAML{where}: {what}; correct it"
+        ) from None
     # What the parser's constructors raise for values that are none of their tag,
     # as !!int x, 2024-13-45, !!bool x.
     except (YAMLError, ValueError, ArithmeticError, LookupError, TypeError) as error:
-        text = f"is not valid YAML: {type(error).__name__}: {error}; mend it"
+        text = f"is not valid YAML: {type(error).__name__}: {error}; correct it"
         raise InputError(field, text) from None
 
 
@@ -92,7 +92,7 @@ class _BoundedParser(Parser):
             self._add(*self._open.pop())
         elif isinstance(event, AliasEvent):
             if any(anchor == event.anchor for anchor, _ in self._open):
-                raise InputError("", f"*{event.anchor} stands within itself; mend it")
+                raise InputError("", f"*{event.anchor} contains itself; correct it")
             self._add(None, self._anchors.get(event.anchor, 1))
         elif isinstance(event, ScalarEvent):
             self._add(event.anchor, 1 + len(event.value))
@@ -107,6 +107,6 @@ class _BoundedParser(Parser):
             raise InputError(
                 "",
                 "has aliases (*name) that stand for more than "
-                f"{LARGEST_MEANING:,} characters; write out what is meant",
+                f"{LARGEST_MEANING:,} characters; write the values out",
             )
         self._open[-1] = (around, total + size)

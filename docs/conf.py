@@ -1,16 +1,13 @@
 """How Sphinx makes the site: ``make docs``.
 
 The pages are those of the repository and of docs/ as they are. Made beside them are
-only those of the reference, one for each heading of docs/api.md.
+only those of the reference, one per public package.
 """
 
 from __future__ import annotations
 
-import logging
 import sys
 from pathlib import Path
-
-from jupyter_client import KernelManager
 
 ROOT = Path(__file__).resolve().parents[1]
 sys.path.insert(0, str(ROOT))
@@ -24,29 +21,20 @@ version = release = __version__
 
 root_doc = "docs/index"
 include_patterns = ["README.md", "CHANGELOG.md", "CONTRIBUTING.md", "docs/**"]
-exclude_patterns = [".*", "build", "results", "docs/results", "docs/tables"]
+exclude_patterns = [".*", "build", "results", "docs/results"]
 extensions = [
-    "myst_nb",
+    "myst_parser",
     "sphinx.ext.autodoc",
     "docs.building.navigation",
     "docs.building.markdown_links",
     "docs.building.mathematics",
-    "docs.building.wiring",
     "docs.building.port_tables",
     "docs.building.reference",
 ]
 
 myst_enable_extensions = ["dollarmath"]
 myst_heading_anchors = 4
-myst_fence_as_directive = ["math", "mermaid"]
-
-nb_execution_mode = "force"
-nb_execution_timeout = 120
-nb_execution_raise_on_error = True
-nb_merge_streams = True
-# Kernels talk to nobody else, and say no more than what fails.
-KernelManager.transport_encryption.default_value = "auto"
-logging.getLogger("traitlets").setLevel(logging.WARNING)
+myst_fence_as_directive = ["math"]
 
 # Several classes have a ``range``; Python's own, in signatures, is none of them.
 suppress_warnings = ["ref.python"]

@@ -116,7 +116,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             from analysis.commands.command_line import run_words
 
             words = sys.argv[1:] if arguments is None else arguments
-            return run_words(list(words), interrupts)
+            status = run_words(list(words), interrupts)
+            if arguments is None:
+                # All is written; what a user's module prints at exit is no result.
+                sys.stdout = sys.stderr
+            return status
     except KeyboardInterrupt:
         print("phonotaxis: interrupted; nothing was written", file=sys.stderr)
         return 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -34,7 +35,7 @@ class SweepResult:
 
     plan: SweepPlan
     table: pd.DataFrame
-    """A row a run: its fields, how it ended, metrics (docs/sweeps.md)."""
+    """A row a run: its fields, how it ended, metrics (docs/compare.md)."""
     summary: dict[str, Any]
     """The JSON document of ``phonotaxis sweep``."""
     out: Path
@@ -125,7 +126,7 @@ def sweep(
     """Runs many scenarios, drawn from distributions and grids.
 
     Args:
-        plan: What to run, or the YAML file that says it (docs/sweeps.md).
+        plan: What to run, or the YAML file that says it (docs/compare.md).
         out: A new directory; none: the next number under ``results``.
         workers: Number of local processes; none: one a core.
         scheduler: Address of a Dask scheduler to use instead.
@@ -158,7 +159,7 @@ def sweep(
 
 def compare(
     *scenarios: str | Path,
-    laws: Iterable[str] | None = None,
+    laws: str | Iterable[str] | None = None,
     runs: int = 50,
     seed: int = 1,
     settings: Mapping[str, Any] | None = None,
@@ -173,8 +174,8 @@ def compare(
     Args:
         *scenarios: Library names, YAML files of layouts, or YAML files of
             scenarios; none: the papers' four experiments.
-        laws: What to compare; none: the papers' and no avoidance, or those for
-            routes.
+        laws: What to compare, in one text parted by commas or one by one; none: the
+            papers' and no avoidance, or those for routes.
         runs: Layouts a scenario, each met by every law.
         seed: Of layouts and noise.
         settings: Further fields of the scenarios, by dotted path.
@@ -195,7 +196,7 @@ def compare(
     from analysis.comparison.plans import EXPERIMENTS, comparison_plan
     from analysis.comparison.report import compare_summary, write_comparison
 
-    chosen = None if laws is None else list(laws)
+    chosen = None if laws is None else _names(laws)
     plans = {
         Path(each).stem: comparison_plan(
             str(each),
@@ -208,7 +209,7 @@ def compare(
         for each in scenarios or EXPERIMENTS
     }
     if len(plans) < len(scenarios):
-        raise InputError("scenarios", "one name stands there twice; drop one")
+        raise InputError("scenarios", "a name is listed twice; remove one")
     prepared = prepare_comparison(plans, out, workers=workers, resume=resume)
     comparisons, pooled = prepared.run(progress)
     summary = compare_summary(prepared, comparisons, pooled)
@@ -219,7 +220,7 @@ def compare(
 def stability(
     scenario: Scenario | str | Path = "default",
     *,
-    laws: Iterable[str] = (),
+    laws: str | Iterable[str] = (),
     robot: str | None = None,
     full: bool = False,
     progress: Callable[[str], None] | None = None,
@@ -228,14 +229,15 @@ def stability(
 
     Args:
         scenario: From ``load_scenario``, or a name or file for it.
-        laws: To compare; ``all``: those that avoid obstacles, or drive on a route;
-            none: the scenario's.
+        laws: To compare, in one text parted by commas or one by one; ``all``: those
+            that avoid obstacles, or drive on a route; none: the scenario's.
         robot: Of several robots, the one to analyse, alone; none: the first.
         full: Everything, also what takes minutes.
         progress: Called with the name of each part before it is computed.
 
     Returns:
-        Every part's data, and verdicts.
+        Every part's data, and verdicts. Where other robots are left out, a warning
+        of the logger ``phonotaxis`` names them.
 
     Raises:
         InputError: There is no such law or robot, or it has no linear model.
@@ -248,11 +250,18 @@ def stability(
 
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)
-    alone, _ = chosen_robot(scenario, robot)
-    scenarios = chosen_laws(alone, list(laws))
+    alone, note = chosen_robot(scenario, robot)
+    if note:
+        logging.getLogger("phonotaxis").warning("%s", note)
+    scenarios = chosen_laws(alone, _names(laws))
     for each in scenarios:
         make_controller(each)
     work = parts_for(scenarios, full=full)
     step = progress or (lambda title: None)
     analyses = [analyse_law(each, work, step=step) for each in scenarios]
     return StabilityResult(analyses, stability_document(analyses, None))
+
+
+def _names(laws: str | Iterable[str]) -> list[str]:
+    """A text would be read letter by letter."""
+    return laws.split(",") if isinstance(laws, str) else list(laws)

@@ -267,7 +267,7 @@ def test_what_a_guard_did_is_drawn_and_named(tmp_path: Path, browser: Any) -> No
     assert drawn.startswith("M")
     assert "H" in drawn
     opened.evaluate("replay.seek(1.5)")
-    did = result.columns["guard_action"][round(1.5 / 0.025) + 1]
+    did = result.columns["guard_action"][round(1.5 / 0.025)]
     name = ("passed", "slowed", "turned", "braked", "halted")[round(did)]
     assert chart.locator(".readings").inner_text().endswith(name)
     opened.context.close()

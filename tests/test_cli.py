@@ -269,7 +269,7 @@ simulate = diagrams.simulate
 
 def telling(scenario, *, progress, **others):
     def tell(time_s):
-        print("runs", flush=True)
+        print("runs", file=sys.__stdout__, flush=True)
         progress(time_s)
     return simulate(scenario, progress=tell, **others)
 

@@ -61,5 +61,5 @@ def test_bad_input_is_one_line_and_status_2(capsys, words, field, hint):
 def test_its_old_name_still_does_with_a_notice(capsys):
     assert phonotaxis.main(["localization", "--trials", "0"]) == 2
     said = capsys.readouterr().err.splitlines()
-    assert said[0] == "phonotaxis: the command localization is called accuracy now"
+    assert said[0] == "phonotaxis: the command localization is now called accuracy"
     assert "trials" in said[1]

@@ -98,7 +98,7 @@ def test_an_interrupt_leaves_what_was_heard(tmp_path):
         process.send_signal(signal.SIGINT)
         _, complaint = process.communicate(timeout=60)
     assert process.returncode == 1
-    told = complaint.removeprefix("phonotaxis: interrupted; what was heard until ")
+    told = complaint.removeprefix("phonotaxis: interrupted; the sound until ")
     assert told.endswith(" s is in ears\n")
     frames = soundfile.info(heard).frames
     assert frames == soundfile.info(tmp_path / "ears" / "played.wav").frames

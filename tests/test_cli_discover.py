@@ -11,7 +11,7 @@ import phonotaxis
 from analysis import installation
 from analysis.commands.command_line import COMMANDS, make_parser
 from diagrams import load_scenario
-from diagrams.fields import schema_text
+from diagrams.fields.shipped import schema_text
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:
@@ -65,6 +65,29 @@ def test_near_misses_are_named(capsys, words, meant):
     status, _, complaint = call(capsys, *words)
     assert status == 2
     assert f"did you mean {meant!r}?" in complaint
+
+
+@pytest.mark.parametrize(
+    ("words", "end"),
+    [
+        (["stability", "--laws", "active"], " (did you mean '--law'?)"),
+        (["simulate", "--sed", "3"], " (did you mean '--seed'?)"),
+        (["simulate", "--runs", "10"], " (--runs is an option of compare, falsify)"),
+        (
+            ["design", "--law", "active"],
+            " (--law is an option of simulate, stability)",
+        ),
+        (["simulate", "--obstacles", "3"], "--obstacles"),
+        (["simulate", "--gui"], "--gui"),
+        (["locate", "a.wav", "--array", "x"], "--array x"),
+    ],
+)
+def test_options_are_near_to_those_of_the_same_command(capsys, words, end):
+    status, _, complaint = call(capsys, *words)
+    assert status == 2
+    told = f"{end}; see phonotaxis {words[0]} --help"
+    assert complaint.rstrip().endswith(told)
+    assert "unrecognized arguments: --" in complaint
 
 
 def test_examples_of_the_help_are_commands():

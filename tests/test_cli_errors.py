@@ -29,6 +29,10 @@ def listed(c, s, repulsion): return [1.0]
 def raises(c, s, repulsion): raise KeyError("k" * 1000)
 def leaves(c, s, repulsion): sys.exit(0)
 def late(c, s, repulsion): return math.sqrt(-1.0) if 1.6 < c < 2.9 else 0.0
+def stops(c, s, repulsion): raise KeyboardInterrupt
+class Odd(BaseException): pass
+def odd(c, s, repulsion): raise Odd("odd")
+def late_odd(c, s, repulsion): return odd(c, s, 0) if 1.6 < c < 2.9 else 0.0
 class Plain: pass
 def scaled(k, c, s, repulsion): return k / c
 partial = functools.partial(scaled, 2.0)
@@ -104,7 +108,9 @@ def test_a_value_error_of_the_program_is_a_bug(capsys, tmp_path, monkeypatch):
         ("listed", "returns [1.0]"),
         ("raises", "raises KeyError"),
         ("leaves", "raises SystemExit"),
-        ("Plain", "no LeafSystem"),
+        ("stops", "raises KeyboardInterrupt"),
+        ("odd", "raises Odd: odd"),
+        ("Plain", "not a LeafSystem"),
     ],
 )
 @pytest.mark.parametrize("module", ["five_laws", "./five_laws.py"])
@@ -125,6 +131,9 @@ def test_a_law_that_is_none(capsys, laws, module, name, message):
         ("import sys\nsys.exit(0)", "SystemExit"),
         ("raise RuntimeError('no')", "RuntimeError: no in line 1 of"),
         ("import nothing_of_that_name", "ModuleNotFoundError"),
+        ("raise KeyboardInterrupt", "KeyboardInterrupt in line 1 of"),
+        ("raise GeneratorExit", "GeneratorExit in line 1 of"),
+        ("class Odd(BaseException): pass\nraise Odd('odd')", "Odd: odd in line 2 of"),
     ],
 )
 def test_a_module_that_cannot_be_imported(capsys, laws, text, message):
@@ -137,17 +146,49 @@ def test_a_module_that_cannot_be_imported(capsys, laws, text, message):
         assert message in complaint
 
 
-def test_a_law_that_fails_in_the_run(capsys, laws):
+@pytest.mark.parametrize(
+    ("law", "kind"), [("late", "ValueError"), ("late_odd", "Odd: odd")]
+)
+def test_a_law_that_fails_in_the_run(capsys, laws, law, kind):
     """The trial before the run does not meet every distance."""
     obstacle = 'obstacles=[{"waypoints_m": [[2.3, 0.0]]}]'
     words = ["simulate", *SHORT, "--set", "source.waypoints_m=[[4, 0]]"]
     words += ["--set", "obstacle_sensing=ideal", "--set", obstacle]
-    status, printed, complaint = call(capsys, *words, "--law", "five_laws.py:late")
+    status, printed, complaint = call(capsys, *words, "--law", f"five_laws.py:{law}")
     assert (status, printed) == (1, "")
     assert complaint.count("\n") == 1
-    assert "'five_laws.py:late' raises ValueError" in complaint
+    assert f"'five_laws.py:{law}' raises {kind}" in complaint
     assert " m, s = 0 m/s" in complaint
     assert not (laws / "results").exists()
+
+
+TALKING = """
+import atexit
+print("imported")
+atexit.register(print, "at exit")
+def soft(c, s, repulsion):
+    print("called")
+    return 1.0 / c
+"""
+
+
+@pytest.mark.slow
+def test_what_a_law_prints_goes_to_standard_error(laws):
+    (laws / "talking.py").write_text(TALKING)
+    obstacle = ("--set", 'obstacles=[{"waypoints_m": [[2.4, 0.6]]}]')
+    words = ["simulate", *SHORT, *obstacle, "--no-plots", "--out", "out", "--json"]
+    ended = subprocess.run(
+        [sys.executable, "-m", "phonotaxis", *words, "--law", "talking.py:soft"],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert json.loads(ended.stdout)["law"] == "talking.py:soft"
+    lines = ended.stderr.splitlines()
+    assert lines[0] == "imported"
+    assert lines[-1] == "at exit"
+    assert set(lines[1:-1]) == {"called"}
 
 
 def test_a_partial_is_a_law(capsys, laws):
@@ -177,7 +218,7 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
     said = complaint or json.loads(printed)["error"]["message"]
     assert status == 1
     assert "No space left on device" in said
-    assert "make room" in said
+    assert "free space on the disk" in said
     assert list(tmp_path.iterdir()) == []
 
 
@@ -207,13 +248,105 @@ def test_messages_are_short_whatever_was_in_the_file(capsys, tmp_path):
     assert complaint.rstrip().endswith("valid number")
 
 
+#: A locale whose encoding is ASCII, and no way round it.
+ASCII = {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0"}
+QUICK = f"simulate {' '.join(SHORT)} --no-plots --out out"
+
+
+def shell(
+    folder: Path, words: str, environment: dict[str, str]
+) -> subprocess.CompletedProcess[str]:
+    """What a command does in a shell; ``{}`` in the words stands for the program."""
+    program = f"'{sys.executable}' -m phonotaxis"
+    if "{}" not in words:
+        words = f"{{}} {words}"
+    return subprocess.run(
+        ["/bin/sh", "-c", words.replace("{}", program)],
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("shell", "environment", "status"),
+    ("words", "status", "complaint"),
+    [
+        ("--help >/dev/full", 1, "cannot write (No space left on device)"),
+        ("--version >/dev/full", 1, "cannot write (No space left on device)"),
+        ("scenarios >/dev/full", 1, "standard output cannot be written (No space"),
+        ("columns --json >/dev/full", 1, "standard output cannot be written (No sp"),
+        (f"{QUICK} >/dev/full", 1, "on device); the results are in out"),
+        ("simulat --json >/dev/full", 2, "invalid choice: 'simulat'"),
+        ("simulat >/dev/full 2>/dev/full", 2, ""),
+        ("( sleep 0.5; {} scenarios; echo $? >status ) | true", 1, ""),
+        ("( sleep 0.5; {} --help; echo $? >status ) | true", 1, ""),
+        (f"( {{}} {QUICK} --json; echo $? >status ) | true", 1, ""),
+    ],
+)
+def test_standard_output_that_cannot_be_written(tmp_path, words, status, complaint):
+    """A line at most, and the status of what has happened."""
+    ended = shell(tmp_path, words, {})
+    left = tmp_path / "status"
+    found = int(left.read_text()) if "status" in words else ended.returncode
+    assert (found, ended.stdout) == (status, "")
+    assert complaint in ended.stderr
+    assert ended.stderr.count("\n") == bool(complaint), ended.stderr
+
+
+@pytest.mark.slow
+def test_a_locale_of_ascii(tmp_path):
+    """Drake is loaded, and workers load it, too; what is not ASCII names the remedy."""
+    (tmp_path / "sweep.yaml").write_text(
+        "set: {hearing: ideal, duration_s: 0.05}\nruns: 2\n"
+    )
+    (tmp_path / "sound.yaml").write_text(
+        "sound: {kind: wav, file: \u03bb.wav}\n", encoding="utf-8"
+    )
+    for words in (f"{QUICK} --json", "sweep sweep.yaml --workers 1 --json"):
+        ended = shell(tmp_path, words, ASCII)
+        assert (ended.returncode, ended.stderr) == (0, "")
+        assert json.loads(ended.stdout)["schema_version"] == 1
+    for words in ("simulate \u03bb.yaml", "simulate sound.yaml"):
+        ended = shell(tmp_path, words, ASCII)
+        assert (ended.returncode, ended.stdout) == (2, "")
+        assert ended.stderr.startswith("phonotaxis: locale: ")
+        assert ended.stderr.endswith(
+            "; set PYTHONUTF8=1, or a locale with UTF-8, for example LC_ALL=C.UTF-8\n"
+        )
+        assert ended.stderr.count("\n") == 1
+
+
+def test_a_system_without_utf_8(capsys, monkeypatch):
+    """The remedy is named before anything is loaded."""
+    monkeypatch.setattr(
+        "locale.getpreferredencoding", lambda do_setlocale=True: "ANSI_X3.4-1968"
+    )
+    status, printed, complaint = call(capsys, "simulate", *SHORT)
+    assert (status, printed) == (2, "")
+    assert complaint.startswith("phonotaxis: locale: Drake needs UTF-8, and the encod")
+    assert "PYTHONUTF8=1" in complaint
+
+
+def test_a_working_directory_that_is_not_utf_8(tmp_path, monkeypatch, capsys):
+    """It would stand in the results, in which text is UTF-8."""
+    folder = tmp_path / "\udcff"
+    folder.mkdir()
+    monkeypatch.chdir(folder)
+    status, _, complaint = call(capsys, "simulate", *SHORT)
+    assert status == 2
+    assert complaint.startswith("phonotaxis: out: ")
+    assert list(folder.iterdir()) == []
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("words", "environment", "status"),
     [
         ("simulate nothing 2>&-", {}, 2),
         ("scenarios >&-", {}, 0),
-        ("scenarios >/dev/full", {}, 1),
         (
             "scenarios",
             {"LC_ALL": "C", "PYTHONIOENCODING": "ascii"},
@@ -226,15 +359,8 @@ def test_messages_are_short_whatever_was_in_the_file(capsys, tmp_path):
         ),
     ],
 )
-def test_terminals_and_notebooks(tmp_path, shell, environment, status):
-    process = subprocess.run(
-        ["/bin/sh", "-c", f"'{sys.executable}' -m phonotaxis {shell}"],
-        cwd=tmp_path,
-        env={**os.environ, "PYTHONPATH": str(ROOT), **environment},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+def test_terminals_and_notebooks(tmp_path, words, environment, status):
+    process = shell(tmp_path, words, environment)
     assert process.returncode == status, process.stderr
     assert "Traceback" not in process.stderr
     assert process.stderr.count("\n") <= 1

@@ -66,7 +66,7 @@ def test_a_stream_that_must_not_be_believed_ends_with_status_1(tmp_path, capsys,
     ("words", "complaint"),
     [
         (("none.wav",), "input: cannot read it"),
-        (("raw",), "input: it is no WAV; say what it is, as --rate 48000"),
+        (("raw",), "input: it is not a WAV file; state its format, for example"),
         (("raw", "--rate", "0"), "--rate: is 0; give a number above 0"),
         (("raw", "--rate", "400"), "input: it has a sample rate of 400 Hz; record at"),
         (("raw", "--rate", "16000", "--channels", "2"), "input: it has 2 channels"),

@@ -58,8 +58,10 @@ def test_the_sound_that_is_saved_is_that_of_the_film(tmp_path, capsys):
     ("name", "complaint"),
     [
         ("film.avi", "neither .gif nor .mp4"),
-        ("there.gif", "is there already"),
-        ("nowhere/film.gif", "no directory that can be written"),
+        ("there.gif", "already exists"),
+        ("nowhere/film.gif", "not a directory that can be written"),
+        ("out/film.gif", "is in the directory of the results"),
+        (f"{'x' * 300}.gif", "not a usable path (File name too long)"),
     ],
 )
 def test_bad_names_are_refused_before_the_run(tmp_path, capsys, name, complaint):

@@ -160,7 +160,7 @@ def test_of_several_robots_one_is_analysed_alone(quick, capsys, tmp_path):
         status, printed, complaint = run(capsys, *words)
         assert status == 0
         assert complaint.count("\n") == 1
-        assert f"the report is of robot {['first', 'second'][k]!r} alone" in complaint
+        assert f"the report covers robot {['first', 'second'][k]!r} alone" in complaint
         documents.append(json.loads(printed))
         again = load_scenario(out / "scenario.yaml")
         assert not again.robots
@@ -168,7 +168,8 @@ def test_of_several_robots_one_is_analysed_alone(quick, capsys, tmp_path):
     assert documents[0]["law"] == "trajectory_filtered"
     status, _, complaint = run(capsys, "robots_2", "--robot", "nobody")
     assert status == 2
-    assert complaint == "phonotaxis: robot: 'nobody' is none; use first, second\n"
+    said = "'nobody' is not a robot of the scenario; use first, second"
+    assert complaint == f"phonotaxis: robot: {said}\n"
 
 
 def test_drake_ending_the_analysis_is_one_line(capsys, tmp_path, monkeypatch):

@@ -162,13 +162,16 @@ def running_in(process: int) -> list[Path]:
 
 
 @pytest.mark.slow
-def test_killed_sweep_goes_on_where_it_was(capsys, tmp_path):
+@pytest.mark.parametrize(
+    "after",
+    [17, *(pytest.param(runs, marks=pytest.mark.long) for runs in (1, 66))],
+)
+def test_killed_sweep_goes_on_where_it_was(capsys, tmp_path, after):
     file, out = (
         write(tmp_path / "sweep.yaml", COMPILED + "runs: 60\n"),
         tmp_path / "out",
     )
     process = begin(file, out, "--workers", "2")
-    after = int(np.random.default_rng(time.time_ns()).integers(1, 70))
     wait_for_runs(out, after)
     workers = running_in(process.pid)
     process.kill()
@@ -202,7 +205,8 @@ def test_interrupt_keeps_what_is_done(tmp_path):
     process.send_signal(signal.SIGINT)
     _, complaint = process.communicate(timeout=30)
     assert process.returncode == 1
-    assert len(complaint.splitlines()) == 1
+    # The first line may be that the loop is compiled first.
+    *_, complaint = complaint.splitlines()
     kept = len(pd.read_parquet(out / "runs.parquet"))
     assert kept >= 3
     assert f"interrupted; {kept} of 1000 runs are kept" in complaint

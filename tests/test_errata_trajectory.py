@@ -15,6 +15,7 @@ from systems.laws.trajectory.trajectory_impedance import (
     contact_numbers,
     contacts_of_objects,
     state_matrices,
+    step_is_blocked,
 )
 from systems.routes.grid_search import find_cells
 
@@ -89,20 +90,88 @@ def test_engelbrecht_zone_of_the_text_makes_the_force_jump():
 
 
 def test_engelbrecht_eq_27_is_no_penalty():
-    """lambda (d_sec^2 - d^2) falls ever faster as d grows; a hinge ends at d_sec."""
+    """lambda/2 (d_sec^2 - d^2) falls ever faster as d grows; a hinge ends at d_sec.
+
+    With its factor of 1/2 its slope is the -lambda d that eq. 32 has, and that of the
+    hinge lambda/2 max(0, d_sec - d)^2, which the code uses, is -lambda (d_sec - d).
+    """
+    security, weight = 0.5, 3.0
 
     def printed(distance):
-        return 0.5**2 - distance**2
-
-    slopes = [(printed(d + 1e-6) - printed(d)) / 1e-6 for d in (0.1, 0.5, 2.0)]
-    np.testing.assert_allclose(slopes, [-0.2, -1.0, -4.0], atol=1e-5)
-    assert printed(1.0) < 0.0
+        return 0.5 * weight * (security**2 - distance**2)
 
     def hinge(distance):
-        contact = Contact((-1.0, 0.0), distance, 0.0, (0.0, 0.0), 1.0)
-        return penalty_gradient([contact], 0.5, 1.0)[0]
+        return 0.5 * weight * max(0.0, security - distance) ** 2
 
-    assert [hinge(d) for d in (0.1, 0.4, 0.6)] == pytest.approx([0.4, 0.1, 0.0])
+    def slope(penalty, distance):
+        return (penalty(distance + 1e-6) - penalty(distance - 1e-6)) / 2e-6
+
+    distances = (0.1, 0.4, 0.6, 2.0)
+    np.testing.assert_allclose(
+        [slope(printed, d) for d in distances],
+        [-weight * d for d in distances],
+        atol=1e-8,
+    )
+    assert printed(1.0) < 0.0
+    for distance in distances:
+        # The object is ahead along x, so that the distance falls as P moves on.
+        contact = Contact((-1.0, 0.0), distance, 0.0, (0.0, 0.0), 1.0)
+        along_x = penalty_gradient([contact], security, weight)[0]
+        assert along_x == pytest.approx(-slope(hinge, distance), abs=1e-8)
+
+
+def before_a_wall(allows, lag_s):
+    """Largest and last x of a robot whose target passes a wall at 1 m and returns.
+
+    A plain loop that shares nothing with the blocks: target at 0.15 m/s to 3 m and
+    back, virtual mass of 1 kg, gains of the paper, motors of a first-order lag.
+    """
+    tick_s, place, speed, wanted, farthest = 0.025, 0.0, 0.0, 0.0, 0.0
+    decay = math.exp(-tick_s / lag_s) if lag_s else 0.0
+    for tick in range(2400):
+        time = tick * tick_s
+        out = min(0.15 * time, 3.0)
+        target = out if time < 30.0 else max(3.0 - 0.15 * (time - 30.0), 0.0)
+        acceleration = K * (target - place) - D * wanted
+        if place < 1.0:
+            acceleration -= K * place  # K_e (S - d), S = 1 m and d = 1 m - place
+        after = wanted + tick_s * min(max(acceleration, -2.5), 2.5)
+        after = min(max(after, -0.22), 0.22)
+        wanted = after if allows(1.0 - place, tick_s * after) else 0.0
+        place += tick_s * wanted + (speed - wanted) * lag_s * (1.0 - decay)
+        speed = wanted + (speed - wanted) * decay
+        farthest = max(farthest, place)
+    return farthest, place
+
+
+def test_engelbrecht_eq_6_holds_for_ever_what_has_momentum():
+    """A robot that coasts into L_block takes no step that ends outside of it again.
+
+    As printed, a new position needs d > L_block. Without momentum that stops the robot
+    before L_block and lets it go when its target returns. With motors of 50 ms it
+    coasts 3.3 mm farther, and stays there. A step that leads away is allowed here.
+    """
+    block = 0.2
+
+    def printed(distance, step):
+        return distance - step > block
+
+    def ours(distance, step):
+        objects = np.zeros(64)
+        objects[:6] = 1.0, distance, 0.0, 0.0, 0.0, 1.0
+        return not step_is_blocked(objects, (step, 0.0), block)
+
+    assert before_a_wall(lambda *_: True, 0.05)[0] > 2.5
+    for allows in (printed, ours):
+        farthest, last = before_a_wall(allows, 0.0)
+        assert 0.79 < farthest < 0.8
+        assert last == pytest.approx(0.0, abs=0.01)
+    farthest, last = before_a_wall(printed, 0.05)
+    assert farthest == last == pytest.approx(0.8033, abs=1e-3)
+    farthest, last = before_a_wall(ours, 0.05)
+    # No farther than it coasts from top speed.
+    assert 0.8 < farthest < 0.8 + 0.22 * 0.05
+    assert last == pytest.approx(0.0, abs=0.01)
 
 
 def test_engelbrecht_sec_1_a_star_is_up_to_8_percent_long():

@@ -9,8 +9,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import phonotaxis
-from benchmarks.start import BROKEN, REFUSALS
+from tests.refusals import BROKEN, REFUSALS
 
 ROOT = Path(phonotaxis.__file__).parent
 HEAVY = {"pydrake", "numba", "scipy", "pandas", "matplotlib", "control", "dask"}
@@ -95,3 +97,43 @@ def test_no_plots_and_the_last_line(tmp_path, monkeypatch, capsys):
     last = capsys.readouterr().out.splitlines()[-1].split()
     assert last[:3] == ["replay", "out/replay.html,", "to"]
     assert (tmp_path / "out/replay.html").is_file()
+
+
+def test_help_of_every_command_loads_nothing_else(tmp_path):
+    code = """
+import contextlib, io, sys
+import phonotaxis
+from analysis.commands.command_line import COMMANDS
+for words in ([], *([name] for name in COMMANDS)):
+    with contextlib.suppress(SystemExit), contextlib.redirect_stdout(io.StringIO()):
+        phonotaxis.main([*words, "--help"])
+print(*COMMANDS, *(name.partition(".")[0] for name in sys.modules))
+"""
+    loaded = printed_by(code)
+    assert {"simulate", "laws", "analysis"} <= loaded
+    assert not {"systems", "diagrams", "numpy", "pydrake", "pydantic"} & loaded
+
+
+@pytest.mark.parametrize("package", ["systems", "diagrams"])
+def test_blocks_load_no_plotting(package):
+    """Nor python-control, pydrake.all, and what scipy imports for a second."""
+    code = (
+        f"import sys, {package}; [getattr({package}, name) for name in dir({package})];"
+        "print(*sys.modules)"
+    )
+    loaded = printed_by(code)
+    assert f"{package}.world" in loaded or f"{package}.builder" in loaded
+    slow = {"matplotlib", "control", "pydrake.all", "scipy.signal", "scipy.stats"}
+    assert not slow & loaded
+
+
+def printed_by(code):
+    """Words that a new process prints."""
+    ran = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=ROOT.parent,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return set(ran.stdout.split())

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import csv
+import html
+import json
+import re
 import runpy
 import subprocess
 import sys
 import tomllib
-from dataclasses import fields
+from dataclasses import asdict, fields
 from importlib.metadata import version
 from pathlib import Path
 
@@ -81,7 +84,7 @@ def test_settings_may_be_a_mapping():
         "default", ["source.speed_m_s=0.2", "obstacles.0.size_m=[0.2, 0.1]"]
     )
     assert named == listed
-    with pytest.raises(phonotaxis.InputError, match=r"seed: .* is no plain value"):
+    with pytest.raises(phonotaxis.InputError, match=r"seed: .* is not a plain value"):
         phonotaxis.load_scenario("default", {"seed": np.int64(3)})
     with pytest.raises(phonotaxis.InputError, match="give a list of key=value"):
         phonotaxis.load_scenario("default", "hearing=ideal")
@@ -117,6 +120,41 @@ def test_a_run_is_saved_whole_and_once(run: phonotaxis.RunResult, tmp_path: Path
     }
     with pytest.raises(phonotaxis.InputError, match="is not empty"):
         run.save(out)
+
+
+#: A body that is slow in the first layout and faster than a guard reckons with next.
+CART = {"name": "cart", "size_m": [0.5, 0.5], "waypoints_m": [[5, -2], [5, 2]]}
+WARNED = {"hearing": "ideal", "duration_s": 1.0, "guard": {"obstacle_speed_m_s": 0.6}}
+FIELD = "guard.obstacle_speed_m_s"
+MESSAGE = (
+    "the guard's assumption A1 does not hold: greatest speed of a corner of 'cart' is "
+    "0.9 m/s, above 0.6 m/s (docs/guard.md)"
+)
+
+
+def shown(page: Path) -> str:
+    """A page as it is read."""
+    return re.sub("<.*?>", "", html.unescape(page.read_text("utf-8")))
+
+
+def test_warnings_are_in_all_that_a_run_gives(tmp_path: Path):
+    settings = {
+        **WARNED, "obstacles": [CART | {"speed_m_s": 2.0, "acceleration_m_s2": 0.9}]
+    }  # fmt: skip
+    run = phonotaxis.simulate(phonotaxis.load_scenario("obstacle_free", settings))
+    told = [{"field": FIELD, "message": MESSAGE}]
+    assert [asdict(each) for each in run.warnings] == told
+    assert run.summary()["warnings"] == told
+    out = run.save(tmp_path / "run")
+    assert json.loads((out / "summary.json").read_text("utf-8"))["warnings"] == told
+    for name in ("report.html", "replay.html"):
+        assert f"{FIELD}: {MESSAGE}" in shown(out / name)
+
+
+def test_a_run_without_warnings_has_none(run: phonotaxis.RunResult, tmp_path: Path):
+    assert run.warnings == ()
+    assert run.summary()["warnings"] == []
+    assert "Warning" not in shown(run.save(tmp_path / "run") / "report.html")
 
 
 def test_pictures_are_asked_for_by_name(run: phonotaxis.RunResult):
@@ -155,6 +193,58 @@ def test_a_sweep_gives_table_and_page(tmp_path: Path):
     assert (found.out / "report.html").is_file()
 
 
+def test_a_sweep_counts_the_runs_with_warnings(tmp_path: Path):
+    """Of two cells with two runs each one is too fast, in the terminal on one line."""
+    plan = phonotaxis.SweepPlan(
+        scenario="obstacle_free",
+        set={**WARNED, "obstacles": [CART | {"acceleration_m_s2": 0.9}]},
+        grid={"obstacles.0.speed_m_s": (0.3, 2.0)},
+        runs=2,
+    )
+    found = phonotaxis.sweep(plan, tmp_path / "sweep", workers=1)
+    told = [[], [{"field": FIELD, "message": MESSAGE}]]
+    assert [json.loads(x) for x in found.table["warnings"]] == 2 * told
+    counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
+    assert found.summary["warnings"] == counted
+    assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
+    line = f"Warning in 2 of 4 runs: {FIELD}: {MESSAGE}"
+    assert str(found).splitlines()[-1] == line
+    page = shown(found.out / "report.html")
+    assert line in page
+    assert "with warnings" in page
+
+
+def test_a_comparison_counts_the_runs_with_warnings(tmp_path: Path):
+    """Under the laws that have a guard."""
+    body = CART | {"speed_m_s": 2.0, "acceleration_m_s2": 0.9}
+    found = phonotaxis.compare(
+        "obstacle_free",
+        laws="none,guarded",
+        runs=2,
+        settings={"hearing": "ideal", "duration_s": 1.0, "obstacles": [body]},
+        out=tmp_path / "laws",
+        workers=1,
+    )
+    counted = [{"field": FIELD, "runs": 2, "message": MESSAGE}]
+    assert [cell["warnings"] for cell in found.summary["cells"]] == [[], counted]
+    line = f"Warning in 2 of 2 runs of guarded: {FIELD}: {MESSAGE}"
+    assert line in str(found).splitlines()
+    assert line in shown(found.out / "report.html")
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"laws": "magic"}, r"'magic' is not known"),
+        ({"laws": "active,active"}, r'"active" is listed twice'),
+        ({"grid": {"hearing": "ideal"}}, "grid.hearing: is 'ideal'; give a list"),
+    ],
+)
+def test_a_text_is_not_read_letter_by_letter(options, message, tmp_path: Path):
+    with pytest.raises(phonotaxis.InputError, match=message):
+        phonotaxis.compare("wall", **options, out=tmp_path / "out")
+
+
 def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
     found = phonotaxis.compare(
         "two_static_obstacles",
@@ -169,7 +259,7 @@ def test_a_comparison_gives_rates_and_pairs(tmp_path: Path):
     assert (comparison.pairs[0].first, comparison.pairs[0].second) == ("none", "active")
     assert "success %" in str(found)
     assert (found.out / "summary.json").is_file()
-    with pytest.raises(phonotaxis.InputError, match="stands there twice"):
+    with pytest.raises(phonotaxis.InputError, match="is listed twice"):
         phonotaxis.compare("wall", "wall", out=tmp_path / "twice")
 
 
@@ -181,11 +271,32 @@ def test_stability_gives_findings_and_a_page(
         report_parts, "parts_for", lambda _, full: report_parts.parts(full=full)[:2]
     )
     told: list[str] = []
+    for laws, names in (
+        ("all", ["conventional", "active", "conventional2017", "active2017"]),
+        ("conventional,active", ["conventional", "active"]),
+        ("active", ["active"]),
+        (("active",), ["active"]),
+    ):
+        by_name = phonotaxis.stability("obstacle_free", laws=laws)
+        assert [each.law for each in by_name.analyses] == names
     found = phonotaxis.stability("obstacle_free", progress=told.append)
     assert repr(found) == "<StabilityResult obstacle_free: active>"
     assert len(told) == 2
     assert len(found.analyses[0].findings) == 2
     assert (found.save(tmp_path / "report") / "report.html").is_file()
+
+
+def test_stability_warns_that_other_robots_are_left_out(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+):
+    """As the command does."""
+    monkeypatch.setattr(report_parts, "parts_for", lambda _, full: [])
+    phonotaxis.stability("robots_2")
+    phonotaxis.stability("robots_2", robot="second")
+    phonotaxis.stability("unknown_block")
+    first, second = (record.getMessage() for record in caplog.records)
+    assert first.startswith("the report covers robot 'first' alone, without second; ")
+    assert second == "the report covers robot 'second' alone, without first"
 
 
 def test_locate_takes_samples_and_files_alike(tmp_path: Path):
@@ -215,7 +326,7 @@ NOISE = np.random.default_rng(3).standard_normal((3, 9600))
 @pytest.mark.parametrize(
     ("samples", "options", "message"),
     [
-        (NOISE, {}, "sample_rate_hz: is not said"),
+        (NOISE, {}, "sample_rate_hz: is missing"),
         (NOISE, {"sample_rate_hz": 44_100.5}, "whole number of Hz"),
         (NOISE, {"sample_rate_hz": float("nan")}, "whole number of Hz"),
         (NOISE.T, {"sample_rate_hz": 48_000}, "transpose"),
@@ -225,7 +336,7 @@ NOISE = np.random.default_rng(3).standard_normal((3, 9600))
         (NOISE * np.nan, {"sample_rate_hz": 48_000}, "not finite"),
         ([["a"] * 9], {"sample_rate_hz": 48_000}, "holds no numbers"),
         (NOISE, {"sample_rate_hz": 48_000, "geometry": [[0.0]]}, "geometry: micro"),
-        (NOISE, {"sample_rate_hz": 48_000, "geometry": [1.0, 2.0]}, "list of places"),
+        (NOISE, {"sample_rate_hz": 48_000, "geometry": [1.0, 2.0]}, "of positions"),
         ("a.wav", {"sample_rate_hz": 48_000}, "a file has its own"),
     ],
 )

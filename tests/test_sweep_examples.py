@@ -1,4 +1,4 @@
-"""docs/sweeps.md shows what works."""
+"""docs/compare.md shows what works."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ import pytest
 from ruamel.yaml import YAML
 
 import phonotaxis
-from analysis.sweeps.plan import SweepPlan, load_sweep
+from analysis.sweeps.plan import load_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
-PAGE = (ROOT / "docs" / "sweeps.md").read_text("utf-8")
+PAGE = (ROOT / "docs" / "compare.md").read_text("utf-8")
 EXAMPLE = ROOT / "docs" / "examples" / "crossing.yaml"
 
 
@@ -28,12 +28,6 @@ def test_the_example_is_the_file():
     assert len(load_sweep(EXAMPLE).points()) == 240
 
 
-def test_the_table_of_fields_is_that_of_the_plan():
-    table = PAGE.partition("## The file")[2].partition("\n\nFields")[0]
-    named = re.findall(r"(?m)^\| `(\w+)` \|", table)
-    assert named == [name for name in SweepPlan.model_fields if name != "folder"]
-
-
 @pytest.mark.slow
 def test_the_commands_and_the_script_run(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -42,7 +36,6 @@ def test_the_commands_and_the_script_run(tmp_path, monkeypatch, capsys):
     text = EXAMPLE.read_text("utf-8").replace("runs: 40", "runs: 1")
     example.write_text(text.replace("hearing: ideal", "hearing: ideal, duration_s: 1"))
     commands = blocks("sh")[0].splitlines()
-    assert len(commands) == 2
     for command in commands:
         program, *words = shlex.split(command)
         assert program == "phonotaxis"

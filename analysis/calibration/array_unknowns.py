@@ -12,8 +12,6 @@ from analysis.calibration.wave_fronts import WaveFront, wave_front
 from systems.framework.input_error import InputError
 from systems.sound.array_budget import ArrayBudget
 
-__all__ = ["ArrayUnknowns"]
-
 # Directions with less than this share of the largest variance are known exactly.
 _EXACT = 1e-14
 
@@ -55,8 +53,8 @@ class ArrayUnknowns:
         if not any(columns):
             raise InputError(
                 "position_std_m",
-                "is 0, and so is all else that is not known; state how uncertain the "
-                "geometry is, as 'position_std_m: 0.02'",
+                "is 0, as are all other uncertainties; state how uncertain the "
+                "geometry is, for example 'position_std_m: 0.02'",
             )
         scale = np.zeros((sum(rows), sum(columns)))
         row = column = 0

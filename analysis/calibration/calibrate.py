@@ -28,8 +28,6 @@ from analysis.recordings.recording_search import Sighting
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-__all__ = ["CalibrationRun", "calibrate", "calibration_run"]
-
 # A wave whose length is less than so many deviations of the microphones' places may
 # be taken for the one before or after it.
 _DEVIATIONS_A_PERIOD = 5.0
@@ -108,13 +106,13 @@ def _listened(
         found, said = _sightings(sounds, k, known, top_hz)
         remarks += [f"{name}: {remark}" for remark in said]
         if not found:
-            remarks.append(f"{name}: nothing is heard, and it is left out")
+            remarks.append(f"{name}: it has no detectable sound, and it is left out")
             continue
         sound = heard_sound(found, known.known.shape, known.c)
         if 2 * sound.used <= sound.stretches:
             remarks.append(
                 f"{name}: of {sound.stretches} stretches {sound.used} agree; its "
-                "source moves, or there are others"
+                "source moves, or there are other sources"
             )
         place = listed.position_m
         heard.append(sound)
@@ -130,8 +128,8 @@ def _listened(
     if not measured:
         raise InputError(
             "sounds",
-            "nothing is heard in any recording; record single loud sounds in quiet, "
-            "and check the positions of the microphones (in m)",
+            "no recording has a detectable sound; record single loud sounds in a "
+            "quiet place, and check the positions of the microphones (in m)",
         )
     return measured, geometry, heard, remarks
 

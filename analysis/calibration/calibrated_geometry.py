@@ -15,8 +15,6 @@ from diagrams.yaml_text import LARGEST_BYTES, dump_yaml
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["calibrated_fields", "write_calibration"]
-
 _Side = Literal["ahead", "behind", "above", "below"]
 
 # Fields that the calibration replaces.

@@ -21,8 +21,6 @@ from systems.hearing.multilateration import whitening_matrix
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["Calibration", "Fit", "calibrate_array", "place_weight"]
-
 _STEPS = 200
 _FIRST_DAMPING, _LEAST_DAMPING, _MOST_DAMPING = 1e-4, 1e-12, 1e9
 _SETTLED = 1e-5  # of the sum of squares, relative to it and to a single delay

@@ -13,8 +13,6 @@ from scipy.stats import chi2
 from analysis.calibration.calibration import Calibration, Fit, place_weight
 from analysis.calibration.wave_fronts import wave_front
 
-__all__ = ["CalibrationMisfit", "calibration_misfit"]
-
 # A chi-square that chance exceeds less often does not fit.
 _CHANCE = 1e-3
 

@@ -7,13 +7,11 @@ from typing import Annotated
 
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from diagrams.fields import explain
+from diagrams.fields.explain import explain
 from diagrams.loading import read_mapping
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Time
-
-__all__ = ["CalibrationSound", "CalibrationSounds", "load_calibration_sounds"]
 
 _MOST_SOUNDS = 500
 
@@ -41,7 +39,7 @@ class CalibrationSound(Parameters):
         if self.to_s is not None and self.to_s <= self.from_s:
             raise InputError(
                 "to_s",
-                f"is {self.to_s:g}, not after from_s of {self.from_s:g}; mend it",
+                f"is {self.to_s:g}, not after from_s of {self.from_s:g}; raise it",
             )
         return self
 
@@ -76,8 +74,9 @@ def load_calibration_sounds(path: str | Path) -> CalibrationSounds:
     if not data.get("sounds"):
         raise InputError(
             "sounds",
-            f"{str(path)!r} lists none; write for instance 'sounds: [{{recording: "
-            "a.wav, position_m: [2, 1, 0.5]}]', one for each place",
+            f"{str(path)!r} lists no sounds; write for example 'sounds: "
+            f"[{{recording: a.wav, position_m: [2, 1, 0.5]}}]', one entry for each "
+            "place",
         )
     try:
         return CalibrationSounds.model_validate({"folder": str(path.parent), **data})

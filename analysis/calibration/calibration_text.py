@@ -13,8 +13,6 @@ from analysis.calibration.calibrated_geometry import calibrated_fields
 from analysis.calibration.observability import CalibrationGain, gain_ratios
 from analysis.reporting.plain_values import plain
 
-__all__ = ["calibration_document", "calibration_text"]
-
 # Independent directions that a document lists.
 _MOST_DIRECTIONS = 32
 
@@ -26,13 +24,13 @@ _UNITS = {
 }
 
 _NOTHING = (
-    "nothing gained: the array is known no better than before. A sound at an unknown "
-    "place has {delays} delays for {unknowns} unknowns of its own; give position_m of "
+    "no gain: the array is not known better than before. A sound at an unknown place "
+    "has {delays} delays for {unknowns} unknowns of its own; give position_m of "
     "sounds at known places"
 )
 _NOTHING_KNOWN = (
-    "nothing gained: the array is known no better than before. The positions and "
-    "delays of the sounds are less certain than the array; measure them better"
+    "no gain: the array is not known better than before. The positions and delays of "
+    "the sounds are less certain than the array; measure them better"
 )
 
 
@@ -51,7 +49,7 @@ def calibration_text(run: CalibrationRun) -> str:
         lines += [f"{verdict}: {_gain_text(run, gain)}" for gain in told]
     lines.append(_fit_text(run))
     if not calibration.settled and not run.gains_nothing:
-        lines.append("the search did not come to an end: doubt these numbers")
+        lines.append("the search did not converge: do not rely on these numbers")
     if not run.gains_nothing:
         lines += ["", f"speed of sound {calibration.c:.2f} m/s", *_places(run)]
     return "\n".join([*lines, "", *_sounds(run)])
@@ -106,22 +104,22 @@ def _fit_text(run: CalibrationRun) -> str:
         return f"{text}: sounds and geometry agree"
     name = f"{misfit.kind} {misfit.index + 1}"
     remedy = {
-        "sound": "check its position_m and that nothing else is heard in it",
+        "sound": "check its position_m, and that its recording has no other sound",
         "microphone": "check its place, or state a larger position_std_m for it",
-        "channel": "check that it is sampled with the others, or raise delay_std_s",
+        "channel": "check that all channels are sampled at once, or raise delay_std_s",
     }[misfit.kind]
     if misfit.kind == "sound":
         name = calibration.sounds[misfit.index].name or name
     without = f"{misfit.chi_square:.0f} of {misfit.freedom}"
     if not misfit.explains:
         return (
-            f"{text}: sounds and geometry DO NOT AGREE; {name} is most to blame, but "
-            f"without it {without} is left: {remedy}, the order of channels, and all "
+            f"{text}: sounds and geometry DO NOT AGREE; {name} fits worst, but "
+            f"without it {without} remains: {remedy}, the order of channels, and all "
             "standard deviations"
         )
     return (
-        f"{text}: sounds and geometry DO NOT AGREE; without {name} they do, {without}: "
-        f"{remedy}"
+        f"{text}: sounds and geometry DO NOT AGREE; without {name} they agree, "
+        f"{without}: {remedy}"
     )
 
 

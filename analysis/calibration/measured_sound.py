@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-__all__ = ["MeasuredSound", "check_position", "check_sounds"]
-
 # Of a microphone: the wave front is then no longer that of a point.
 _NEAREST_M = 0.05
 _FARTHEST_M = 1000.0
@@ -48,7 +46,10 @@ def check_sounds(
             coordinates than the array, or a position is at a microphone or far out.
     """
     if not sounds:
-        raise InputError(field, "are none; give at least one, made at a known position")
+        raise InputError(
+            field,
+            "are empty; give at least one sound that was made at a known position",
+        )
     for k, sound in enumerate(sounds):
         where = f"{field}.{k}"
         if sound.tau.shape != (len(places) - 1,):

@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from analysis.calibration.calibration import Calibration
 
-__all__ = ["CalibrationGain", "calibration_gains", "gain_ratios", "gains_nothing"]
-
 # Posterior over prior deviation: below the first observable, above the second not.
 _OBSERVABLE, _NOT = 0.5, 0.9
 

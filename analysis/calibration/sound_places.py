@@ -14,8 +14,6 @@ from systems.hearing.multilateration import locate_source
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["SoundPlace"]
-
 # An unknown source is rarely nearer than this share of the aperture: so weak that
 # it tells nothing, yet it keeps a range that cannot be heard from running away.
 _NEAREST_APERTURES = 0.1

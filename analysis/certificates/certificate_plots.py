@@ -23,15 +23,6 @@ from analysis.nonlinear.velocity_passivity import EnergyBalance
 from analysis.reporting.palette import COLOURS
 from systems.world.geometry import rectangle_corners
 
-__all__ = [
-    "draw_bodies",
-    "plot_certificate_trials",
-    "plot_disturbance_bounds",
-    "plot_energy_balance",
-    "plot_energy_certificate",
-    "plot_sos_region",
-]
-
 
 def draw_bodies(axes: Axes, model: PointMass) -> None:
     """Obstacles, the source's body, the follow distance and P at the start.

@@ -12,8 +12,6 @@ from analysis.certificates.energy_certificate import EnergyCertificate
 from analysis.models.point_mass import PointMassRuns
 from systems.framework.input_error import InputError
 
-__all__ = ["BATCH", "CertificateTrials", "draw_starts", "try_certificate"]
-
 #: Starts drawn at a time: the first batch depends on the seed alone.
 BATCH = 20_000
 #: Batches at most: where hardly any start lies outside, not all that were asked

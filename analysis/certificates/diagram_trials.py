@@ -32,8 +32,6 @@ from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, rectangle_clearance, rotate
 
-__all__ = ["DiagramTrials", "try_diagram"]
-
 
 @dataclass(frozen=True, eq=False)
 class DiagramTrials:
@@ -130,8 +128,8 @@ def _certified_starts(
     if len(kept) < count:
         raise InputError(
             "starts",
-            f"only {len(kept)} of {BATCH} random starts are certified and "
-            f"clear of all bodies; ask for fewer than {count}",
+            f"only {len(kept)} of {BATCH} random starts are certified and clear of "
+            f"all bodies; use fewer than {count} starts",
         )
     return np.array(kept), np.array(poses), skipped
 

@@ -31,15 +31,6 @@ from analysis.nonlinear.velocity_passivity import velocity_term_passivity
 from diagrams import Scenario
 from systems.world.geometry import beyond_each
 
-__all__ = [
-    "DisturbanceBounds",
-    "ObstacleBound",
-    "SourceBound",
-    "disturbance_bounds",
-    "encounter_contact_time",
-    "source_bound",
-]
-
 #: Speeds of the tables, m/s.
 SPEEDS_M_S = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6)
 #: Step and length of the simulated runs, s.

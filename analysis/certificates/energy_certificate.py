@@ -28,6 +28,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.ndimage import binary_propagation
 
 from analysis.certificates.escape_levels import border_cells, cell_bounds, climb
+from analysis.models.ideal_scenarios import moving_bodies
 from analysis.models.point_mass import PointMass, VelocityTermModel, point_mass
 from analysis.nonlinear.velocity_passivity import (
     VelocityTermPassivity,
@@ -35,8 +36,6 @@ from analysis.nonlinear.velocity_passivity import (
 )
 from diagrams import Scenario
 from systems.framework.input_error import InputError
-
-__all__ = ["EnergyCertificate", "certify_energy"]
 
 #: Floor round start, source and obstacles that is looked at, m.
 MARGIN_M = 1.5
@@ -127,8 +126,10 @@ class EnergyCertificate:
         return on_grid & free & slow & safe.all(axis=0)
 
     @property
-    def start_certified(self) -> bool:
-        """Whether the scenario's own start is."""
+    def start_certified(self) -> bool | None:
+        """Whether the scenario's own start is; None where bodies move."""
+        if moving_bodies(self.scenario):
+            return None
         return bool(self.certified([[*self.model.p_WP, 0.0, 0.0]])[0])
 
     def to_dict(self) -> dict[str, Any]:
@@ -232,8 +233,8 @@ def _check(model: PointMass, cell_m: float, contact_m: float) -> None:
     if model.law.forces_n.min() < -1e-9:
         raise InputError(
             "law",
-            f"{model.law.name!r} pulls towards obstacles somewhere; the bounds of "
-            "its energy need a force that is never negative at rest",
+            f"{model.law.name!r} pulls toward obstacles at some distances; the "
+            "bounds of its energy need a force that is never negative at rest",
         )
 
 

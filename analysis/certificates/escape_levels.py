@@ -10,12 +10,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from analysis.models.point_mass import PointMass
-
-__all__ = ["border_cells", "cell_bounds", "climb"]
+from systems.framework.compiling import njit
 
 
 def cell_bounds(

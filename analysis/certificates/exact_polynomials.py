@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from fractions import Fraction
 
-__all__ = ["Polynomial", "gram_polynomial", "is_positive_definite", "match_gram"]
-
 #: Exponents of the variables.
 Exponents = tuple[int, ...]
 

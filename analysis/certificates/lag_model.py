@@ -20,8 +20,6 @@ from analysis.certificates.exact_polynomials import Exponents, Polynomial
 from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
 
-__all__ = ["LagModel", "lag_model"]
-
 #: Degree of h, and how far it may be off, as a share of h(0).
 _DEGREE, _TOLERANCE = 4, 0.01
 #: Farthest that the domain reaches beyond the equilibrium, m.

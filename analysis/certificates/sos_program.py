@@ -20,8 +20,7 @@ from pydrake.solvers import (
     MathematicalProgramResult,
     SolverInterface,
 )
-from pydrake.symbolic import Expression, Monomial
-from pydrake.symbolic import Polynomial as SymbolicPolynomial
+from pydrake.symbolic import Expression, Monomial, Polynomial as SymbolicPolynomial
 from scipy.linalg import solve_continuous_lyapunov
 
 from analysis.certificates.exact_polynomials import (
@@ -33,17 +32,6 @@ from analysis.certificates.exact_polynomials import (
 )
 from analysis.certificates.lag_model import LagModel
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "Feasibility",
-    "box",
-    "feasibility",
-    "find_multipliers",
-    "first_region",
-    "is_proved",
-    "larger_region",
-    "solve",
-]
 
 #: The first region is the largest of the linear model's, shrunk by the least of
 #: these that has multipliers.

@@ -39,8 +39,6 @@ from analysis.certificates.sos_program import (
 from analysis.nonlinear.phase_portrait import certified_speeds, head_on_model
 from diagrams import Scenario
 
-__all__ = ["SosRegion", "sos_region"]
-
 #: Rounds of finding P and multipliers in turn.
 _ROUNDS = 6
 

@@ -14,12 +14,14 @@ if TYPE_CHECKING:
 
     from analysis.hearing.localization import LocalizationCell
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "--trials", metavar="N", type=int, default=100, help="measurements a cell (100)"
+        "--trials",
+        metavar="N",
+        type=int,
+        default=100,
+        help="measurements per cell (100)",
     )
     parser.add_argument("--seed", metavar="N", help="seed of all random numbers")
     parser.add_argument(
@@ -39,7 +41,7 @@ def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
     overrides = [] if options.seed is None else [f"seed={options.seed}"]
     load_scenario("default", overrides)
     check_trials(options.trials)
-    say("measuring how well sounds are located")
+    say("measuring how well the robot locates sounds")
 
     from analysis.hearing.localization import prepare_localization
     from analysis.hearing.localization_report import (
@@ -68,7 +70,8 @@ def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
 
 COMMAND = Command(
     "accuracy",
-    "how well the robot hears: the papers' tables, ours, and the bound",
+    "measure how well the robot locates sounds, against the papers' tables and the "
+    "bound",
     _add_arguments,
     _prepare,
     examples=(

@@ -5,17 +5,6 @@ from __future__ import annotations
 from argparse import ArgumentParser, Namespace
 from typing import Any
 
-__all__ = [
-    "LAW_HELP",
-    "LAW_WORDS",
-    "SCENARIO_WORDS",
-    "completed_by",
-    "overrides",
-    "take_json",
-    "take_output",
-    "take_scenario",
-]
-
 #: The names stand in ``phonotaxis laws`` alone: to load them takes seconds.
 LAW_HELP = "a name (phonotaxis laws lists them), or package.module:Name"
 
@@ -60,20 +49,20 @@ def take_scenario(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--velocity-term",
         metavar="TERM",
-        help="printed (|dC/dt|) or closing (the speed of approach alone)",
+        help="printed (|dC/dt|) or closing (the speed of approach only)",
     )
     parser.add_argument(
         "--guard",
         choices=("on", "off"),
-        help="keep the robot in space that its sensors have seen free",
+        help="keep the robot in space that its sensors have seen as free",
     )
     parser.add_argument(
         "--set",
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="set any field (phonotaxis fields lists them), as source.speed_m_s=0.2; "
-        "may be repeated",
+        help="set any field (phonotaxis fields lists them), for example "
+        "source.speed_m_s=0.2; may be repeated",
     )
 
 

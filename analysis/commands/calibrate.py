@@ -13,15 +13,15 @@ from analysis.commands.first_words import say
 if TYPE_CHECKING:
     from analysis.calibration.calibrate import CalibrationRun
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
-        "sounds", metavar="SOUNDS.yaml", help="recordings, and where their sources are"
+        "sounds",
+        metavar="SOUNDS.yaml",
+        help="recordings, and the positions of their sources",
     )
     parser.add_argument(
-        "--geometry", metavar="FILE.yaml", help="places of the microphones as stated"
+        "--geometry", metavar="FILE.yaml", help="stated positions of the microphones"
     )
     parser.add_argument(
         "--out", metavar="DIR", help="directory for array.yaml and calibration.json"
@@ -69,7 +69,7 @@ def _prepare(options: Namespace, take: Take) -> Job[CalibrationRun]:
 
 COMMAND = Command(
     "calibrate",
-    "places of microphones from sounds at known places",
+    "positions of microphones from sounds at known positions",
     _add_arguments,
     _prepare,
     examples=("calibrate sounds.yaml --out results/calibrated",),

@@ -5,15 +5,13 @@ from __future__ import annotations
 import json
 import sys
 from argparse import Namespace
-from contextlib import ExitStack, nullcontext
+from contextlib import AbstractContextManager, ExitStack, nullcontext, redirect_stdout
 from functools import partial
 from typing import Any
 
 from analysis.commands.command import Command, Job, Place
 from analysis.commands.interrupts import Interrupts
 from analysis.commands.progress import Progress
-
-__all__ = ["carry_out"]
 
 
 def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> None:
@@ -35,7 +33,8 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
             # Loads most of the libraries, so that it has to be watched.
             from analysis.run_error import RunError, no_exit
 
-            with no_exit():
+            # Only the result goes to standard output, not what a user's code prints.
+            with no_exit(), _output_of(command):
                 job = command.prepare(options, partial(_take, stack, interrupts))
                 found, summary = _run(job, interrupts)
     except KeyboardInterrupt:
@@ -55,12 +54,16 @@ def carry_out(command: Command, options: Namespace, interrupts: Interrupts) -> N
     job.demand(found)
 
 
+def _output_of(command: Command) -> AbstractContextManager[Any]:
+    return nullcontext() if command.prints else redirect_stdout(sys.stderr)
+
+
 def _left(job: Job[Any]) -> str:
     """What an interrupt leaves behind, in words."""
     if job.kept is None:
         return job.left()
     return (
-        f"{job.kept()} of {job.total} runs are kept: go on with --out {job.out} "
+        f"{job.kept()} of {job.total} runs are kept: continue with --out {job.out} "
         "--resume"
     )
 
@@ -87,9 +90,19 @@ def _print(job: Job[Any], found: Any, summary: Any, *, as_json: bool) -> None:
     for remark in job.remarks(found):
         print(f"phonotaxis: {remark}", file=sys.stderr)
     if as_json:
-        print(json.dumps(summary, allow_nan=False))
+        text = json.dumps(summary, allow_nan=False)
     else:
-        print(job.text(found, summary))
+        text = job.text(found, summary)
         if job.out is not None:
-            print(job.where.format(out=job.out))
-    sys.stdout.flush()
+            text += f"\n{job.where.format(out=job.out)}"
+    try:
+        print(text, flush=True)
+    except BrokenPipeError:
+        raise
+    except OSError as error:
+        from analysis.run_error import RunError
+
+        where = f"; the results are in {job.out}" if job.out is not None else ""
+        raise RunError(
+            f"standard output cannot be written ({error.strerror}){where}"
+        ) from error

@@ -10,8 +10,6 @@ from typing import Any, Generic, TypeVar
 
 from analysis.commands.progress import Progress
 
-__all__ = ["Command", "Job", "Place", "Take"]
-
 Found = TypeVar("Found")
 
 
@@ -72,5 +70,7 @@ class Command:
     """Loads and checks the input."""
     examples: tuple[str, ...] = ()
     """Words after the program's name, for the help."""
+    prints: bool = False
+    """Whether its run prints on standard output; it runs no code of a user's then."""
     was: str = ""
     """A name that it had, by which it still can be called."""

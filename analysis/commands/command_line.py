@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import argparse
 import json
+import locale
 import logging
 import os
 import re
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import MappingProxyType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from analysis.commands import (
     accuracy,
     calibrate,
     compare,
     design,
+    falsify,
     listen,
     locate,
     simulate,
@@ -31,9 +34,9 @@ from analysis.commands.discovery import completion, doctor, fields, laws, scenar
 from analysis.commands.exporting import columns, export
 from analysis.commands.interrupts import Interrupts
 
-__all__ = ["BAD_INPUT", "COMMANDS", "MOST_FAULTS", "make_parser", "run_words"]
-
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+#: Locales with UTF-8, of which a system has at least one.
+_UTF_8_LOCALES = ("C.UTF-8", "UTF-8", "en_US.UTF-8")
 #: So many faults of one input are told.
 MOST_FAULTS = 20
 #: By name, in the order of the help.
@@ -52,6 +55,7 @@ COMMANDS: dict[str, Command] = {
         stability,
         sweep,
         design,
+        falsify,
         export,
         columns,
         doctor,
@@ -67,24 +71,46 @@ class _UsageError(Exception):
 class _Parser(argparse.ArgumentParser):
     """One that raises what is wrong, and names what may have been meant."""
 
-    def error(self, message: str) -> NoReturn:
-        raise _UsageError(f"{message}{self._hint(message)}; see {self.prog} --help")
-
-    def _hint(self, message: str) -> str:
-        command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
-        option = re.search(r"unrecognized arguments:.*?(--[\w-]+)", message)
-        if not command and not option:
-            return ""
-        from diagrams.fields import did_you_mean
-
-        if command:
-            return did_you_mean(command[1], COMMANDS)
-        assert option is not None
-        helps = [self.format_help(), *(p.format_help() for p in self.below.values())]
-        return did_you_mean(option[1], re.findall(r"--[\w-]+", " ".join(helps)))
+    def print_help(self, file: Any = None) -> None:
+        # That of argparse says nothing when standard output cannot be written.
+        (file or sys.stdout).write(self.format_help())
 
     #: Parsers of the subcommands, by name.
     below: Mapping[str, argparse.ArgumentParser] = MappingProxyType({})
+
+    def error(self, message: str) -> NoReturn:
+        command = re.match(r"argument COMMAND: invalid choice: '(.*?)'", message)
+        hint = ""
+        if command:
+            from diagrams.fields.near_miss import did_you_mean
+
+            hint = did_you_mean(command[1], COMMANDS)
+        raise _UsageError(f"{message}{hint}; see {self.prog} --help")
+
+    def refuse(self, command: str, words: Sequence[str]) -> NoReturn:
+        """Raises what is wrong with words that a subcommand does not know.
+
+        Args:
+            command: Name of the subcommand.
+            words: One or more.
+        """
+        hint = ""
+        if option := re.search(r"--([\w-]+)", " ".join(words)):
+            from diagrams.fields.near_miss import did_you_mean
+
+            options = {name: _options(parser) for name, parser in self.below.items()}
+            # Without the dashes, which would make all options alike.
+            hint = did_you_mean(option[1], options[command]).replace("'", "'--", 1)
+            others = [name for name, own in options.items() if option[1] in own]
+            if others and not hint:
+                hint = f" (--{option[1]} is an option of {', '.join(others)})"
+        text = f"unrecognized arguments: {' '.join(words)}{hint}"
+        raise _UsageError(f"{text}; see {self.prog} {command} --help")
+
+
+def _options(parser: argparse.ArgumentParser) -> list[str]:
+    """Names of a parser's options, without their dashes."""
+    return re.findall(r"--([\w-]+)", parser.format_usage())
 
 
 class _Version(argparse.Action):
@@ -110,17 +136,33 @@ def run_words(words: Sequence[str], interrupts: Interrupts) -> int:
     Raises:
         KeyboardInterrupt: It was interrupted, and nothing was written.
     """
-    _prepare_process()
     try:
-        options = make_parser().parse_args(_by_new_names(words))
+        _prepare_process()
+        _check_words(words)
+        parser = make_parser()
+        try:
+            options, unknown = parser.parse_known_args(_by_new_names(words))
+        except SystemExit:  # of --help and --version
+            sys.stdout.flush()
+            raise
+        if unknown:
+            parser.refuse(options.command, unknown)
         carry_out(COMMANDS[options.command], options, interrupts)
-    except BrokenPipeError:
-        # The reader of our output has left; Python must not complain at exit.
-        sys.stdout = None
+    except BrokenPipeError:  # the reader of our output has left
         return FAILED
     except Exception as error:  # noqa: BLE001  # bad input, a failed run, or a bug
         return _report(error, words)
+    finally:
+        _drop_unwritable()
     return DONE
+
+
+def _drop_unwritable() -> None:
+    """Drops output that cannot be written, else Python complains about it at exit."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        sys.stdout = None
 
 
 def _by_new_names(words: Sequence[str]) -> Sequence[str]:
@@ -128,7 +170,7 @@ def _by_new_names(words: Sequence[str]) -> Sequence[str]:
     for command in COMMANDS.values():
         if words and command.was and words[0] == command.was:
             print(
-                f"phonotaxis: the command {command.was} is called {command.name} now",
+                f"phonotaxis: the command {command.was} is now called {command.name}",
                 file=sys.stderr,
             )
             return [command.name, *words[1:]]
@@ -141,6 +183,9 @@ def _prepare_process() -> None:
     Standard streams that are closed lead nowhere: a result file must not get their
     numbers. Characters that a terminal cannot show are escaped. Pictures go to
     files, whatever a notebook has chosen. What takes long says so.
+
+    Raises:
+        InputError: Files would be read in another encoding than UTF-8.
     """
     while (descriptor := os.open(os.devnull, os.O_RDWR)) <= 2:
         pass
@@ -156,9 +201,51 @@ def _prepare_process() -> None:
     logger = logging.getLogger("phonotaxis")
     logger.handlers = [handler]
     logger.setLevel(logging.INFO)
+    _read_utf_8()
 
 
-def make_parser() -> argparse.ArgumentParser:
+def _read_utf_8() -> None:
+    """Makes UTF-8 the encoding in which this process opens text files.
+
+    Drake opens Python files of its own, which are UTF-8, in the encoding of the locale,
+    so that it cannot be loaded where that is ASCII.
+
+    Raises:
+        InputError: The system has no locale with UTF-8.
+    """
+    for name in (None, *_UTF_8_LOCALES):
+        with suppress(locale.Error):
+            locale.setlocale(locale.LC_CTYPE, name)
+        encoding = locale.getpreferredencoding(do_setlocale=False)
+        if encoding.lower() == "utf-8":
+            return
+    raise _bad_locale(
+        f"Drake needs UTF-8, and the encoding of this locale is {encoding}"
+    )
+
+
+def _bad_locale(why: str) -> Exception:
+    from systems.framework.input_error import InputError
+
+    remedy = "set PYTHONUTF8=1, or a locale with UTF-8, for example LC_ALL=C.UTF-8"
+    return InputError("locale", f"{why}; {remedy}")
+
+
+def _check_words(words: Sequence[str]) -> None:
+    """Refuses names of files that this process cannot read or open.
+
+    Raises:
+        InputError: The locale's encoding is another than the names'.
+    """
+    encoding = sys.getfilesystemencoding()
+    if encoding == "utf-8":
+        return
+    for name in (*words, os.getcwd()):  # noqa: PTH109
+        if any("\udc80" <= letter <= "\udcff" for letter in name):
+            raise _bad_locale(f"{name} cannot be read in this locale ({encoding})")
+
+
+def make_parser() -> _Parser:
     """The parser of the whole command line."""
     parser = _Parser(
         prog="phonotaxis",
@@ -195,8 +282,13 @@ def _report(error: Exception, words: Sequence[str]) -> int:
     faults: list[tuple[str, str]]
     if isinstance(error, _UsageError):
         faults, status = [("command line", str(error))], BAD_INPUT
+    elif isinstance(error, UnicodeEncodeError) and (
+        sys.getfilesystemencoding() != "utf-8"
+    ):
+        # A file's name that stands in a scenario, for example.
+        return _report(_bad_locale(str(error)), words)
     elif isinstance(error, ImportError):
-        text = f"{error}; the installation is not whole, install it again"
+        text = f"{error}; the installation is incomplete; install phonotaxis again"
         faults, status = [("", text)], FAILED
     else:
         from analysis.run_error import failure_text
@@ -207,7 +299,8 @@ def _report(error: Exception, words: Sequence[str]) -> int:
             status = BAD_INPUT
         else:
             faults, status = [("", failure_text(error))], FAILED
-    _complain(faults, as_json="--json" in words)
+    with suppress(OSError):  # standard error cannot be written either
+        _complain(faults, as_json="--json" in words)
     return status
 
 
@@ -215,13 +308,14 @@ def _complain(faults: Sequence[tuple[str, str]], *, as_json: bool) -> None:
     told = [(field, _short(field, message)) for field, message in faults[:MOST_FAULTS]]
     if as_json:
         errors = [{"field": field, "message": text} for field, text in told]
-        print(json.dumps({"error": errors[0], "errors": errors}))
-        return
+        with suppress(OSError):  # else standard error has to tell
+            print(json.dumps({"error": errors[0], "errors": errors}), flush=True)
+            return
     for field, message in told:
         text = f"{field}: {message}" if field else message
         print(f"phonotaxis: {text}", file=sys.stderr)
     if more := len(faults) - len(told):
-        print(f"phonotaxis: and {more} more of the kind", file=sys.stderr)
+        print(f"phonotaxis: {more} more messages of this kind", file=sys.stderr)
 
 
 def _short(field: str, message: str) -> str:

@@ -12,30 +12,28 @@ from analysis.commands.first_words import say
 if TYPE_CHECKING:
     from analysis.comparison.laws_in_pairs import Comparison, Pair
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     scenario = parser.add_argument(
         "scenario",
         nargs="*",
-        help="library name, YAML file of layouts, or YAML file of a scenario "
-        "(default: the papers' four experiments)",
+        help="library name, or YAML file of layouts or of a scenario (default: the "
+        "papers' four experiments)",
     )
     completed_by(scenario, SCENARIO_WORDS)
     parser.add_argument(
         "--laws",
         metavar="LAW,...",
-        help="laws to compare (default: the papers', and none; with routes those for "
-        "routes)",
+        help="laws to compare (default: the papers' laws and none; for routes the laws "
+        "of routes)",
     )
     parser.add_argument(
         "--velocity-term",
         metavar="TERM,...",
-        help="printed, closing, or both (default: the scenario's)",
+        help="printed, closing, or both (default: as in the scenario)",
     )
     parser.add_argument(
-        "--runs", metavar="N", type=int, default=50, help="layouts a scenario (50)"
+        "--runs", metavar="N", type=int, default=50, help="layouts per scenario (50)"
     )
     parser.add_argument("--seed", metavar="N", help="seed of layouts and noise (1)")
     parser.add_argument(
@@ -43,20 +41,20 @@ def _add_arguments(parser: ArgumentParser) -> None:
         metavar="KEY=VALUE",
         action="append",
         default=[],
-        help="set any field, as hearing=ideal; may be repeated",
+        help="set any field, for example hearing=ideal; may be repeated",
     )
     parser.add_argument(
         "--grid",
         metavar="KEY=[VALUE,...]",
         action="append",
         default=[],
-        help="compare values of a further field, as hearing=[audio,ideal]",
+        help="compare values of a further field, for example hearing=[audio,ideal]",
     )
     parser.add_argument(
-        "--workers", metavar="N", type=int, help="processes (default: one a core)"
+        "--workers", metavar="N", type=int, help="processes (default: one per core)"
     )
     parser.add_argument(
-        "--resume", action="store_true", help="go on with the runs in --out"
+        "--resume", action="store_true", help="continue with the runs in --out"
     )
     take_output(parser)
 
@@ -102,7 +100,7 @@ def _prepare(
 
 COMMAND = Command(
     "compare",
-    "laws side by side on the same random layouts",
+    "compare laws on the same random layouts",
     _add_arguments,
     _prepare,
     examples=(

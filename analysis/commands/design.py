@@ -12,8 +12,6 @@ from analysis.commands.first_words import say
 if TYPE_CHECKING:
     from analysis.design.design_study import DesignStudy
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     take_scenario(parser)
@@ -45,7 +43,7 @@ def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
 
 COMMAND = Command(
     "design",
-    "the laws' gains, derived from stated requirements",
+    "derive the laws' gains from stated requirements",
     _add_arguments,
     _prepare,
     examples=(

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import sys
 
-__all__ = ["say"]
-
 
 def say(text: str) -> None:
     """Tells a terminal what begins; a pipe gets nothing.

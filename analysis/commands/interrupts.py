@@ -9,8 +9,6 @@ from contextlib import contextmanager
 from importlib.machinery import ExtensionFileLoader
 from types import FrameType
 
-__all__ = ["Interrupts"]
-
 _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGALRM)
 #: An interrupt that could not strike, or was swallowed, tries again after this, s.
 _AGAIN_S = 0.1

@@ -16,8 +16,6 @@ if TYPE_CHECKING:
     from analysis.listening.sound_stream import SoundStream
     from analysis.listening.step_views import Teller
 
-__all__ = ["COMMAND"]
-
 # From thread to thread; a tenth of what Python takes.
 _SWITCH_S = 5e-4
 
@@ -36,28 +34,30 @@ def _add_arguments(parser: ArgumentParser) -> None:
         help="WAV, FLAC or raw samples; - is standard input (default)",
     )
     parser.add_argument(
-        "--geometry", metavar="FILE.yaml", help="places of the microphones"
+        "--geometry", metavar="FILE.yaml", help="positions of the microphones"
     )
     parser.add_argument(
         "--device", help="sound card to record from: its name or number, or default"
     )
-    parser.add_argument("--rate", type=int, metavar="HZ", help="of raw samples")
+    parser.add_argument(
+        "--rate", type=int, metavar="HZ", help="sample rate of raw samples"
+    )
     parser.add_argument(
         "--format",
         choices=("s16le", "s24le", "s32le", "f32le"),
         default="s16le",
-        help="of raw samples (default: s16le)",
+        help="format of raw samples (default: s16le)",
     )
     parser.add_argument(
         "--channels",
         type=int,
         metavar="N",
-        help="of raw samples (default: the array's)",
+        help="channels of raw samples (default: as in the array)",
     )
     parser.add_argument(
         "--json",
         action="store_true",
-        help="print a JSON line for each source and step, and one at the end",
+        help="print one JSON line per source and step, and one at the end",
     )
 
 
@@ -123,7 +123,7 @@ def _pipe(options: Namespace) -> BinaryIO:
         if sys.stdin is None or sys.stdin.isatty():
             raise InputError(
                 "input",
-                "nothing is piped in; name a file, pipe in sound, or give --device",
+                "no sound is piped in; name a file, pipe in sound, or give --device",
             )
         return os.fdopen(os.dup(sys.stdin.fileno()), "rb")
     try:
@@ -164,9 +164,10 @@ def _is_flac(path: Path) -> bool:
 
 COMMAND = Command(
     "listen",
-    "bearings of all sources, live from a pipe or a card",
+    "print bearings of all sources, live from a pipe or a sound card",
     _add_arguments,
     _prepare,
+    prints=True,
     examples=(
         "listen recording.wav --geometry array.yaml",
         "listen --device default --geometry array.yaml",

@@ -13,13 +13,11 @@ from analysis.commands.first_words import say
 if TYPE_CHECKING:
     from analysis.recordings.locate_result import LocateResult
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument("recording", metavar="FILE", help="multi-channel WAV or FLAC")
     parser.add_argument(
-        "--geometry", metavar="FILE.yaml", help="places of the microphones"
+        "--geometry", metavar="FILE.yaml", help="positions of the microphones"
     )
     parser.add_argument(
         "--out", metavar="DIR", help="directory for locate.json and locate.png"
@@ -35,7 +33,7 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
     geometry = load_geometry(Path(given)) if given else ROBOT_ARRAY
     recorded = recorded_samples(options.recording, geometry)
     place = take(options.out) if options.out is not None else None
-    say(f"locating what {options.recording} holds")
+    say(f"locating sources in {options.recording}")
 
     from analysis.recordings.locate import located
     from analysis.recordings.locate_text import locate_text
@@ -63,7 +61,7 @@ def _prepare(options: Namespace, take: Take) -> Job[LocateResult]:
 
 COMMAND = Command(
     "locate",
-    "bearing and range over time of a recording",
+    "compute bearing and range over time from a recording",
     _add_arguments,
     _prepare,
     examples=(

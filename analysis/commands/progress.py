@@ -10,8 +10,6 @@ from analysis.commands.interrupts import Interrupts
 if TYPE_CHECKING:
     from tqdm import tqdm
 
-__all__ = ["Progress"]
-
 
 class Progress:
     """A bar on a terminal, nothing in a pipe. Each call lets interrupts through.

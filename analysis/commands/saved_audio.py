@@ -10,8 +10,6 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from diagrams import RunAudio, Scenario
 
-__all__ = ["SavedAudio"]
-
 
 class SavedAudio:
     """Where the sound goes, and how far it got.
@@ -41,8 +39,8 @@ class SavedAudio:
         if self._path.is_relative_to(out.expanduser().resolve()):
             raise InputError(
                 "save_audio",
-                f"{directory} is the directory of the results or in it, which appears "
-                "at the end; name another directory",
+                f"{directory} is the directory of the results or in it, and that "
+                "directory is created at the end; name another directory",
             )
 
     @contextmanager
@@ -77,7 +75,7 @@ class SavedAudio:
         """What an interrupt leaves, in words; nothing where there is nothing."""
         if self._files is None or self._files.until_s == 0.0:
             return ""
-        return f"what was heard until {self._files.until_s:g} s is in {self._shown}"
+        return f"the sound until {self._files.until_s:g} s is in {self._shown}"
 
     def facts(self) -> dict[str, Any]:
         """The directory, and what stands in which file, as plain values."""

@@ -5,14 +5,12 @@ from __future__ import annotations
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from analysis.commands.command import Place
     from analysis.commands.saved_audio import SavedAudio
     from diagrams import RunAudio, RunResult, Scenario
-
-__all__ = ["SavedMovie"]
 
 
 class SavedMovie:
@@ -21,7 +19,7 @@ class SavedMovie:
     Args:
         file: Ends in .gif or .mp4; nothing is there yet.
         scenario: What is to be run.
-        directory: Takes the sound meanwhile; it is removed if the run fails.
+        place: Of the results; its directory takes the sound meanwhile.
         saved: What saves the sound anyway; none: nothing does.
 
     Raises:
@@ -29,15 +27,21 @@ class SavedMovie:
     """
 
     def __init__(
-        self, file: str, scenario: Scenario, directory: Path, saved: SavedAudio | None
+        self, file: str, scenario: Scenario, place: Place, saved: SavedAudio | None
     ) -> None:
-        from analysis.movies import MovieFile
+        from analysis.movies.encoding import MovieFile
         from diagrams.audio.audible import check_audible
         from systems.framework.input_error import InputError
 
         self._shown, self._movie = file, MovieFile(file)
         self._scenario, self._saved = scenario, saved
-        self._directory = directory / "heard"
+        if self._movie.path.resolve().is_relative_to(place.out.resolve()):
+            raise InputError(
+                "movie",
+                f"{file} is in the directory of the results, and that directory is "
+                "created at the end; name another directory",
+            )
+        self._directory = place.directory / "heard"
         self._own: RunAudio | None = None
         self._audible = self._movie.has_sound
         try:
@@ -72,7 +76,7 @@ class SavedMovie:
         Raises:
             RunError: The encoder fails, or the disk does.
         """
-        from analysis.movies import RunFrames
+        from analysis.movies.run_frames import RunFrames
 
         sound = None
         if self._audible and self._saved is not None:

@@ -26,8 +26,6 @@ from analysis.commands.saved_movie import SavedMovie
 if TYPE_CHECKING:
     from diagrams import RunResult
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     sound = parser.add_argument("--sound", metavar="FILE", help="sound file to play")
@@ -37,19 +35,19 @@ def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
         "--save-audio",
         metavar="DIR",
-        help="new directory for what the robots hear and the loudspeakers play",
+        help="new directory for the sound that robots hear and loudspeakers play",
     )
     take_exports(parser)
     parser.add_argument(
         "--movie",
         metavar="FILE",
-        help="new .gif or .mp4 of the run from above; an .mp4 has the microphones' "
-        "sound, and needs ffmpeg",
+        help="new .gif or .mp4 of the run from above; an .mp4 has the sound at the "
+        "microphones, and needs ffmpeg",
     )
     parser.add_argument(
         "--no-plots",
         action="store_true",
-        help="write no pictures: the replay and the numbers alone",
+        help="write no pictures: only the replay and the numbers",
     )
     take_output(parser)
 
@@ -68,15 +66,16 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
         saved = SavedAudio(options.save_audio, place.out, scenario)
     movie: SavedMovie | None = None
     if options.movie is not None:
-        movie = SavedMovie(options.movie, scenario, place.directory, saved)
+        movie = SavedMovie(options.movie, scenario, place, saved)
     say(f"simulating {scenario.name}")
 
     from analysis.exports.recorded_run import RecordedRun
     from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import build_sound_follower, prepared_loop, simulate
+    from diagrams.scenario_warnings.warnings_of import warnings_of
 
-    for note in scenario.notes():
-        logging.getLogger("phonotaxis").warning("%s", note)
+    for warning in warnings_of(scenario):
+        logging.getLogger("phonotaxis").warning("%s", warning)
     listening = movie or saved
     follower = None
     if scenario.engine == "compiled":

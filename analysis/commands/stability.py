@@ -21,27 +21,26 @@ from analysis.commands.progress import Progress
 if TYPE_CHECKING:
     from analysis.stability.law_analysis import LawAnalysis
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     law = parser.add_argument(
         "--law",
         metavar="LAW",
         action="append",
-        help=f"{LAW_HELP}; may be repeated, to compare laws; "
-        "all: those that avoid obstacles, or drive on a route (default: the "
-        "scenario's law)",
+        help=f"{LAW_HELP}; may be repeated to compare laws; all: the laws that avoid "
+        "obstacles, or that drive on a route (default: the scenario's law)",
     )
     completed_by(law, LAW_WORDS)
     parser.add_argument(
         "--robot",
         metavar="NAME",
-        help="of several robots, the one to analyse, alone (default: the first)",
+        help="robot to analyze, without the other robots (default: the first)",
     )
     take_scenario(parser)
     parser.add_argument(
-        "--full", action="store_true", help="everything, also what takes minutes"
+        "--full",
+        action="store_true",
+        help="all parts, including those that take minutes",
     )
     take_output(parser)
 
@@ -86,7 +85,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
             names = ", ".join(key for key, _ in failures)
             raise RunError(
                 f"parts of the report failed: {names}; {place.out / 'report.html'} "
-                "says how (--debug prints the traceback)"
+                "states the errors (--debug prints the traceback)"
             ) from failures[0][1]
 
     return Job(
@@ -106,7 +105,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
 
 COMMAND = Command(
     "stability",
-    "stability of a scenario's loop: report, models, numbers",
+    "analyze the stability of a scenario's loop: report, models, numbers",
     _add_arguments,
     _prepare,
     examples=(

@@ -12,19 +12,22 @@ from analysis.commands.first_words import say
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/sweeps.md")
+    parser.add_argument("sweep", metavar="SWEEP.yaml", help="see docs/compare.md")
     parser.add_argument(
-        "--workers", metavar="N", type=int, help="local processes (default: one a core)"
+        "--workers",
+        metavar="N",
+        type=int,
+        help="local processes (default: one per core)",
     )
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a Dask cluster, as tcp://host:8786"
+        "--scheduler",
+        metavar="ADDRESS",
+        help="address of a Dask cluster, for example tcp://host:8786",
     )
     parser.add_argument(
-        "--resume", action="store_true", help="go on with what --out holds"
+        "--resume", action="store_true", help="continue with the runs in --out"
     )
     take_output(parser)
 
@@ -76,7 +79,7 @@ def _prepare(options: Namespace, take: Take) -> Job[pd.DataFrame]:
 
 COMMAND = Command(
     "sweep",
-    "run many scenarios, drawn from distributions and grids",
+    "run many scenarios that are drawn from distributions and grids",
     _add_arguments,
     _prepare,
     examples=(

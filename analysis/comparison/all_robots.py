@@ -9,8 +9,6 @@ import pandas as pd
 
 from analysis.runs.run_table import ALL_RUNS, SUCCESSES, column
 
-__all__ = ["with_all_robots"]
-
 #: Of times that of the robot that took longest counts.
 _LAST = ("time_to_goal_s",)
 #: Of minima and maxima the worst robot's.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -18,13 +18,13 @@ from analysis.reporting.intervals import (
 from analysis.runs.run_table import (
     ALL_RUNS,
     SUCCESSES,
+    WarningCount,
     bootstrap_seed,
     collisions,
     column,
     successes,
+    warning_counts,
 )
-
-__all__ = ["ExampleRun", "LawCell", "Mean", "Median", "make_cell"]
 
 ExampleKind = Literal["worst", "typical", "best"]
 EXAMPLES: tuple[ExampleKind, ...] = ("worst", "typical", "best")
@@ -79,6 +79,7 @@ class LawCell:
     """Success weighted by path length; none where the source moves."""
     metrics: dict[str, Median]
     examples: tuple[ExampleRun, ...]
+    warnings: list[WarningCount] = field(default_factory=list)
 
     @property
     def label(self) -> str:
@@ -124,6 +125,7 @@ def make_cell(
         spl=_mean(spl[np.isfinite(spl)], bootstrap_seed(seed, "spl")),
         metrics=metrics,
         examples=_examples(rows, success),
+        warnings=warning_counts(rows),
     )
 
 

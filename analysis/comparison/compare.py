@@ -14,16 +14,22 @@ from analysis.comparison.laws_in_pairs import (
     compare_runs,
     pooled_pairs,
 )
+from analysis.reporting.file_names import distinct_names
 from analysis.reporting.result_directory import ResultDirectory, take_directory
 from analysis.sweeps.one_run import require_runs
 from analysis.sweeps.options import check_options
 from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep
 
-__all__ = [
-    "PreparedComparison",
-    "prepare_comparison",
-]
+#: In the directory of a comparison, beside a folder and a picture of each scenario.
+SUMMARY, REPORT, RATES, EXAMPLES = (
+    "summary.json",
+    "report.html",
+    "rates.png",
+    "examples",
+)
+#: Ending of a scenario's picture; it is named as its folder.
+PICTURE = ".png"
 
 
 @dataclass(frozen=True)
@@ -32,7 +38,7 @@ class PreparedComparison:
 
     out: Path
     sweeps: dict[str, PreparedSweep]
-    """By name of the scenario."""
+    """By name of the scenario; the folder of each has that name where it can."""
 
     @property
     def runs(self) -> int:
@@ -104,10 +110,12 @@ def prepare_comparison(
         taken = take_directory(out)
         directory = directory or Path("results") / taken.path.name
     sweeps: dict[str, PreparedSweep] = {}
+    ours = (SUMMARY, REPORT, RATES, EXAMPLES)
+    folders = distinct_names(plans, taken=ours, endings=("", PICTURE))
     try:
-        for name, plan in plans.items():
+        for (name, plan), folder in zip(plans.items(), folders, strict=True):
             sweeps[name] = prepare_sweep(
-                plan, directory / name, workers=workers, resume=resume
+                plan, directory / folder, workers=workers, resume=resume
             )
     except BaseException:
         for sweep in sweeps.values():

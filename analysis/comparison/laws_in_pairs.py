@@ -34,8 +34,6 @@ from analysis.sweeps.estimates import by_cell
 from analysis.sweeps.plan import SweepPlan
 from diagrams.loading import scenario_from_mapping
 
-__all__ = ["Comparison", "Pair", "compare_runs", "pooled_pairs"]
-
 
 @dataclass(frozen=True)
 class Pair:
@@ -67,8 +65,8 @@ class Comparison:
 def compare_runs(plan: SweepPlan, table: pd.DataFrame, scenario: str) -> Comparison:
     """Summarises a paired sweep over laws.
 
-    Rates have Wilson's intervals, medians bootstrapped ones (95 %). A run that
-    raised an error counts as no success.
+    Rates have Wilson's intervals, and medians have intervals from order statistics
+    (95 %). A run that raised an error counts as no success.
 
     Args:
         plan: Its grid has ``law``, and perhaps more fields.
@@ -110,7 +108,10 @@ class _Neighbours:
 
 def _runs(plan: SweepPlan, table: pd.DataFrame) -> list[pd.DataFrame]:
     """Each cell's rows in the order of the layouts."""
-    robots = list(scenario_from_mapping(plan.base).robots)
+    scenario = scenario_from_mapping(plan.base)
+    robots = list(scenario.robots)
+    if "tick_s" not in table:  # else it is swept or drawn
+        table = table.assign(tick_s=scenario.tick_s)
     return by_cell(plan, with_all_robots(table, robots).sort_values("run"))
 
 

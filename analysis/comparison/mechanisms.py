@@ -7,13 +7,10 @@ import pandas as pd
 
 from analysis.runs.run_table import column
 from diagrams.stop_rules import SUCCESSFUL
-from systems.framework.signals import TICK_S
 
-__all__ = ["failure_mechanisms"]
-
-#: A body without an echo for so long before the contact was out of sight, s: none
+#: A body without an echo for so many ticks before the contact was out of sight: none
 #: at the last tick.
-OUT_OF_SIGHT_S = 1.5 * TICK_S
+OUT_OF_SIGHT_TICKS = 1.5
 #: A body first heard of so shortly before the contact was heard late, s: from top
 #: speed at 0.72 m/s, less than 0.72 m.
 LATE_S = 1.0
@@ -22,7 +19,7 @@ LATE_S = 1.0
 def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     """Mechanism of each failed run; missing where a run succeeded.
 
-    Of collisions, by the echoes of the body that was hit (docs/failures.md):
+    Of collisions, by the echoes of the body that was hit (docs/results_laws.md):
 
     - ``never heard``: there was none, the body came from where no cone looks;
     - ``out of sight``: there was none any more at the last tick, the body had left
@@ -37,7 +34,8 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     says), ``failed`` (an error).
 
     Args:
-        rows: Of ``analysis.sweeps.store.load_results``, with cones.
+        rows: Of ``analysis.sweeps.store.load_results``, with cones, and each run's
+            ``tick_s``.
     """
     cause = rows["cause"].astype("object")
     names = cause.where(~cause.isin(SUCCESSFUL))
@@ -48,5 +46,6 @@ def failure_mechanisms(rows: pd.DataFrame) -> pd.Series:
     warning, unseen = rows["contact_warning_s"], rows["contact_unseen_s"]
     names = names.mask(hits, "pushed too little")
     names = names.mask(hits & (warning < LATE_S), "heard late")
-    names = names.mask(hits & (unseen >= OUT_OF_SIGHT_S), "out of sight")
+    out_of_sight = unseen >= OUT_OF_SIGHT_TICKS * rows["tick_s"]
+    names = names.mask(hits & out_of_sight, "out of sight")
     return names.mask(hits & warning.isna(), "never heard")

@@ -16,6 +16,7 @@ from analysis.comparison.report_text import (
     median_text,
     points_text,
     rate_text,
+    warning_texts,
 )
 from analysis.reporting.fact_tables import readable_name
 from analysis.reporting.html_page import (
@@ -23,14 +24,13 @@ from analysis.reporting.html_page import (
     definitions,
     file_links,
     heading,
+    note,
     page,
     paragraph,
     picture,
     section,
     table,
 )
-
-__all__ = ["comparison_page"]
 
 
 def comparison_page(
@@ -57,7 +57,7 @@ def comparison_page(
         parts["All together"] = ("all-together", [_pairs(pooled)])
     contents = [(anchor, title) for title, (anchor, _) in parts.items()]
     return page(
-        f"Laws side by side: {', '.join(comparisons)}",
+        f"Comparison of laws: {', '.join(comparisons)}",
         contents,
         [section(anchor, title, inner) for title, (anchor, inner) in parts.items()],
     )
@@ -66,16 +66,23 @@ def comparison_page(
 def _summary(summary: Mapping[str, Any]) -> list[str]:
     versions = ", ".join(f"{k} {v}" for k, v in summary["versions"].items())
     rows = [
-        ("Layouts", f"{summary['layouts']} a scenario, the same for every law"),
+        (
+            "Layouts",
+            (f"{summary['layouts']} per scenario, the same layouts for every law"),
+        ),
         ("Seed", str(summary["seed"])),
         ("Versions", versions),
     ]
     text = (
-        "In brackets: 95 % intervals. Clearance, reaction, way and ripple are medians "
-        "of all runs, the rest of successful ones."
+        "Brackets are 95 % intervals. Clearance, reaction, distance off the path and "
+        "ripple are medians of all runs; the other metrics are medians of successful "
+        "runs."
     )
-    files = [("summary.json", "the figures of this page, for programs")]
-    rates = "Success, collision, and two medians of every law, with 95 % intervals."
+    files = [("summary.json", "the numbers of this page, for programs")]
+    rates = (
+        "Shares of success and collision, and two medians, of every law, with 95 % "
+        "intervals."
+    )
     return [
         definitions(rows),
         paragraph(text),
@@ -87,10 +94,11 @@ def _summary(summary: Mapping[str, Any]) -> list[str]:
 def _scenario(
     name: str, comparison: Comparison, summary: Mapping[str, Any], directory: Path
 ) -> list[str]:
-    parts = [_laws(comparison.cells), _endings(comparison.cells)]
+    parts = [note(text) for text in warning_texts(comparison.cells)]
+    parts += [_laws(comparison.cells), _endings(comparison.cells)]
     parts += [_pairs(comparison.pairs)] if comparison.pairs else []
     caption = "Worst, typical and best run of every law, from above, in W."
-    parts += [heading(3, "Runs to look at"), picture(f"{name}.png", caption)]
+    parts += [heading(3, "Example runs"), picture(f"{name}.png", caption)]
     for cell in summary["cells"]:
         if cell["scenario"] == name:
             parts += _examples(cell, directory)
@@ -137,7 +145,7 @@ def _pairs(pairs: Sequence[Pair]) -> str:
                 *(difference_text(pair.metrics.get(metric)) for metric in PAIRED),
             ]
         )
-    caption = "Pairs of runs that differ in the law alone; medians of differences"
+    caption = "Pairs of runs that differ in the law only; medians of differences"
     return table(titles, rows, caption=caption)
 
 

@@ -8,8 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-__all__ = ["PairedMedian", "PairedRate", "paired_median", "paired_rate"]
-
 
 @dataclass(frozen=True)
 class PairedRate:
@@ -41,7 +39,7 @@ class PairedMedian:
     difference: float | None
     """Median over the pairs of the first's figure less the second's."""
     low: float | None
-    """Ends of the bootstrap interval of that median."""
+    """Ends of the interval of that median, from order statistics."""
     high: float | None
     p_value: float | None
     """Wilcoxon signed-rank test, two-sided: differences lie evenly about zero."""

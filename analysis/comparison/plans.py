@@ -10,7 +10,7 @@ from pydantic import ValidationError
 
 import diagrams
 from analysis.sweeps.plan import SweepPlan, load_sweep
-from diagrams.fields import explain
+from diagrams.fields.explain import explain
 from diagrams.loading import (
     load_scenario,
     parse_setting,
@@ -20,14 +20,6 @@ from diagrams.loading import (
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
-
-__all__ = [
-    "EXPERIMENTS",
-    "VELOCITY_TERM",
-    "comparison_plan",
-    "comparison_plans",
-    "library_layouts",
-]
 
 #: The papers' experiments.
 EXPERIMENTS = (
@@ -82,6 +74,9 @@ def comparison_plan(
         on_route = [name for name, law in LAWS.items() if law.on_route]
         routed = any(robot.route for robot in base.all_robots.values())
         laws = on_route if routed else FORCE_LAWS
+    for key, values in (grid or {}).items():
+        if isinstance(values, str):  # it would be read letter by letter
+            raise InputError(f"grid.{key}", f"is {values!r}; give a list of values")
     fields = {name: getattr(plan, name) for name in SweepPlan.model_fields}
     fields |= {
         "set": plan.set | (settings or {}),
@@ -101,15 +96,16 @@ def _require_one_law(base: Scenario) -> None:
     if base.searches is not None:
         raise InputError(
             "scenario",
-            f"{base.name!r} is a search by law {base.law!r}, for which no other law "
-            "stands in; sweep its fields, as search.rules (docs/olfaction.md)",
+            f"{base.name!r} is a search by law {base.law!r}, and no other law can "
+            "replace it; sweep its fields instead, for example search.rules "
+            "(docs/searches.md)",
         )
     for name, changes in base.robots.items():
         if "law" in changes:
             raise InputError(
                 f"robots.{name}.law",
-                f"is {changes['law']!r}, but a comparison gives all robots its laws; "
-                "leave it out",
+                f"is {changes['law']!r}, but a comparison sets the laws of all "
+                "robots; leave it out",
             )
 
 
@@ -152,7 +148,7 @@ def comparison_plans(
     for scenario in scenarios or EXPERIMENTS:
         name = Path(scenario).stem
         if name in plans:
-            raise InputError("scenario", f"{name} stands there twice; drop one")
+            raise InputError("scenario", f"{name} is listed twice; remove one")
         plans[name] = comparison_plan(
             scenario,
             laws=None if laws is None else laws.split(","),
@@ -176,7 +172,7 @@ def _layouts(scenario: str) -> SweepPlan:
                 if key in data:
                     raise InputError(
                         f"{scenario}: {key}",
-                        "is for the comparison to set; remove it, or use sweep",
+                        "is set by the comparison; remove it, or use sweep",
                     )
             return load_sweep(path)
     load_scenario(scenario)
@@ -187,7 +183,7 @@ def _listed_values(text: str) -> tuple[str, list[Any]]:
     """Key and values of ``key=[value, ...]``."""
     key, values = parse_setting(text)
     if not isinstance(values, list):
-        raise InputError(key, f"{values!r} is no list of values; write [a, b]")
+        raise InputError(key, f"{values!r} is not a list of values; write [a, b]")
     return key, values
 
 

@@ -24,8 +24,6 @@ from analysis.runs.trajectory_artists import (
 from diagrams import RunResult
 from systems.world.geometry import rectangle_corners
 
-__all__ = ["plot_examples", "plot_rates"]
-
 #: Metrics with a panel each, with their axis' title.
 _METRICS = {
     "minimum_obstacle_clearance_m": "least clearance from obstacles (m), all runs",

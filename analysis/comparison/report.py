@@ -9,14 +9,23 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from analysis.comparison.cells import LawCell
-from analysis.comparison.compare import PreparedComparison
+from analysis.comparison.cells import ExampleRun, LawCell
+from analysis.comparison.compare import (
+    EXAMPLES,
+    PICTURE,
+    RATES,
+    REPORT,
+    SUMMARY,
+    PreparedComparison,
+)
 from analysis.comparison.laws_in_pairs import Comparison, Pair
+from analysis.reporting.file_names import distinct_names
 from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import RunResult, dump_scenario, simulate
 
-__all__ = ["compare_summary", "write_comparison"]
+#: Of an example: the scenario's name, the number of the run, and its kind.
+_Key = tuple[str, int, str]
 
 
 def compare_summary(
@@ -36,13 +45,14 @@ def compare_summary(
     """
     plan = next(iter(prepared.sweeps.values())).plan
     cells, pairs = [], []
+    files = _example_files(comparisons)
     for name, comparison in comparisons.items():
         for cell in comparison.cells:
             examples = [
                 {
                     **asdict(example),
-                    "scenario_file": _example_file(cell, example.kind),
-                    "command": _command(prepared.out, cell, example.kind),
+                    "scenario_file": (file := files[_key(cell, example)]),
+                    "command": _command(prepared.out, file),
                 }
                 for example in cell.examples
             ]
@@ -82,20 +92,25 @@ def write_comparison(
     from analysis.comparison.plots import plot_examples, plot_rates
 
     out = prepared.out
-    (out / "examples").mkdir(exist_ok=True)
-    plot_rates(list(comparisons.values())).savefig(out / "rates.png", dpi=150)
+    (out / EXAMPLES).mkdir(exist_ok=True)
+    files = _example_files(comparisons)
+    plot_rates(list(comparisons.values())).savefig(out / RATES, dpi=150)
     for name, comparison in comparisons.items():
         rows = [
-            (cell, list(_run_examples(prepared, cell))) for cell in comparison.cells
+            (cell, list(_run_examples(prepared, cell, files)))
+            for cell in comparison.cells
         ]
-        plot_examples(rows).savefig(out / f"{name}.png", dpi=150)
-    write_json(summary, out / "summary.json")
-    (out / "report.html").write_text(
+        folder = prepared.sweeps[name].store.out
+        plot_examples(rows).savefig(out / f"{folder.name}{PICTURE}", dpi=150)
+    write_json(summary, out / SUMMARY)
+    (out / REPORT).write_text(
         comparison_page(summary, comparisons, pooled, out), "utf-8"
     )
 
 
-def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunResult]:
+def _run_examples(
+    prepared: PreparedComparison, cell: LawCell, files: dict[_Key, str]
+) -> Iterator[RunResult]:
     """Runs a cell's examples again; keeps their scenarios, and the typical replay."""
     from analysis.runs.replay import write_replay
 
@@ -106,7 +121,7 @@ def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunRe
         scenario = sweep.plan.scenario_of(point).model_copy(
             update={"description": text}
         )
-        file = prepared.out / _example_file(cell, example.kind)
+        file = prepared.out / files[_key(cell, example)]
         file.write_text(dump_scenario(scenario), "utf-8")
         result = simulate(scenario, engine=sweep.engine(scenario))
         if example.kind == "typical":
@@ -114,11 +129,25 @@ def _run_examples(prepared: PreparedComparison, cell: LawCell) -> Iterator[RunRe
         yield result
 
 
-def _example_file(cell: LawCell, kind: str) -> str:
-    label = re.sub(r"[^\w.]+", "-", f"{cell.scenario} {cell.label} {kind}")
-    return f"examples/{label}.yaml"
+def _example_files(comparisons: dict[str, Comparison]) -> dict[_Key, str]:
+    """The scenario file of each example, from the comparison's directory."""
+    labels = {
+        _key(cell, example): re.sub(
+            r"[^\w.]+", "-", f"{cell.scenario} {cell.label} {example.kind}"
+        )
+        for comparison in comparisons.values()
+        for cell in comparison.cells
+        for example in cell.examples
+    }
+    names = distinct_names(labels.values())
+    return {
+        key: f"{EXAMPLES}/{name}.yaml" for key, name in zip(labels, names, strict=True)
+    }
 
 
-def _command(out: Path, cell: LawCell, kind: str) -> str:
-    file = str(out / _example_file(cell, kind))
-    return shlex.join(["phonotaxis", "simulate", file])
+def _key(cell: LawCell, example: ExampleRun) -> _Key:
+    return cell.scenario, example.index, example.kind
+
+
+def _command(out: Path, file: str) -> str:
+    return shlex.join(["phonotaxis", "simulate", str(out / file)])

@@ -10,18 +10,6 @@ from analysis.comparison.laws_in_pairs import Comparison, Pair
 from analysis.comparison.paired_statistics import PairedMedian, PairedRate
 from analysis.reporting.intervals import with_interval
 
-__all__ = [
-    "PAIRED",
-    "MedianColumn",
-    "compare_text",
-    "counts_text",
-    "difference_text",
-    "median_columns",
-    "median_text",
-    "points_text",
-    "rate_text",
-]
-
 
 class MedianColumn(NamedTuple):
     """A median of the printed table."""
@@ -40,7 +28,7 @@ _COLUMNS = (
     MedianColumn("SPARC", "sparc", 1.0, ".2f"),
     MedianColumn("reacts m", "reaction_distance_m", 1.0, ".2f"),
     MedianColumn("error m", "following_error_rms_m", 1.0, ".2f"),
-    MedianColumn("off the way m", "route_deviation_max_m", 1.0, ".2f"),
+    MedianColumn("off the path m", "route_deviation_max_m", 1.0, ".2f"),
     MedianColumn("ripple rad/s", "yaw_ripple_rad_s", 1.0, ".3f"),
 )
 #: Metrics whose paired differences are printed.
@@ -61,16 +49,19 @@ def compare_text(
         Lines without an end of line after the last one.
     """
     lines = [
-        f"{summary['layouts']} layouts a scenario, seed {summary['seed']}",
-        "In brackets: 95 % intervals.",
-        "Clearance, reaction, way, ripple: medians of all runs; the rest of successes.",
+        f"{summary['layouts']} layouts per scenario, seed {summary['seed']}",
+        "Brackets are 95 % intervals.",
+        (
+            "Medians of clearance, reaction, path and ripple are of all runs, others "
+            "of successes."
+        ),
     ]
     for name, comparison in comparisons.items():
         lines += ["", name, *_cell_lines(comparison.cells)]
         lines += ["", *(line for pair in comparison.pairs for line in _pair_line(pair))]
     if len(comparisons) > 1:
         lines += ["", "all together", *(line for p in pooled for line in _pair_line(p))]
-    lines += ["", "Runs to look at:"]
+    lines += ["", "Example runs:"]
     for cell in summary["cells"]:
         lines += [
             f"  {example['command']}   ({example['cause']})"
@@ -94,6 +85,28 @@ def _cell_lines(cells: list[LawCell]) -> Iterator[str]:
         yield f"  {cell.label}: {counts_text(cell.causes)}"
         if cell.mechanisms:
             yield f"      failures: {counts_text(cell.mechanisms)}"
+    yield from warning_texts(cells)
+
+
+def warning_texts(cells: Sequence[LawCell]) -> list[str]:
+    """The warnings of a scenario's runs.
+
+    Args:
+        cells: Of all laws.
+
+    Returns:
+        For each field one line: how many runs of which law, and the first message.
+    """
+    counts, messages = dict[str, list[str]](), dict[str, str]()
+    for cell in cells:
+        for each in cell.warnings:
+            told = f"{each.runs} of {cell.runs} runs of {cell.label}"
+            counts.setdefault(each.field, []).append(told)
+            messages.setdefault(each.field, each.message)
+    return [
+        f"Warning in {', '.join(told)}: {field}: {messages[field]}"
+        for field, told in counts.items()
+    ]
 
 
 def median_columns(cells: Sequence[LawCell]) -> list[MedianColumn]:

@@ -21,15 +21,6 @@ from diagrams.simulation import simulate
 from systems.framework.input_error import InputError
 from systems.laws.parameters import AttractionParameters
 
-__all__ = [
-    "attraction_damping_ratio",
-    "braking_overshoot",
-    "follow_distance",
-    "following_lag",
-    "search_attraction",
-    "with_attraction",
-]
-
 #: K_r that are tried, N/m.
 _STIFFNESSES_N_M = (0.5, 40.0)
 #: The follow distance is rounded up to this, m.
@@ -71,8 +62,8 @@ def search_attraction(scenario: Scenario, requirements: DesignRequirements) -> S
     if excess(low) * excess(high) > 0.0:
         raise InputError(
             "attraction.stiffness_n_m",
-            f"nothing from {low} to {high} N/m has a damping "
-            f"ratio of {requirements.damping}; change plant.motor_lag_s",
+            f"no value from {low} to {high} N/m has a damping ratio of "
+            f"{requirements.damping}; change plant.motor_lag_s",
         )
     # Rounded up, since damping grows with K_r here: D_r grows along with it.
     K_r = math.ceil(10.0 * brentq(excess, low, high)) / 10.0
@@ -99,8 +90,9 @@ def _with_reserve(scenario: Scenario, requirements: DesignRequirements) -> Scena
     if margin <= 0.0:
         raise InputError(
             "stop.goal_margin_m",
-            f"{scenario.stop.goal_margin_m} m leave nothing but the reserve of "
-            f"{requirements.offset_reserve_m} m for where P comes to rest; raise it",
+            f"{scenario.stop.goal_margin_m} m leave no margin after the reserve of "
+            f"{requirements.offset_reserve_m} m for the place where P comes to rest; "
+            "raise it",
         )
     stop = scenario.stop.model_copy(update={"goal_margin_m": margin})
     return scenario.model_copy(update={"stop": stop})

@@ -11,8 +11,6 @@ from analysis.laws.law_curves_plots import LAW_STYLES
 from analysis.laws.push_and_pull import DESIGNED_LAWS, spring, stiffest
 from analysis.linear.contact_mode import largest_contact_stiffness
 
-__all__ = ["plot_design"]
-
 #: Damping that is drawn, N s/m, and the stiffest push, N/m.
 _DAMPING_N_S_M = np.linspace(0.2, 2.0, 37)
 _STIFFNESS_N_M = 30.0

@@ -30,8 +30,6 @@ from analysis.laws.push_and_pull import (
 from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario import Scenario
 
-__all__ = ["Alternative", "BarrierRow", "DesignStudy", "study_design"]
-
 #: Distances from obstacle to rest for the table of barriers, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)
 

@@ -12,25 +12,28 @@ from analysis.reporting.plain_values import plain, write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import dump_scenario
 
-__all__ = ["design_summary", "design_text", "write_design"]
-
 
 def design_text(study: DesignStudy) -> str:
     """What was asked for, what was found, and what gives."""
     lines = [
         f"kinetic energy at top speed {study.kinetic_energy_j:.3f} J",
         "",
-        "K_0 of the conventional law, N/m, that holds a target behind the obstacle:",
+        (
+            "K_0 of the conventional law, N/m, that stops P before an obstacle with "
+            "the target behind it:"
+        ),
     ]
     lines += [
         f"  {row.metres_to_go:3.1f} m behind  {row.stiffness_n_m:5.1f}   "
-        f"({row.stiffness_from_reach_n_m:.1f} without the limit of speed)"
+        f"({row.stiffness_from_reach_n_m:.1f} without the speed limit)"
         for row in study.barriers
     ]
     limits = ", ".join(f"{limit:.1f}" for limit in study.contact_limits_n_m)
-    lines += [f"stable in contact with echoes 0, 1, 2, 4 periods old: up to {limits}"]
-    lines += ["", "Attraction as it is", *_alternative_lines(study.today)]
-    lines += ["", "Attraction as recommended", *_alternative_lines(study.recommended)]
+    lines += [
+        (f"stable in contact with echoes 0, 1, 2, 4 ticks old: up to {limits} N/m")
+    ]
+    lines += ["", "Current attraction", *_alternative_lines(study.today)]
+    lines += ["", "Recommended attraction", *_alternative_lines(study.recommended)]
     return "\n".join(lines)
 
 
@@ -60,7 +63,7 @@ def _check_text(check: Check) -> str:
     sign = ">=" if check.at_least else "<="
     told = "" if check.met else "   not met"
     if check.acceptable and not check.met:
-        told = "   just missed, by the rounding of the gains"
+        told = "   just missed because gains are rounded"
     unit = "" if check.unit == "1" else f" {check.unit}"
     value = 0.0 if math.isclose(check.value, 0.0, abs_tol=5e-4) else check.value
     return f"{check.name:<26}{value:8.3f} {sign} {check.bound:.3f}{unit}{told}"

@@ -1,7 +1,7 @@
 """From requirements to gains: K_0, k_ref, D_0, d_ref of each law, and K_r, D_r, d_f.
 
 Where requirements exclude each other, what comes first holds: the barrier
-before the contact, the contact before the offset. docs/design.md explains.
+before the contact, the contact before the offset. docs/avoidance.md explains.
 """
 
 from __future__ import annotations
@@ -31,8 +31,6 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 from systems.laws.repulsion import RepulsionParameters
-
-__all__ = ["gain_for_barrier", "search_gains"]
 
 #: Gains are rounded to so many figures.
 _FIGURES = 3
@@ -102,7 +100,7 @@ def _barrier_gains(
 ) -> Scenario:
     """The spring from the barrier, the damper from the energy put back."""
     gains = LAWS[law].loop_gains
-    assert gains is not None, f"{law} is tuned by gains that it does not name"
+    assert gains is not None, f"{law} does not name the gains that tune it"
     spring_gain, damper_gain = gains
     # The secant of D_0 s is D_0: it puts back D_0/D_r.
     D_r = scenario.attraction.damping_n_s_m
@@ -204,8 +202,8 @@ def _root(
     if function(low) * function(high) > 0.0:
         raise InputError(
             f"{field}",
-            f"nothing from {low:g} to {high:g} meets the requirements; "
-            "change attraction or robot",
+            f"no value from {low:g} to {high:g} meets the requirements; change "
+            "attraction or robot",
         )
     return float(brentq(function, low, high, rtol=1e-6))
 

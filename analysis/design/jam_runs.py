@@ -11,8 +11,6 @@ import numpy as np
 from diagrams import load_scenario, simulate
 from diagrams.scenario import Scenario
 
-__all__ = ["JAM_STARTS_M", "JamRuns", "jam_runs"]
-
 #: Lateral offsets of the start, m: from before one obstacle to before the other.
 JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())
 

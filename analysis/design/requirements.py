@@ -19,16 +19,6 @@ from analysis.linear.contact_mode import largest_contact_stiffness
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "Check",
-    "DesignRequirements",
-    "LawDesign",
-    "allowed_stiffness",
-    "check_law",
-    "metres_to_go",
-    "with_gains",
-]
-
 #: Gains are rounded; a bound holds to within the rounding.
 _ROUNDING = 0.01
 #: A figure that is off its bound by less is off by the rounding of floats alone.

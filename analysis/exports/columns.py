@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
     from diagrams import RunResult
 
-__all__ = ["COLUMNS", "Column", "column_of", "columns"]
-
 
 class Column(NamedTuple):
     """A column, or several that differ in a number k alone."""
@@ -45,56 +43,56 @@ def _xy(unit: str, name: str, meaning: str) -> list[Column]:
 
 
 _MOTION = [
-    *_of("s", t="time of the tick, from the begin of the run"),
+    *_of("s", t="time of the tick since the beginning of the run"),
     *_xy("m", "p_WB", "the middle of the axle, B, in W"),
     *_of("rad", theta_WB="heading of the robot in W, counter-clockwise, not wrapped"),
     *_xy("m/s", "v_WB", "the velocity of B in W"),
     *_of("rad/s", omega_WB="yaw rate of the robot, counter-clockwise"),
     *_xy("m", "p_WP", "the control point, P, in W"),
-    *_xy("m/s", "v_WP", "the commanded velocity of P in W"),
+    *_xy("m/s", "v_WP", "the velocity of P in W, commanded from t on"),
     *_of(
         "rad/s",
-        wheel_speed_left="commanded speed of the left wheel",
-        wheel_speed_right="commanded speed of the right wheel",
+        wheel_speed_left="speed of the left wheel, commanded from t on",
+        wheel_speed_right="speed of the right wheel, commanded from t on",
     ),
     *_of(
         "m/s",
-        slip_left="speed of the left rim less that of the ground below it",
-        slip_right="speed of the right rim less that of the ground below it",
+        slip_left="speed of the left rim minus speed of the ground below it",
+        slip_right="speed of the right rim minus speed of the ground below it",
         slip_sideways="speed of the wheels to the left over the ground",
     ),
     *_xy("m", "p_WB_estimated", "B in W, by odometry"),
     *_of("rad", theta_WB_estimated="heading in W, by odometry"),
 ]
 _HEARING = [
-    *_xy("m", "p_WS", "what is followed, S (source, robot or goal), in W"),
-    *_of("rad", theta_WS="heading of what is followed in W"),
+    *_xy("m", "p_WS", "S, the source, robot or goal that the robot follows, in W"),
+    *_of("rad", theta_WS="heading of S in W"),
     *_of("m", source_range_true="distance from P to S"),
     *_of("rad", source_bearing_true="direction from P to S, from the robot's x axis"),
     *_of(
         "m",
-        p_PS_B_x="forward part of the heard place of S from P; 0 where nothing is "
-        "heard, of a unit vector where no range is",
-        p_PS_B_y="leftward part of the same",
+        p_PS_B_x="forward component of the heard position of S from P; 0 if nothing "
+        "is heard, of a unit vector if there is no range",
+        p_PS_B_y="leftward component of the heard position of S from P, likewise",
     ),
-    *_of("m", source_range="heard distance from P to S; empty where there is none"),
+    *_of("m", source_range="heard distance from P to S; empty if there is no range"),
     *_of(
         "rad",
-        source_bearing="heard direction from P to S, from the robot's x axis; empty "
-        "where nothing is heard",
+        source_bearing="heard direction from P to S, from the robot's x axis; empty if "
+        "nothing is heard",
     ),
     *_of(
         "0 or 1",
         detected="whether the source was heard in the last frame",
-        range_valid="whether its range was heard, too",
-        target_valid="whether there is a target to go by",
+        range_valid="whether its range was heard in the last frame",
+        target_valid="whether there is a valid target",
         ambiguous="whether another direction fits the sound as well",
     ),
-    *_xy("m", "p_WS_estimated", "where the robot takes S to be, in W"),
+    *_xy("m", "p_WS_estimated", "the position of S that the robot assumes, in W"),
     *_of("number", lost_microphone="the first microphone that hears nothing; 0: none"),
 ]
 _OBSTACLES = [
-    *_of("m", range_K="last range of sensor k; without an echo its greatest range"),
+    *_of("m", range_K="last range of sensor k; its greatest range if there is no echo"),
     *_of("0 or 1", echo_K="whether sensor k had an echo"),
     *_of(
         "m",
@@ -103,46 +101,45 @@ _OBSTACLES = [
     ),
     *_of(
         "number",
-        feature_K="which sensors vector k is of, a code that is the same as long as "
-        "they are; 0: no vector",
+        feature_K="code of the sensors that vector k comes from; 0: no vector",
     ),
     *_of(
         "m/s",
-        obstacle_speed_K="speed of the obstacle of vector k, as the law counts it",
+        obstacle_speed_K="speed s of the obstacle of vector k, as the law uses it",
     ),
 ]
 _CONTROL = [
-    *_xy("N", "attraction", "the force towards the target, in W"),
+    *_xy("N", "attraction", "the force toward the target, in W"),
     *_xy("N", "repulsion", "the force away from obstacles, in W"),
     *_of("m/s", wanted_speed="forward speed that the law commands"),
     *_of("rad/s", wanted_turn="yaw rate that the law commands"),
     *_of(
         "number",
-        plan_mode="0 no target, 1 driving, 2 looking, 3 backing off, 4 no way found",
+        plan_mode="0 no target, 1 driving, 2 looking, 3 backing off, 4 no path found",
     ),
     *_xy("m", "carrot", "the point that the law heads for, in W"),
-    *_of("m", way_left="way to go to the target"),
+    *_of("m", way_left="remaining path length to the target"),
     *_of(
         "number",
-        guard_action="what the guard did: 0 passed, 1 slowed, 2 turned, 3 braked, "
-        "4 halted for a fault of the sensing",
+        guard_action="action of the guard: 0 passed, 1 slowed, 2 turned, 3 braked, 4 "
+        "halted because of a sensing fault",
     ),
     *_of(
         "m",
-        guard_distance="how much farther the robot is from what is not free than it "
-        "has to be",
-        guard_stopping_distance="way in which the robot can stop",
-        guard_view_distance="guard_distance, of what is in view",
+        guard_distance="distance to space that is not free minus the distance that the "
+        "guard needs",
+        guard_stopping_distance="distance in which the robot can stop",
+        guard_view_distance="guard_distance for obstacles in view",
     ),
     *_of(
         "number",
-        sensing_fault="what is wrong with the sensing: 0 nothing, 1 odometry jumped, "
-        "2 a sensor is silent, 3 frozen, 4 noisy",
-        faulty_sensor="which range sensor that is; 0: none",
+        sensing_fault="fault of the sensing: 0 none, 1 odometry jumped, 2 a sensor is "
+        "silent, 3 frozen, 4 noisy",
+        faulty_sensor="number of the faulty range sensor; 0: none",
     ),
 ]
 _ROUTES = [
-    *_of("number", replans="routes that were planned anew"),
+    *_of("number", replans="number of routes that were planned again"),
     *_xy("m", "target", "the target on the route, in W"),
     *_of(
         "m/s",
@@ -151,10 +148,10 @@ _ROUTES = [
     ),
     *_of(
         "m",
-        target_along="way of the target along the route",
-        robot_along="way of P along the route",
+        target_along="distance of the target along the route",
+        robot_along="distance of P along the route",
     ),
-    *_xy("m", "reference", "the reference model's place, in W"),
+    *_xy("m", "reference", "the position of the reference model, in W"),
     *_of(
         "m/s",
         reference_vx="x of the reference model's velocity, in W",
@@ -165,10 +162,13 @@ _ROUTES = [
         stiffness="stiffness between robot and target, K",
         contact_stiffness="stiffness between robot and obstacles, K_e",
     ),
-    *_of("N s/m", damping="damping of the robot towards the target, D"),
+    *_of("N s/m", damping="damping between robot and target, D"),
     *_of("0 or 1", adaptation_active="whether gains are being adapted"),
-    *_of("m/s", filter_slack="how much faster what moves is let come nearer"),
-    *_of("0 or 1", filter_active="whether the filter of velocities changed anything"),
+    *_of(
+        "m/s",
+        filter_slack="speed by which the filter relaxes its limit near moving objects",
+    ),
+    *_of("0 or 1", filter_active="whether the velocity filter changed the command"),
 ]
 _SEARCHES = [
     *_of(
@@ -183,9 +183,9 @@ _SEARCHES = [
         gas_right="reading of the right gas sensor, Rs/R0: 1 in clean air",
         gas_rear="reading of the rear gas sensor",
         gas_left="reading of the left gas sensor",
-        concentration_right="true concentration at the right gas sensor, shares of C1",
-        concentration_rear="true concentration at the rear gas sensor",
-        concentration_left="true concentration at the left gas sensor",
+        concentration_right="true concentration at the right gas sensor, over C1",
+        concentration_rear="true concentration at the rear gas sensor, over C1",
+        concentration_left="true concentration at the left gas sensor, over C1",
         airflow_left="reading of the airflow sensor that looks to the left",
         airflow_right="reading of the airflow sensor that looks to the right",
     ),
@@ -200,21 +200,20 @@ _SEARCHES = [
     *_of(
         "number",
         touched="the body that the switches touch; -1: none",
-        listening="what is listened to: 0 nothing, 1 noise, 2 sound",
-        search_ended="how the search ended: 0 it goes on, 1 found, else why it was "
-        "given up (systems/search/search_ending.py)",
-        search_phase="what the search is at, a number of its rules",
-        search_steps="steps begun",
-        search_fault="what was found to be broken, a bit each "
+        listening="what the robot listens to: 0 nothing, 1 noise, 2 sound",
+        search_ended="end of the search: 0 it continues, 1 found, else the reason for "
+        "giving up (systems/search/search_ending.py)",
+        search_phase="phase of the search, a number of its rules",
+        search_steps="number of steps begun",
+        search_fault="faults that the search has found, one bit per fault "
         "(systems/search/search_ending.py)",
-        sink_frames="frames of the robot that the sink has heard",
-        sink_function="what the last of them tells, a number of the protocol; -1: none "
-        "yet (systems/radio/codec.py)",
-        sink_value="value of the last of them",
-        sink_result="what the sink has heard of the search: -1 nothing, 0 not found, "
-        "1 found",
+        sink_frames="number of radio frames of the robot that the sink has received",
+        sink_function="function of the last of these frames, by the protocol; -1: "
+        "none yet (systems/radio/codec.py)",
+        sink_value="value of the last of these frames",
+        sink_result="result of the search at the sink: -1 none, 0 not found, 1 found",
     ),
-    *_of("s", sink_age_s="time since the sink heard the last of them"),
+    *_of("s", sink_age_s="time since the sink received the last of these frames"),
 ]
 #: All columns that tables of runs can have, in the order of the signal.
 COLUMNS: tuple[Column, ...] = (

@@ -13,8 +13,6 @@ from analysis.reporting.palette import COLOURS
 from diagrams import Scenario
 from systems.sound.parameters import RoomParameters
 
-__all__ = ["body_markers"]
-
 #: Numbers of ``visualization_msgs/Marker``.
 _CUBE, _LINE_LIST, _ADD = 1, 5, 0
 #: Heights of bodies, of which the model has the floor plan alone, m.

@@ -26,9 +26,8 @@ from analysis.exports.ros2_values import (
 )
 from diagrams import dump_scenario
 from diagrams.participants import FollowerParameters
+from diagrams.scenario_warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
-
-__all__ = ["require_mcap", "write_mcap"]
 
 _PACKAGES = ("mcap", "mcap_ros2")
 #: Columns that are told by messages of their own kind.
@@ -53,8 +52,8 @@ def require_mcap() -> None:
     if missing:
         raise InputError(
             "mcap",
-            "needs the packages mcap and mcap-ros2-support; install them by "
-            "pip install 'phonotaxis[export]'",
+            "needs the packages mcap and mcap-ros2-support; install them with pip "
+            "install 'phonotaxis[export]'",
         )
 
 
@@ -83,7 +82,12 @@ def write_mcap(run: RecordedRun, path: Path) -> None:
 def _write(writer: Any, run: RecordedRun) -> None:
     schemas: dict[str, Any] = {}
     scenario = run.scenario
-    about = {"scenario": scenario.name, "law": scenario.law, "seed": str(scenario.seed)}
+    about = {
+        "scenario": scenario.name,
+        "law": scenario.law,
+        "seed": str(scenario.seed),
+        "warnings": "\n".join(map(str, warnings_of(scenario))),
+    }
     writer.add_metadata("phonotaxis", about)
     text = dump_scenario(scenario).encode()
     writer.add_attachment(0, 0, SCENARIO_FILE, "application/yaml", text)

@@ -18,9 +18,7 @@ from systems.framework.input_error import InputError
 if TYPE_CHECKING:
     import pandas as pd
 
-    from diagrams.simulation import RunResult
-
-__all__ = ["SCENARIO_FILE", "TABLE_FILE", "RecordedRun"]
+    from diagrams.run_result import RunResult
 
 SCENARIO_FILE, TABLE_FILE = "scenario.yaml", "trajectory.parquet"
 #: Without these there is nothing to see.
@@ -58,7 +56,7 @@ class RecordedRun:
                 raise InputError(
                     "result",
                     f"{str(folder)!r} has no {name}; give the result directory of a "
-                    "run, as phonotaxis simulate makes it",
+                    "run of phonotaxis simulate",
                 )
         scenario = load_scenario(folder / SCENARIO_FILE)
         run = cls(scenario, _read(folder / TABLE_FILE))
@@ -66,8 +64,8 @@ class RecordedRun:
             if missing := [key for key in _NEEDED if key not in own]:
                 raise InputError(
                     "result",
-                    f"{str(folder / TABLE_FILE)!r} has no {missing[0]} of {name}, as "
-                    f"{SCENARIO_FILE} beside it would have; run again",
+                    f"{str(folder / TABLE_FILE)!r} has no {missing[0]} of "
+                    f"{name}, which a run of {SCENARIO_FILE} has; run again",
                 )
         return run
 

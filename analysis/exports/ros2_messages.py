@@ -7,8 +7,6 @@ from __future__ import annotations
 
 import re
 
-__all__ = ["DEFINITIONS", "message_definition"]
-
 #: Fields of each message by its name, without ``msg/``.
 DEFINITIONS = {
     "builtin_interfaces/Duration": """\

@@ -6,16 +6,6 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-__all__ = [
-    "WORLD_FRAME",
-    "Message",
-    "pose",
-    "stamped",
-    "stamped_pose",
-    "transform",
-    "vector",
-]
-
 #: Fields by name.
 Message = dict[str, Any]
 #: W.

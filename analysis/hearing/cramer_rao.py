@@ -26,15 +26,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import fft
 
-__all__ = [
-    "LocalizationBound",
-    "SlopeEnergy",
-    "arrival_information",
-    "polar_gradients",
-    "polar_point",
-    "position_bound",
-]
-
 # Beyond this condition number a position cannot be told from the delays.
 _LARGEST_CONDITION = 1e14
 

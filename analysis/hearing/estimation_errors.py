@@ -10,8 +10,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.intervals import Estimate
 
-__all__ = ["CONFIDENCE", "Consistency", "consistency", "rms_ratio", "stated_ratio"]
-
 #: Of all intervals.
 CONFIDENCE = 0.95
 

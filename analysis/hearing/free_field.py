@@ -37,14 +37,6 @@ from systems.sound.parameters import EDGE_S, MicArrayParameters, SoundParameters
 from systems.sound.propagation import propagate
 from systems.sound.waveforms import make_waveform
 
-__all__ = [
-    "FreeFieldCell",
-    "Loudspeaker",
-    "frame_estimator",
-    "run_cell",
-    "total_consistency",
-]
-
 #: Full scale of the converter over the largest sample.
 _HEADROOM = 1.2
 

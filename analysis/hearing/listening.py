@@ -21,8 +21,6 @@ from systems.sound.array_tolerances import draw_tolerances
 from systems.sound.sound_emitter import emitted_samples
 from systems.sound.waveforms import make_waveform
 
-__all__ = ["Heard", "Listener"]
-
 # Ticks from the start to the first frame that counts: sound arrives meanwhile
 # (from 8 m at most), and every block has a past.
 _LEAD = 2

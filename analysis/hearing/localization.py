@@ -23,15 +23,6 @@ from analysis.hearing.trial_counts import check_trials
 from diagrams import Scenario, load_scenario
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "ESTIMATORS",
-    "REALISTIC_TOLERANCES",
-    "SOUND_SPEED_TOLERANCE",
-    "LocalizationCell",
-    "LocalizationExperiment",
-    "prepare_localization",
-]
-
 #: What the experiment changes in the default scenario: nothing moves the
 #: robot, and the sound goes on, so that every frame is a measurement.
 _SETTING = (

@@ -15,8 +15,6 @@ from analysis.hearing.cramer_rao import polar_point
 from analysis.hearing.localization import LocalizationCell
 from analysis.reporting.palette import COLOURS
 
-__all__ = ["plot_localization"]
-
 #: How the estimators are drawn.
 _STYLES = {
     "paper": (COLOURS["obstacle"], "the papers' estimator"),

@@ -14,8 +14,6 @@ from analysis.reporting.plain_values import write_json
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from diagrams import write_scenario
 
-__all__ = ["localization_summary", "localization_text", "write_localization"]
-
 _ERROR_NAMES = {
     "position_m": "1 mm",
     "delay_s": "1 us",
@@ -96,7 +94,7 @@ def localization_text(summary: dict[str, Any]) -> str:
     drawn = any(tolerances.values())
     cells = summary["cells"]
     lines = [
-        f"{cells[0]['trials']} frames a cell, {summary['sound']}, "
+        f"{cells[0]['trials']} frames per cell, {summary['sound']}, "
         f"{summary['snr_db_at_1m']:g} dB over the noise at 1 m, "
         + (_tolerances_text(tolerances) if drawn else "no errors of the array")
     ]

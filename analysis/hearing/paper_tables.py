@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-__all__ = ["PAPER_CELLS", "PaperCell"]
-
 
 class PaperCell(NamedTuple):
     """One place of Han 2019, tables 1 and 2: real hardware, 100 measurements."""

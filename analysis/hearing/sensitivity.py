@@ -21,15 +21,6 @@ from analysis.hearing.paper_tables import PaperCell
 from systems.framework.signals import TICK_S
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "UNIT_ERRORS",
-    "ArrayErrors",
-    "PolarStd",
-    "measured_std",
-    "predicted_std",
-    "sensitivity_table",
-]
-
 #: Shares of a Gaussian within one standard deviation.
 _ONE_SIGMA = (0.158655, 0.841345)
 

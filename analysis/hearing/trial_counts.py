@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from systems.framework.input_error import InputError
 
-__all__ = ["check_trials"]
-
 #: Emission and bound of a cell are held in memory.
 _MOST_TRIALS = 100_000
 

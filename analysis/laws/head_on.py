@@ -20,8 +20,6 @@ from diagrams import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point
 
-__all__ = ["HeadOn", "head_on", "radial_equilibria"]
-
 
 @dataclass(frozen=True, eq=False)
 class HeadOn:

@@ -18,8 +18,6 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.ranging.collision_vector import SLOTS
 
-__all__ = ["LawCurves", "law_curves", "radial_forces"]
-
 #: Where curves are drawn, m and m/s (negative: the obstacle recedes).
 DISTANCES_M = np.linspace(0.0, 3.0, 301)[1:]
 SPEEDS_M_S = np.linspace(-1.0, 1.0, 201)

@@ -11,8 +11,6 @@ from analysis.laws.law_curves import LawCurves
 from analysis.reporting.palette import SERIES_COLOURS
 from systems.laws.catalogue import LAWS
 
-__all__ = ["LAW_STYLES", "plot_law_curves"]
-
 #: (colour, title) of the laws of the package.
 LAW_STYLES = {
     law.name: (law.colour or colour, law.label)
@@ -40,7 +38,7 @@ def plot_law_curves(curves: Sequence[LawCurves]) -> Figure:
     by_distance.set_title("the obstacle at rest")
     by_speed.set_xlabel("speed of approach (m/s); negative: receding")
     by_speed.set_title(
-        f"at c = {curves[0].at_distance_m:g} m; dashed: s of the approach alone"
+        f"at c = {curves[0].at_distance_m:g} m; dashed: s of the approach only"
     )
     for axes in (by_distance, by_speed):
         axes.set_ylim(bottom=0.0)

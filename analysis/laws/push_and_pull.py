@@ -17,22 +17,6 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 
-__all__ = [
-    "DESIGNED_LAWS",
-    "Push",
-    "barrier_from_reach_n_m",
-    "far_offset",
-    "injected_share",
-    "kinetic_energy",
-    "largest_rise",
-    "law_force",
-    "net_barrier",
-    "rest_offset",
-    "sampled_push",
-    "spring",
-    "stiffest",
-]
-
 #: The laws whose gains are to be chosen, by name.
 DESIGNED_LAWS = {
     law.name: law.tuning for law in LAWS.values() if law.tuning is not None
@@ -62,7 +46,7 @@ def law_force(law: str, scenario: Scenario) -> Callable[..., float]:
     """
     if law not in DESIGNED_LAWS:
         raise InputError(
-            "law", f"{law!r} has no gains to be chosen; use {', '.join(DESIGNED_LAWS)}"
+            "law", f"{law!r} has no gains to choose; use {', '.join(DESIGNED_LAWS)}"
         )
     return law_function(scenario.model_copy(update={"law": law}))
 

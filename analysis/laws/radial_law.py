@@ -17,9 +17,8 @@ from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams import Scenario
 from diagrams.laws import make_controller
+from diagrams.own_code import loaded_digests
 from systems.framework.input_error import InputError
-
-__all__ = ["DISTANCE_STEP_M", "RadialLaw", "law_function", "radial_law"]
 
 #: Spacing of ``forces_n``, m. Linear interpolation of the default laws between
 #: two entries errs by less than 1e-5 N; of K_0/c near 3 cm by less than 4e-4 N.
@@ -97,8 +96,8 @@ def law_function(scenario: Scenario) -> Callable[[Any, Any], Any]:
     if function is None:
         raise InputError(
             "law",
-            f"{scenario.law!r} is a block that gives no force f(c, s), on which "
-            "energy functions rest; write it as a function law(c, s, repulsion)",
+            f"{scenario.law!r} is a block without a force f(c, s), which energy "
+            "functions need; write it as a function law(c, s, repulsion)",
         )
     return function
 
@@ -113,6 +112,7 @@ def radial_law(scenario: Scenario) -> RadialLaw:
     key = scenario.model_copy(update={"name": "", "description": "", "seed": 0})
     return _tabulate(
         key.law,
+        str(loaded_digests(key)),
         key.repulsion.model_dump_json(),
         (key.ultrasonic.minimum_range_m, key.ultrasonic.maximum_range_m),
         key.robot.top_speed_m_s,
@@ -136,6 +136,7 @@ class _Scenario:
 @lru_cache(maxsize=64)
 def _tabulate(
     name: str,
+    _own_code: str,
     _repulsion: str,
     ranges_m: tuple[float, float],
     top_speed: float,
@@ -148,7 +149,9 @@ def _tabulate(
     distances[0] = 1e-9
     forces = np.array([float(function(c, 0.0)) for c in distances.tolist()])
     if not np.all(np.isfinite(forces)):
-        raise InputError("law", f"{name!r} gives a force that is not finite; bound it")
+        raise InputError(
+            "law", f"{name!r} gives a force that is not finite; bound the force"
+        )
     work = 0.5 * DISTANCE_STEP_M * (forces[1:] + forces[:-1])
     energies = np.append(np.cumsum(work[::-1])[::-1], 0.0)
     increments = _increments(function, range_m, top_speed)

@@ -17,6 +17,7 @@ from analysis.linear.delayed_run import kicked, offsets
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed
+from analysis.models.linear_models import NEUTRAL
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
@@ -24,22 +25,11 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point
 
-__all__ = [
-    "HOLDS",
-    "BurstCycle",
-    "BurstRun",
-    "Hold",
-    "burst_cycle",
-    "simulate_burst_cycle",
-]
-
 Hold = Literal["world", "robot", "motion"]
 
 #: What the tracker can do between bursts.
 HOLDS: tuple[Hold, ...] = ("world", "robot", "motion")
 
-#: Multipliers nearer to 1 belong to a continuum of equilibria.
-_NEUTRAL = 1e-6
 #: Of the response, less than this part of the greatest is no share.
 _NO_SHARE = 1e-14
 #: Kick that starts a run, m/s.
@@ -136,7 +126,7 @@ def burst_cycle(
     if on <= 0.0 or gap < 0.0 or abs(ticks - round(ticks)) > 1e-6:
         raise InputError(
             "sound",
-            f"{on:g} s of sound and {gap:g} s of silence make no cycle of whole "
+            f"{on:g} s of sound and {gap:g} s of silence are not a cycle of whole "
             f"ticks; give multiples of {tick_s} s, and some sound",
         )
     loop = ideal_loop(_with_bursts(point.loop.scenario, hold, on, on + gap))
@@ -206,7 +196,7 @@ def _multipliers(
     poles, modes = np.linalg.eig(line.A)
     seen, moved = (line.C @ modes)[0], np.linalg.solve(modes, line.B)[:, 0]
     share = np.abs(seen * moved)
-    poles = poles[(np.abs(poles - 1.0) > _NEUTRAL) & (share > _NO_SHARE * share.max())]
+    poles = poles[(np.abs(poles - 1.0) > NEUTRAL) & (share > _NO_SHARE * share.max())]
     return poles[np.argsort(-np.abs(poles))]
 
 

@@ -11,13 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
 from analysis.models.equilibria import follow_equilibrium
+from analysis.models.linear_models import NEUTRAL
 from analysis.models.operating_points import OperatingPoint, motion_model
 from diagrams.scenario import Scenario
-
-__all__ = ["GapChart", "gap_chart"]
-
-#: Multipliers nearer to 1 belong to a continuum of equilibria.
-_NEUTRAL = 1e-6
 
 
 @dataclass(frozen=True)
@@ -92,5 +88,5 @@ def gap_chart(
 
 def _largest(point: OperatingPoint, product: NDArray[np.float64]) -> float:
     poles = motion_model(point, product, 1.0).poles
-    poles = poles[np.abs(poles - 1.0) > _NEUTRAL]
+    poles = poles[np.abs(poles - 1.0) > NEUTRAL]
     return float(np.abs(poles).max(initial=0.0))

@@ -33,16 +33,6 @@ from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import WheelSpeedCommand_
 
-__all__ = [
-    "ContactLimits",
-    "ContactOptions",
-    "contact_limits",
-    "contact_matrix",
-    "contact_spectral_radius",
-    "largest_contact_stiffness",
-    "motion_chain",
-]
-
 #: Springs that are tried, N/m.
 _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
 #: A spectral radius above 1 by more than this is no rounding.

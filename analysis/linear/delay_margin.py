@@ -18,20 +18,12 @@ from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from analysis.linear.loop_margins import is_loop, loop_margins
-from analysis.models.linear_models import LinearModel
+from analysis.models.linear_models import NEUTRAL, LinearModel
 from analysis.models.linearisation import plant_jacobians
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model, open_loop
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "DELAY_PLACES",
-    "DelayMargin",
-    "DelayPlace",
-    "DelayedLoop",
-    "delay_margin",
-]
 
 DelayPlace = Literal["sensor", "wheels"]
 
@@ -39,8 +31,6 @@ DelayPlace = Literal["sensor", "wheels"]
 #: takes them to, or wheel commands reach the motors later.
 DELAY_PLACES: tuple[DelayPlace, ...] = ("sensor", "wheels")
 
-#: Poles nearer to z = 1 are neutral at every delay.
-_NEUTRAL = 1e-7
 #: No larger delay margin is looked for, s.
 _LONGEST_S = 10.0
 
@@ -135,7 +125,7 @@ class DelayedLoop:
 
     def _largest(self, delay_s: float) -> tuple[float, complex]:
         poles = np.linalg.eigvals(self.period_matrix(delay_s))
-        poles = poles[np.abs(poles - 1.0) > _NEUTRAL]
+        poles = poles[np.abs(poles - 1.0) > NEUTRAL]
         largest = complex(poles[np.abs(poles).argmax()])
         return abs(largest), largest
 
@@ -200,8 +190,8 @@ def delay_margin(
     if loop.spectral_radius(0.0) >= 1.0:
         raise InputError(
             f"{at}, {direction}",
-            "the loop is unstable without a delay, and has no "
-            "delay margin; take a stable operating point (follow_equilibrium)",
+            "the loop is unstable without a delay, and has no delay margin; use a "
+            "stable operating point (follow_equilibrium)",
         )
     tick_s = point.loop.tick_s
     none = DelayMargin(at, direction, math.inf, math.nan)

@@ -16,14 +16,6 @@ from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 from systems.hearing.ideal_source_sensor import relative_position
 
-__all__ = [
-    "DelayCheck",
-    "DelayedRun",
-    "check_delay_margin",
-    "fitted_oscillation",
-    "simulate_delayed",
-]
-
 #: Kick that starts a run, m/s: far above rounding, far below what is not linear.
 _KICK_M_S = 1e-6
 
@@ -132,7 +124,7 @@ def simulate_delayed(
     if point.moves:
         raise InputError(
             "point",
-            "moves, and simulate_delayed is about rest; take one of "
+            "moves, and simulate_delayed needs a point at rest; use one of "
             "find_equilibria(scenario).points",
         )
     if delay_s < 0.0:

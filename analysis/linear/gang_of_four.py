@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.linear.frequency_levels import frequency_grid, peak
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import Direction, closed, cut_model
 from analysis.models.operating_points import OperatingPoint
 
-__all__ = ["GangOfFour", "gang_of_four"]
-
-#: Points of the frequency grid, and its lowest frequency, rad/s.
+#: Points of the frequency grid besides those of modes and peaks, and its lowest
+#: frequency, rad/s.
 _POINTS, _LOWEST = 800, 1e-2
 
 
@@ -25,7 +24,7 @@ class GangOfFour:
     direction: Direction
     """Along the line to the source, or across it."""
     omega: NDArray[np.float64]
-    """(n,) rad/s, up to the Nyquist frequency."""
+    """(n,) rad/s, up to the Nyquist frequency; the modes and the peaks are in it."""
     S: NDArray[np.complex128]
     """(n,) what is left at the sensor of an error of its estimate."""
     T: NDArray[np.complex128]
@@ -58,8 +57,18 @@ def gang_of_four(point: OperatingPoint, direction: Direction = "along") -> GangO
     whole = closed(cut, cut.input_names)
     own, push = f"sensor_{direction}", f"actuator_{direction}"
     part = minimal_model(whole.part([own, push], [own, push]))
-    highest = math.pi / (whole.period_s or 1.0)
-    omega = np.geomspace(_LOWEST, highest, _POINTS)
+    grid = frequency_grid(part.poles, part.period_s, lowest=_LOWEST, points=_POINTS)
+    peaks = [
+        peak(part.part([u], [y]), offset)[1]
+        for u, y, offset in (
+            (own, own, -1.0),
+            (own, own, 0.0),
+            (push, own, 0.0),
+            (own, push, 0.0),
+        )
+    ]
+    within = [omega for omega in peaks if 0.0 < omega <= grid[-1]]
+    omega = np.union1d(grid, within)
     response = part.response(omega)
     # What arrives at a cut is T-like: the error itself comes on top.
     T = -response[0, 0]

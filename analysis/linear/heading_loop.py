@@ -5,14 +5,14 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import control
 import numpy as np
+from numpy.typing import NDArray
 
+from analysis.linear.loop_margins import loop_margins
+from analysis.models.linear_models import LinearModel
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
-
-__all__ = ["HeadingLoopMargins", "heading_loop", "heading_loop_margins"]
 
 
 @dataclass(frozen=True)
@@ -40,7 +40,7 @@ def heading_loop(
     robot: RobotParameters,
     lag_s: float,
     tick_s: float | None = TICK_S,
-) -> control.TransferFunction:
+) -> LinearModel:
     """The open loop from the deviation to the heading, while it drives ahead.
 
     PID (Song 2011, table 1), duties v +- 0.01 e (table 2, mended), motors with a lag,
@@ -56,28 +56,73 @@ def heading_loop(
             without sampling.
 
     Returns:
-        deg to deg.
+        One input and one output, deg; feedback is negative.
     """
     full = min(motors.full_speed_m_s, robot.top_speed_m_s)
     turn = math.degrees(2.0 * 0.01 * full / robot.wheel_separation_m)
-    s = control.tf([1.0, 0.0], [1.0])
-    plant = turn / (s * (lag_s * s + 1.0))
+    # The states are written down one by one: transfer functions of so short a tick are
+    # ill-conditioned.
+    parts = _sampled if tick_s else _continuous
+    A, B, C, D = parts(heading, turn, lag_s, tick_s or 0.0)
+    if heading.integral == 0.0:
+        # Nothing reaches the integral, whose pole would count as one of the loop.
+        A, B, C = A[1:, 1:], B[1:], C[:, 1:]
+    return LinearModel(
+        name="L of the heading",
+        A=A,
+        B=B,
+        C=C,
+        D=D,
+        state_names=tuple(f"x{k}" for k in range(len(A))),
+        input_names=("deviation",),
+        output_names=("heading",),
+        period_s=tick_s,
+    )
+
+
+_Matrices = tuple[
+    NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]
+]
+
+
+def _continuous(
+    heading: HeadingControlParameters, turn: float, lag_s: float, _: float
+) -> _Matrices:
+    """States: integral of the deviation, heading, and its rate where motors lag.
+
+    The derivative of the deviation is taken into the heading or its rate.
+    """
     kp, ki, kd = heading.proportional, heading.integral, heading.differential
-    if tick_s is None:
-        return plant * (kp + ki / s + kd * s)
-    z = control.tf([1.0, 0.0], [1.0], tick_s)
-    pid = kp + ki * tick_s * z / (z - 1.0) + kd * (z - 1.0) / (tick_s * z)
-    return control.c2d(plant, tick_s, method="zoh") * pid
+    one = np.ones((1, 1))
+    if lag_s == 0.0:
+        A = np.array([[0.0, 0.0], [turn * ki, 0.0]])
+        B = np.array([[1.0], [turn * kp]])
+        return A, B, np.array([[0.0, 1.0]]), turn * kd * one
+    A = np.array(
+        [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [turn * ki / lag_s, 0.0, -1 / lag_s]]
+    )
+    jump = turn * kd / lag_s
+    B = np.array([[1.0], [jump], [(turn * kp - jump) / lag_s]])
+    return A, B, np.array([[0.0, 1.0, 0.0]]), 0.0 * one
 
 
-def _margins(
-    loop: control.TransferFunction, top_rad_s: float
-) -> tuple[float, float, float]:
-    """Gain margin, phase margin, deg, and crossover, rad/s."""
-    omega = np.geomspace(1e-3, 0.999 * top_rad_s, 4000)
-    response = control.frd(loop, omega, smooth=True)
-    gain, phase, _, _, crossover, _ = control.stability_margins(response)
-    return gain, phase, crossover
+def _sampled(
+    heading: HeadingControlParameters, turn: float, lag_s: float, tick_s: float
+) -> _Matrices:
+    """States: integral of the PID, last deviation, heading, and its rate."""
+    kp, ki, kd = heading.proportional, heading.integral, heading.differential
+    keep = math.exp(-tick_s / lag_s) if lag_s > 0.0 else 0.0
+    # Heading and rate after a tick, by the rate at its beginning and by the command.
+    coast = lag_s * (1.0 - keep)
+    moved = turn * np.array([[tick_s - coast], [1.0 - keep]])
+    pid = np.array([[1.0, -kd / tick_s]])
+    direct = kp + ki * tick_s + kd / tick_s
+    A = np.zeros((4, 4))
+    A[0, 0] = 1.0
+    A[2:, :2] = moved @ pid
+    A[2:, 2:] = [[1.0, coast], [0.0, keep]]
+    B = np.concatenate(([[ki * tick_s], [1.0]], moved * direct))
+    return A, B, np.array([[0.0, 0.0, 1.0, 0.0]]), np.zeros((1, 1))
 
 
 def heading_loop_margins(
@@ -100,16 +145,14 @@ def heading_loop_margins(
         The margins; the gain margin is infinite where no gain is too much.
     """
     parts = heading, motors, robot, lag_s
-    # Of the frequency response: polynomials of so short a tick are ill-conditioned.
-    gain, phase, crossover = _margins(heading_loop(*parts, tick_s), math.pi / tick_s)
-    _, free, _ = _margins(heading_loop(*parts, None), math.pi / tick_s)
-    delay = float(math.radians(phase) / crossover)
+    found = loop_margins(heading_loop(*parts, tick_s))
+    free = loop_margins(heading_loop(*parts, None))
     return HeadingLoopMargins(
         tick_s,
-        float(crossover),
-        float(phase),
-        delay,
-        delay / tick_s,
-        float(20.0 * np.log10(gain)),
-        float(free),
+        found.crossover_rad_s,
+        found.phase_margin_deg,
+        found.delay_margin_s,
+        found.delay_margin_s / tick_s,
+        found.gain_increase_margin_db,
+        free.phase_margin_deg,
     )

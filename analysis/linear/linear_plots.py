@@ -23,17 +23,6 @@ from analysis.models.ideal_loop import ideal_loop
 from analysis.reporting.palette import COLOURS, draw_grid
 from systems.world.geometry import rectangle_corners
 
-__all__ = [
-    "plot_bode",
-    "plot_equilibria",
-    "plot_gang_of_four",
-    "plot_nichols",
-    "plot_nyquist",
-    "plot_pole_cloud",
-    "plot_sensitivities",
-    "plot_step",
-]
-
 #: How each kind is drawn: marker, colour, title.
 _KINDS = {
     "sink": ("o", COLOURS["robot"], "sink"),
@@ -75,11 +64,14 @@ def plot_equilibria(search: EquilibriumSearch) -> Figure:
                 px + radius * np.cos(angle), py + radius * np.sin(angle), "--",
                 color=colour, linewidth=1.0, label="continuum",
             )  # fmt: skip
-    for number, switch in enumerate(search.switching):
+    for switch in search.switching:
+        title = "attractive switching point" if switch.attractive else "switching point"
+        label = None if title in drawn else title
+        drawn.add(title)
         axes.plot(
             *switch.p_WP, "s", color=COLOURS["estimate"], markersize=7, zorder=4,
-            markeredgecolor="black", linestyle="none",
-            label=None if number else "nearest body changes",
+            markeredgecolor="black", linestyle="none", label=label,
+            fillstyle="full" if switch.attractive else "none",
         )  # fmt: skip
     axes.set_aspect("equal")
     axes.set_xlim(x0, x1)
@@ -284,7 +276,7 @@ def plot_gang_of_four(gang: GangOfFour) -> Figure:
     """Sizes of S, T, PS and CS."""
     figure = Figure(figsize=(8.0, 5.4), layout="constrained")
     titles = {
-        "S": "S: error of the estimate that is left",
+        "S": "S: remaining error of the estimate",
         "PS": "PS: push to position, m / (m/s$^2$)",
         "CS": "CS: error to acceleration, (m/s$^2$) / m",
         "T": "T = 1 - S",

@@ -1,22 +1,29 @@
 """Margins of a loop: gain, phase, modulus, disk, and delay at its crossovers.
 
-All are read off the frequency response, with crossovers and peaks refined
-between the points of the grid, in continuous time or sampled alike. Gain and
-phase count in both directions: a loop whose plant is unstable without feedback
-is lost by too little gain.
+Crossovers and peaks come from the loop's matrices (``frequency_levels``), in
+continuous time or sampled alike, so none is missed between two points of a grid or
+beyond its ends. Gain and phase count in both directions: a loop whose plant is
+unstable without feedback is lost by too little gain.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from typing import Any
+from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
 
+from analysis.linear.frequency_levels import (
+    GRID_POINTS,
+    SEARCH_POINTS,
+    crossings,
+    frequency_grid,
+    level_frequencies,
+    peak,
+    with_middles,
+)
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import (
     BREAK_POINTS,
@@ -28,28 +35,8 @@ from analysis.models.open_loops import (
 from analysis.models.operating_points import OperatingPoint
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "SKEWS",
-    "DiskMargin",
-    "FrequencyResponse",
-    "LoopMargins",
-    "PointMargins",
-    "all_margins",
-    "frequency_response",
-    "is_loop",
-    "loop_margins",
-]
-
 #: Skews of the disks: guards gain reduction, both alike, gain increase.
 SKEWS = (-1.0, 0.0, 1.0)
-#: Points of a frequency grid.
-_POINTS = 1500
-#: Further ones near the Nyquist frequency of a sampled loop.
-_CLOSE = 300
-#: Lowest and highest frequency, rad/s; a sampled loop ends at its Nyquist frequency.
-_LOWEST, _HIGHEST = 1e-3, 1e3
-#: A frequency that counts as none, rad/s.
-_AT_REST = 1e-6
 #: A response below this everywhere is no loop.
 _NO_LOOP = 1e-9
 
@@ -106,6 +93,8 @@ class DiskMargin:
     def phase_margin_deg(self) -> float:
         """Phase may change by this much either way, deg."""
         # Where |d| = alpha meets the factors exp(j phase).
+        if self.alpha == math.inf:
+            return math.inf
         squared = self.alpha**2
         cosine = 4.0 - squared * (1.0 + self.skew**2)
         cosine /= 4.0 + squared * (1.0 - self.skew**2)
@@ -114,6 +103,8 @@ class DiskMargin:
     @property
     def _ends(self) -> tuple[float, float]:
         """Where the disk of factors meets the real axis."""
+        if self.alpha == math.inf:
+            return -math.inf, math.inf
         less, more = self.alpha * (1.0 - self.skew), self.alpha * (1.0 + self.skew)
         high = (2.0 + less) / (2.0 - more) if more < 2.0 else math.inf
         return (2.0 - less) / (2.0 + more), high
@@ -153,8 +144,13 @@ class LoopMargins:
     """M_t, largest |T|."""
     disks: tuple[DiskMargin, ...]
     """One for each of ``SKEWS``."""
-    response: FrequencyResponse = field(repr=False)
-    """For pictures."""
+    model: LinearModel = field(repr=False)
+    """L."""
+
+    @cached_property
+    def response(self) -> FrequencyResponse:
+        """For pictures."""
+        return frequency_response(self.model)
 
     @property
     def gain_increase_margin_db(self) -> float:
@@ -189,19 +185,21 @@ def _least_db(low: float, high: float) -> float:
 
 
 def frequency_response(model: LinearModel) -> FrequencyResponse:
-    """Response of a loop over all frequencies that count."""
-    highest = math.pi / model.period_s if model.period_s else _HIGHEST
-    omega = np.geomspace(_LOWEST, highest, _POINTS)
-    if model.period_s:
-        # Zeros near z = -1 turn the phase within the last thousandths.
-        close = highest * (1.0 - np.geomspace(1e-2, 1e-7, _CLOSE))
-        omega = np.sort(np.concatenate((omega, close)))
+    """Response of a loop over all frequencies that count, for pictures."""
+    omega = _grid(model, GRID_POINTS)
     return FrequencyResponse(omega, model.response(omega)[0, 0])
+
+
+def _grid(model: LinearModel, points: int) -> NDArray[np.float64]:
+    """Frequencies with the modes of the open and of the closed loop."""
+    poles = np.concatenate((model.poles, np.linalg.eigvals(_closed_matrix(model))))
+    return frequency_grid(poles, model.period_s, points=points)
 
 
 def is_loop(model: LinearModel) -> bool:
     """Whether anything comes back: a response of rounding errors has no margins."""
-    return bool(np.abs(frequency_response(model).L).max() > _NO_LOOP)
+    omega = _grid(model, SEARCH_POINTS)
+    return bool(np.abs(model.response(omega)[0, 0]).max() > _NO_LOOP)
 
 
 def loop_margins(model: LinearModel) -> LoopMargins:
@@ -216,20 +214,22 @@ def loop_margins(model: LinearModel) -> LoopMargins:
     if model.B.shape[1] != 1 or model.C.shape[0] != 1:
         raise InputError(
             f"{model.name}",
-            f"has {model.B.shape[1]} inputs and {model.C.shape[0]} "
-            "outputs; margins are of one loop, take one by LinearModel.part",
+            f"has {model.B.shape[1]} inputs and {model.C.shape[0]} outputs; margins "
+            "need exactly one loop; select one with LinearModel.part",
         )
-    response = frequency_response(model)
-
-    def L(omega: float) -> complex:
-        return complex(model.response([omega])[0, 0, 0])
-
     if not _closed_is_stable(model):
-        return _nothing(model.name, response)
-    upper, lower = _gain_margins(response, L, model.period_s)
-    lag, lead, crossover, delay = _phase_margins(response, L)
-    nearest, where = _minimum(response, L, lambda value: np.abs(1.0 + value))
-    peak_T, _ = _minimum(response, L, lambda value: -np.abs(value / (1.0 + value)))
+        return _nothing(model)
+    T = _complementary(model)
+    omega = _grid(model, SEARCH_POINTS)
+    upper, lower = _gain_margins(model, T, omega)
+    lag, lead, crossover, delay = _phase_margins(model, T, omega)
+    # S = 1 - T, and the disk of a skew is the least of 1/|S + (skew - 1)/2|.
+    peaks = [peak(T, (1.0 + skew) / 2.0) for skew in SKEWS]
+    disks = tuple(
+        DiskMargin(skew, 1.0 / largest if largest > 0.0 else math.inf, where)
+        for skew, (largest, where) in zip(SKEWS, peaks, strict=True)
+    )
+    largest_T, (largest_S, where) = peaks[0][0], peaks[-1]
     return LoopMargins(
         name=model.name,
         stable=True,
@@ -239,19 +239,19 @@ def loop_margins(model: LinearModel) -> LoopMargins:
         phase_lead_margin_deg=math.degrees(lead),
         crossover_rad_s=crossover,
         delay_margin_s=delay,
-        modulus_margin=nearest,
+        modulus_margin=1.0 / largest_S,
         modulus_frequency_rad_s=where,
-        sensitivity_peak=1.0 / nearest,
-        complementary_peak=-peak_T,
-        disks=tuple(_disk(response, L, skew) for skew in SKEWS),
-        response=response,
+        sensitivity_peak=largest_S,
+        complementary_peak=largest_T,
+        disks=disks,
+        model=model,
     )
 
 
-def _nothing(name: str, response: FrequencyResponse) -> LoopMargins:
+def _nothing(model: LinearModel) -> LoopMargins:
     """Of a closed loop that is unstable."""
     return LoopMargins(
-        name=name,
+        name=model.name,
         stable=False,
         gain_increase_margin=1.0,
         gain_reduction_margin=1.0,
@@ -264,46 +264,53 @@ def _nothing(name: str, response: FrequencyResponse) -> LoopMargins:
         sensitivity_peak=math.inf,
         complementary_peak=math.inf,
         disks=tuple(DiskMargin(skew, 0.0, math.nan) for skew in SKEWS),
-        response=response,
+        model=model,
     )
 
 
+def _closed_matrix(model: LinearModel) -> NDArray[np.float64]:
+    """(n, n) A of the closed loop."""
+    return model.A - model.B @ model.C / (1.0 + model.D[0, 0])
+
+
 def _closed_is_stable(model: LinearModel) -> bool:
-    gain = 1.0 / (1.0 + model.D[0, 0])
-    poles = np.linalg.eigvals(model.A - model.B @ model.C * gain)
+    poles = np.linalg.eigvals(_closed_matrix(model))
     if model.period_s:
         return bool((np.abs(poles) < 1.0).all())
     return bool((poles.real < 0.0).all())
 
 
-def _zeros(
-    omega: NDArray[np.float64],
-    values: NDArray[np.float64],
-    function: Callable[[float], float],
-) -> Iterator[float]:
-    """Where a function of frequency changes sign, between grid points."""
-    for k in np.flatnonzero(np.sign(values[:-1]) * np.sign(values[1:]) < 0):
-        yield float(brentq(function, omega[k], omega[k + 1], xtol=1e-14, rtol=1e-13))
+def _complementary(model: LinearModel) -> LinearModel:
+    """T = L/(1 + L); it has no poles on the border where the loop is stable."""
+    share = 1.0 / (1.0 + model.D[0, 0])
+    return replace(
+        model,
+        A=_closed_matrix(model),
+        B=share * model.B,
+        C=share * model.C,
+        D=share * model.D,
+    )
 
 
 def _gain_margins(
-    response: FrequencyResponse, L: Callable[[float], complex], period: float | None
+    model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float]:
     """Least factor above 1, and greatest below, that puts a pole on the border."""
-    upper, lower = math.inf, 0.0
-    values = [
-        L(omega)
-        for omega in _zeros(response.omega, response.L.imag, lambda w: L(w).imag)
+    # L is real where T is.
+    found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, -1j, 0.0))))
+    at = crossings(found, lambda w: model.response(w)[0, 0].imag)
+    values = list(model.response(at)[0, 0].real) if at else []
+    # At both ends of the border L is real, too. T tells a loop that integrates, and
+    # is without end at rest: no gain above 0 is too small.
+    ends = [0.0, math.pi / T.period_s] if T.period_s else [0.0]
+    values += [
+        t / (1.0 - t) for t in T.response(ends)[0, 0].real if abs(1.0 - t) > _NO_LOOP
     ]
-    at_rest = L(_AT_REST)
-    # A loop that integrates is without end at rest: no gain above 0 is too small.
-    if abs(at_rest.imag) < 1e-2 * abs(at_rest.real) < 1e-2 / _NO_LOOP:
-        values.append(at_rest)
-    if period:
-        values.append(L(math.pi / period))
+    values += [] if T.period_s else [float(model.D[0, 0])]
+    upper, lower = math.inf, 0.0
     for value in values:
-        if value.real < -_NO_LOOP:
-            gain = -1.0 / value.real
+        if value < -_NO_LOOP:
+            gain = -1.0 / value
             if gain >= 1.0:
                 upper = min(upper, gain)
             elif gain > _NO_LOOP:
@@ -312,51 +319,24 @@ def _gain_margins(
 
 
 def _phase_margins(
-    response: FrequencyResponse, L: Callable[[float], complex]
+    model: LinearModel, T: LinearModel, omega: NDArray[np.float64]
 ) -> tuple[float, float, float, float]:
     """Least lag and lead, rad, where the lesser is, rad/s, and least delay, s."""
+    # |L| = 1 where the real part of T is a half.
+    found = with_middles(np.concatenate((omega, level_frequencies(T, 0.0, 1.0, -1.0))))
+    at = crossings(found, lambda w: np.abs(model.response(w)[0, 0]) - 1.0)
     lag, lead, where, delay = math.inf, math.inf, math.nan, math.inf
-    size = np.abs(response.L) - 1.0
-    for omega in _zeros(response.omega, size, lambda w: abs(L(w)) - 1.0):
-        behind = float(np.angle(-L(omega))) % math.tau  # lag that leads to -1
+    for w, L in zip(at, model.response(at)[0, 0] if at else (), strict=True):
+        behind = float(np.angle(-L)) % math.tau  # lag that leads to -1
         ahead = math.tau - behind
         if min(behind, ahead) < min(lag, lead):
-            where = omega
+            where = w
         lag, lead = min(lag, behind), min(lead, ahead)
-        delay = min(delay, behind / omega)
+        delay = min(delay, behind / w)
+    if not model.period_s and abs(model.D[0, 0]) >= 1.0:
+        # Crossovers without end: no delay is short enough.
+        delay = 0.0
     return lag, lead, where, delay
-
-
-def _minimum(
-    response: FrequencyResponse,
-    L: Callable[[float], complex],
-    function: Callable[[Any], Any],
-) -> tuple[float, float]:
-    """Least value of a function of L over the grid, refined about its place."""
-    omega, values = response.omega, function(response.L)
-    k = int(np.argmin(values))
-    low, high = omega[max(k - 1, 0)], omega[min(k + 1, len(omega) - 1)]
-    found = minimize_scalar(
-        lambda w: float(function(L(w))),
-        bounds=(low, high),
-        method="bounded",
-        options={"xatol": 1e-9 * high},
-    )
-    if found.fun < values[k]:
-        return float(found.fun), float(found.x)
-    return float(values[k]), float(omega[k])
-
-
-def _disk(
-    response: FrequencyResponse, L: Callable[[float], complex], skew: float
-) -> DiskMargin:
-    """alpha is the least of 1/|S + (skew - 1)/2| over frequency."""
-
-    def size(value: Any) -> Any:
-        return -np.abs(1.0 / (1.0 + value) + (skew - 1.0) / 2.0)
-
-    largest, where = _minimum(response, L, size)
-    return DiskMargin(skew, -1.0 / largest, where)
 
 
 @dataclass(frozen=True)

@@ -20,16 +20,6 @@ from diagrams import Scenario
 from diagrams.loading import scenario_from_mapping
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "contact_poles",
-    "contact_uncertainty",
-    "following_poles",
-    "following_uncertainty",
-    "law_stiffness",
-    "range_slope",
-    "with_values",
-]
-
 #: Temperatures between which the speed of sound is not known, deg C.
 _TEMPERATURES_C = (5.0, 35.0)
 
@@ -82,7 +72,7 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
             1.0,
             0.98,
             1.02,
-            "true radius over the stated one: wear, pressure",
+            "true radius over stated radius: wear, pressure",
         ),
         UncertainParameter(
             "extra_ticks",
@@ -91,7 +81,7 @@ def _common(scenario: Scenario) -> tuple[UncertainParameter, ...]:
             0.0,
             0.0,
             1.0,
-            "a processor that needs a tick more; whole ticks",
+            "a processor that needs one more tick; whole ticks",
             whole=True,
         ),
     )
@@ -114,7 +104,7 @@ def _sound_speed(scenario: Scenario) -> UncertainParameter:
         c,
         min(c, ends[0]),
         max(c, ends[1]),
-        "air of 5 to 35 deg C where the estimator believes in one speed",
+        "air of 5 to 35 deg C, while the estimator assumes one speed",
     )
 
 

@@ -15,18 +15,6 @@ from numpy.typing import NDArray
 
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "PoleCloud",
-    "PoleFunction",
-    "PoleSensitivity",
-    "UncertainParameter",
-    "continuous",
-    "damping_ratio",
-    "pole_cloud",
-    "pole_sensitivities",
-    "slowest_pole",
-]
-
 #: Poles in the z plane at given values of the parameters, by name; those that are
 #: neutral whatever the values are (the heading at rest) are left out.
 PoleFunction = Callable[[Mapping[str, float]], NDArray[np.complex128]]
@@ -57,8 +45,8 @@ class UncertainParameter:
         if not self.low <= self.nominal <= self.high or self.low == self.high:
             raise InputError(
                 f"{self.name}",
-                f"{self.nominal:g} is not within [{self.low:g}, "
-                f"{self.high:g}], or these are equal; mend the interval",
+                f"{self.nominal:g} is not within [{self.low:g}, {self.high:g}], or "
+                "its ends are equal; correct the interval",
             )
 
 

@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 
 from analysis.linear.contact_mode import contact_matrix
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import frozen_scenario, ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
-
-__all__ = ["ContactSlopes", "RootLocus", "contact_slopes", "root_loci"]
 
 #: Gains that are tried, over today's.
 _FACTORS = np.geomspace(0.05, 20.0, 121)

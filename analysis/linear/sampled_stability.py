@@ -15,17 +15,6 @@ from analysis.models.linear_models import LinearModel
 from diagrams.scenario import Scenario
 from systems.framework.signals import TICK_S
 
-__all__ = [
-    "SCHEMES",
-    "ConditionCheck",
-    "PolesAgainstPeriod",
-    "StabilityChart",
-    "check_conditions",
-    "gain_chart",
-    "gain_delay_chart",
-    "poles_against_period",
-]
-
 Scheme = Literal["held acceleration", "held velocity", "held velocity, one tick late"]
 
 #: Ways to sample a double integrator; the second is the built one without lag.

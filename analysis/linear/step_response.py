@@ -18,8 +18,6 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point
 
-__all__ = ["Oscillation", "StepCheck", "check_step", "fitted_step"]
-
 
 @dataclass(frozen=True)
 class Oscillation:
@@ -108,9 +106,8 @@ def _along(point: OperatingPoint, modes: list[Any]) -> Any:
     if not modes:
         raise InputError(
             "attraction",
-            "about the equilibrium nothing oscillates, so that there is "
-            "no frequency to compare; take a stiffness_n_m that is larger for the "
-            "damping_n_s_m",
+            "nothing oscillates about the equilibrium, so that there is no frequency "
+            "to compare; use a larger stiffness_n_m for this damping_n_s_m",
         )
     return max(modes, key=lambda mode: mode.frequency_rad_s)
 

@@ -14,8 +14,6 @@ from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.channel_faults import ChannelFault, find_channel_faults
 from analysis.recordings.clock_drift import STRETCH_S, clock_drift, common_lags
 
-__all__ = ["LiveFaults"]
-
 # Share of samples at full scale from which on a channel is clipped.
 _CLIPPED, _CLIPPED_SHARE = 0.999, 1e-3
 

@@ -17,15 +17,14 @@ from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.array_match import array_mismatch, chosen_microphones
 from analysis.recordings.channel_faults import ChannelFault
 from systems.framework.input_error import InputError
-from systems.hearing.voting import VotePlan, vote_plan
+from systems.hearing.voting.direction_votes import VotePlan
+from systems.hearing.voting.listening_plan import vote_plan
 from systems.hearing.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     TrackedSources,
     hear_sources,
 )
-
-__all__ = ["HeardStep", "HeardStream", "LiveHearing", "listen", "track_document"]
 
 _BAND_HZ = (200.0, 15_000.0)
 _TOP_OF_RATE = 0.45
@@ -184,7 +183,7 @@ class LiveHearing:
             self._plan = self._voting(chosen_microphones(self._geometry, self._alive))
         except ValueError:
             raise self._end(
-                f"{fault.message}; those that are left tell no bearings"
+                f"{fault.message}; the remaining channels give no bearings"
             ) from None
 
     def _end(self, fault: str) -> StreamBrokenError:

@@ -21,8 +21,6 @@ from analysis.listening.sound_stream import (
 )
 from systems.framework.input_error import InputError
 
-__all__ = ["open_card"]
-
 # Blocks that may wait to be heard, 5 s of them.
 _MOST_WAITING = 250
 
@@ -80,7 +78,9 @@ def open_card(
             ) as card:
                 yield from recorder.blocks(card)
         except sounddevice.PortAudioError as error:
-            raise StreamBrokenError(f"the sound card broke off ({error})") from None
+            raise StreamBrokenError(
+                f"the sound card stopped recording ({error})"
+            ) from None
 
     return SoundStream(channels, sample_rate_hz, blocks())
 
@@ -119,7 +119,7 @@ class _Recorder:
                 samples, lost = self._waiting.get(timeout=SILENT_AFTER_S)
             except queue.Empty:
                 if not card.active:
-                    raise StreamBrokenError("the sound card has gone") from None
+                    raise StreamBrokenError("the sound card was disconnected") from None
                 if not gap:
                     none = np.zeros((self._channels, 0), np.float32)
                     yield SoundBlock(none, (STOPPED,))

@@ -27,8 +27,6 @@ from analysis.listening.sound_stream import (
 )
 from systems.framework.input_error import InputError
 
-__all__ = ["SAMPLE_FORMATS", "SampleFormat", "open_flac", "open_pipe"]
-
 SampleFormat = Literal["s16le", "s24le", "s32le", "f32le"]
 
 #: Names of raw samples, as other programs use them, and their bytes.
@@ -126,7 +124,9 @@ def _begin(source: _Source, raw: _Format | None) -> tuple[_Format, int | None]:
         return _wav_header(source)
     if raw is None:
         raise InputError(
-            "input", "it is no WAV; say what it is, as --rate 48000 --format s16le"
+            "input",
+            "it is not a WAV file; state its format, for example --rate 48000 "
+            "--format s16le",
         )
     source.unread(start)
     return raw, None
@@ -205,7 +205,8 @@ def _check_stated(
 ) -> None:
     if stated_rate not in (None, rate):
         raise InputError(
-            "--rate", f"is {stated_rate} Hz, but the file says {rate} Hz; leave it out"
+            "--rate",
+            f"is {stated_rate} Hz, but the file states {rate} Hz; leave it out",
         )
     if stated_channels not in (None, channels):
         raise InputError(
@@ -222,19 +223,21 @@ def _wav_header(source: _Source) -> tuple[_Format, int | None]:
     """
     _exactly(source, 4)
     if _exactly(source, 4) != b"WAVE":
-        raise InputError("input", "it begins like a WAV and is none; convert it")
+        raise InputError(
+            "input", "it begins like a WAV file but is not one; convert it"
+        )
     found = None
     for _ in range(_MOST_CHUNKS):
         name, size = struct.unpack("<4sI", _exactly(source, 8))
         if name == b"data":
             break
         if size > _MOST_HEADER:
-            raise InputError("input", "the WAV header is not whole; record it again")
+            raise InputError("input", "the WAV header is incomplete; record it again")
         chunk = _exactly(source, size + size % 2)
         if name == b"fmt ":
             found = chunk
     if found is None or len(found) < 16:
-        raise InputError("input", "the WAV header is not whole; record it again")
+        raise InputError("input", "the WAV header is incomplete; record it again")
     kind, channels, rate, _, _, bits = struct.unpack("<HHIIHH", found[:16])
     if kind == _EXTENSIBLE and len(found) >= 26:
         kind = struct.unpack("<H", found[24:26])[0]
@@ -335,7 +338,8 @@ def _another(source: _Source, form: _Format) -> int | None:
     if other != form:
         # Times and delays are counted in samples of one rate.
         raise StreamBrokenError(
-            f"the stream changes from {form} to {other}; listen to that by itself"
+            f"the stream changes from {form} to {other}; listen to the second part by "
+            "itself"
         )
     return length
 

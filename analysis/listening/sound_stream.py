@@ -9,24 +9,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "BLOCK_S",
-    "SILENT_AFTER_S",
-    "STOPPED",
-    "Pace",
-    "SoundBlock",
-    "SoundStream",
-    "StreamBrokenError",
-]
-
 #: Blocks are this long, s: short beside a step of the listener.
 BLOCK_S = 0.02
 
 #: A stream that brings nothing for so long has stopped, s.
 SILENT_AFTER_S = 1.0
 STOPPED = (
-    f"no sound has come for {SILENT_AFTER_S:g} s; sources begin anew when it goes on, "
-    "and times count the sound alone"
+    f"no sound has come for {SILENT_AFTER_S:g} s; tracks of sources restart when it "
+    "continues, and times count the sound only"
 )
 
 # Seconds over which the pace of samples is measured; what it may be off; beyond what it
@@ -114,6 +104,6 @@ class Pace:
         fault = (
             f"samples come at {1e-3 * pace * self._rate:.3g} kHz, and "
             f"{1e-3 * self._rate:g} kHz are stated: samples get lost, or the rate is "
-            "wrong and so are all bearings; see to --rate and the recorder"
+            "wrong, which makes all bearings wrong; check --rate and the recorder"
         )
         return (fault,)

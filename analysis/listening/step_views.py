@@ -12,8 +12,6 @@ from analysis.listening.live_hearing import HeardStep, track_document
 from systems.hearing.voting.source_listener import TrackedSources
 from systems.hearing.voting.source_tracks import SourceTrack
 
-__all__ = ["JsonLines", "Screen", "Teller", "TextLines", "view"]
-
 # Columns of the compass, which is odd so that ahead is in its middle, and its least.
 _COLUMNS, _LEAST_COLUMNS = 73, 25
 

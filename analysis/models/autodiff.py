@@ -8,8 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.autodiffutils import ExtractGradient, ExtractValue, InitializeAutoDiff
 
-__all__ = ["seed", "value_and_gradient"]
-
 
 def seed(values: Any) -> Any:
     """The values as AutoDiffXd, each its own variable; (n,)."""

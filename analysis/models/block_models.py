@@ -21,8 +21,6 @@ from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
 from diagrams.simulation import simulator_config
 
-__all__ = ["block_model", "join_blocks", "sampled_blocks", "sampled_twin"]
-
 #: Appended to the name of a signal as it is after the updates of its tick.
 AFTER = "_after"
 

@@ -9,16 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.systems.analysis import InitializeParams
 
-__all__ = [
-    "Port",
-    "Runner",
-    "begin",
-    "get_state",
-    "run_periods",
-    "set_discrete_state",
-    "set_state",
-]
-
 #: A port of a block: (role in ``SoundFollower.blocks``, name of the port).
 Port = tuple[str, str]
 

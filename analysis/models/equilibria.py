@@ -8,50 +8,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.models.equilibrium_search import (
-    CONTACT_CELLS,
+    CONTACT_M,
     CellSearch,
     Leftover,
     SearchArea,
+    SwitchingPoint,
 )
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import frozen_scenario, ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import (
+    frozen_scenario,
+    ideal_scenario,
+    moving_bodies,
+)
 from analysis.models.operating_points import (
     FLAT,
     NO_FORCE_N,
     OperatingPoint,
     resting_equilibrium,
 )
+from analysis.runs.shortest_path import shortest_path_length
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "EquilibriumSearch",
-    "SwitchingPoint",
-    "find_equilibria",
-    "follow_equilibrium",
-    "nearest_equilibrium",
-]
+from systems.world.geometry import control_point, rectangle_corners
 
 #: Roots nearer to each other than this are one, m.
 _SAME_M = 1e-6
 #: Starts of Newton's method in a group of cells, beside those round which the
 #: force turns.
 _MOST_STARTS = 6
+#: At most about so many of the latter, and groups of cells after the first round.
+_MOST_TURNED, _MOST_GROUPS = 12, 12
 #: Newton's method gives up so far from its start, m.
 _NEWTON_REACH_M = 0.5
 #: Edge of the smallest cells, m.
 _SMALLEST_M = 0.002
-
-
-@dataclass(frozen=True)
-class SwitchingPoint:
-    """Where the nearest body changes and the forces before and behind oppose."""
-
-    p_WP: NDArray[np.float64]
-    """(2,) m, to the size of a cell."""
-    attractive: bool
-    """Both forces drive P to the line on which the body changes: P stays there,
-    chattering."""
+#: A point of rest is known to so many smallest cells: what is left over farther from
+#: all that were found is quartered on.
+_KNOWN_CELLS = 3
+#: So many times, and while there are no more cells than this.
+_ROUNDS, _MOST_CELLS = 10, 60_000
+#: Width of a line of sight, m.
+_LINE_M = 1e-3
+#: Offsets from the follow distance that differ by less are equal, m.
+_SAME_OFFSET_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -71,18 +71,49 @@ class EquilibriumSearch:
     cells: int
     """Cells looked at, of all sizes."""
     unresolved: tuple[tuple[float, float], ...]
-    """Centres of groups of cells that could neither be left out nor be traced
-    to an equilibrium, m."""
+    """Middles of groups of cells that could neither be left out nor be traced to a
+    listed point of rest, m."""
     empty_outside: bool
     """Whether attraction exceeds every repulsion beyond the area."""
 
+    moving: tuple[str, ...]
+    """Bodies that move in the scenario that was asked about."""
+
     @property
     def complete(self) -> bool:
-        """Whether no equilibrium can have been missed."""
+        """Whether every place of rest lies within three cells of one that is listed."""
         return not self.unresolved and self.empty_outside
 
+    def way_m(self, point: OperatingPoint) -> float:
+        """Length of the shortest free way of P from the start to a point.
+
+        The way is kept half the robot's width from every body, or as far as the
+        start and the point are themselves.
+
+        Args:
+            point: One of ``points``.
+
+        Returns:
+            m; infinite where there is no way.
+        """
+        return self._way(point, self.scenario.robot.width_m / 2.0)
+
+    def _way(self, point: OperatingPoint, radius: float) -> float:
+        boxes = [body.rectangle(0.0) for body in self.scenario.bodies().values()]
+        radius = min(radius, 0.99 * point.clearance_m)
+        return shortest_path_length(self._start, point.p_WP, 0.0, boxes, radius)
+
+    @property
+    def _start(self) -> NDArray[np.float64]:
+        """(2,) P at the start, m."""
+        epsilon = self.scenario.robot.control_point_m
+        return np.array(control_point(self.scenario.start.pose, epsilon))
+
     def follow_point(self) -> OperatingPoint:
-        """The stable equilibrium that is nearest to the follow distance.
+        """The stable equilibrium nearest to the follow distance, in free reach.
+
+        Of several at the same distance from the follow point it is the one nearest to
+        the start. Where no free way leads to any, it is the best of all the same.
 
         Raises:
             InputError: There is no stable equilibrium.
@@ -92,28 +123,81 @@ class EquilibriumSearch:
             kinds = ", ".join(point.kind for point in self.points) or "none at all"
             raise InputError(
                 "attraction",
-                f"the loop has no stable equilibrium (found: {kinds}), so that there "
-                "is nothing to linearise about; raise attraction.damping_n_s_m or "
-                "lower the law's stiffness",
+                f"the loop has no stable equilibrium (found: {kinds}), so that "
+                "there is no point to linearize about; raise "
+                "attraction.damping_n_s_m or lower the law's stiffness",
             )
-        return min(sinks, key=lambda point: abs(point.offset_m))
+        reached = [point for point in sinks if np.isfinite(self.way_m(point))]
+        return min(
+            reached or sinks,
+            key=lambda point: (
+                round(abs(point.offset_m) / _SAME_OFFSET_M),
+                float(np.linalg.norm(point.p_WP - self._start)),
+            ),
+        )
 
     @property
     def statement(self) -> str:
         """What was searched, and how completely, in a sentence or two."""
         x0, x1, y0, y1 = self.area_m
         where = f"[{x0:g}, {x1:g}] m x [{y0:g}, {y1:g}] m"
-        contact = CONTACT_CELLS * self.cell_m * 1e3
         text = (
             f"{len(self.points)} equilibria and {len(self.switching)} switching "
-            f"points with P in {where}, {contact:.0f} mm or more from every body. "
-            f"{self.cells} cells down to {self.cell_m * 1e3:.1f} mm were looked at; "
-            "in those left out the force exceeds its largest change within the cell"
+            f"points with P in {where}, {CONTACT_M * 1e3:.0f} mm or more from every "
+            f"body. {self.cells} cells down to {self.cell_m * 1e3:.1f} mm were looked "
+            "at; in those left out no mean of the forces is zero"
         )
         if self.unresolved:
             text += f"; {len(self.unresolved)} groups of cells stay open"
         beyond = "exceeds" if self.empty_outside else "need not exceed"
         return f"{text}. Beyond the area the attraction {beyond} every repulsion."
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a reader must know before the numbers about ``follow_point``."""
+        found = []
+        at = self.follow_point()
+        x, y = at.p_WP
+        if not self.complete:
+            places = [f"({u:.2f}, {v:.2f})" for u, v in self.unresolved[:3]]
+            found.append(
+                "The search for places of rest is incomplete: "
+                + (
+                    f"{len(self.unresolved)} groups of cells stay open, about "
+                    f"{', '.join(places)} m. "
+                    if places
+                    else "P may also rest beyond the area that was searched. "
+                )
+                + "There may be places of rest that are not listed."
+            )
+        if self.moving:
+            found.append(
+                f"Bodies move ({', '.join(self.moving)}): the report assumes "
+                "that they rest at their places at 0 s."
+            )
+        way, straight = self.way_m(at), float(np.linalg.norm(at.p_WP - self._start))
+        place = f"The operating point, P at ({x:.3f}, {y:.3f}) m,"
+        if not np.isfinite(way):
+            found.append(
+                f"{place} is not reachable: no path as wide as the robot leads "
+                "there from the start."
+            )
+        elif self._way(at, _LINE_M) > straight + _LINE_M:
+            found.append(
+                f"{place} lies behind a body as seen from the start: the "
+                f"shortest path around it is {way:.2f} m long, the straight line "
+                f"{straight:.2f} m."
+            )
+        traps = [point.p_WP for point in self.switching if point.attractive]
+        if traps:
+            places = [f"({u:.3f}, {v:.3f})" for u, v in traps[:3]]
+            found.append(
+                f"P can also come to stay, chattering, at {len(traps)} attractive "
+                f"switching points: {', '.join(places)} m"
+                f"{' and others' if len(traps) > 3 else ''}. No linear model holds "
+                "there."
+            )
+        return tuple(found)
 
 
 def find_equilibria(
@@ -127,7 +211,8 @@ def find_equilibria(
     Args:
         scenario: Its sensors are taken to be ideal; bodies rest where they are
             at time zero (``frozen_scenario`` for another moment).
-        area_m: Of P; by default all bodies and the start with 2 m around.
+        area_m: Of P; by default all bodies and the start with the follow distance and
+            1 m around.
         smallest_m: Edge below which cells are not quartered, m.
 
     Returns:
@@ -138,6 +223,7 @@ def find_equilibria(
     """
     if not smallest_m > 0.0:
         raise InputError("smallest_m", f"is {smallest_m}; give a positive length in m")
+    moving = moving_bodies(scenario)
     scenario = frozen_scenario(ideal_scenario(scenario))
     area = area_m or _area(scenario)
     if not (area[0] < area[1] and area[2] < area[3]):
@@ -147,69 +233,148 @@ def find_equilibria(
     loop = ideal_loop(scenario)
     field_ = ForceField(loop)
     search = CellSearch(field_)
-    groups, cells, edge = search.left_over(area, smallest_m)
-    roots: list[NDArray[np.float64]] = []
-    switching: list[SwitchingPoint] = []
-    unresolved: list[tuple[float, float]] = []
-    for group in groups:
-        found = _roots(field_, group, edge, scenario.start.position_m)
-        switches = _switching_points(search, group)
-        if not found and not switches:
-            weakest = group.centres[group.strengths.argmin()]
-            unresolved.append((float(weakest[0]), float(weakest[1])))
-        roots += [r for r in found if not _near(r, roots)]
-        switching += switches
+    left, cells, edge = search.left_over(area, smallest_m)
+    known = _KNOWN_CELLS * edge
+    found = _Found([], [], [], np.asarray(scenario.start.position_m))
+    finest = edge
+    groups: list[Leftover] = []
+    for round_ in range(_ROUNDS):
+        groups = search.groups(left, finest)
+        if round_:
+            # Many are left over along a circle that is nearly one of equilibria; what
+            # is passed over has its turn among the quarters.
+            groups = sorted(groups, key=lambda group: group.strengths.min())
+            groups = groups[:_MOST_GROUPS]
+        for group in groups:
+            found.add(search, field_, group, finest, first=round_ == 0)
+        left = left[~found.explain(search, left, known)]
+        if not len(left) or len(left) > _MOST_CELLS or round_ == _ROUNDS - 1:
+            break
+        cells += 4 * len(left)
+        left, finest = search.quartered(left, finest)
+    roots = found.roots + found.flat
     points = [resting_equilibrium(loop, root) for root in roots]
     points.sort(key=lambda point: point.source_distance_m)
+    unresolved = [
+        group.centres[group.strengths.argmin()] for group in search.groups(left, finest)
+    ]
     return EquilibriumSearch(
         scenario=scenario,
         points=tuple(points),
-        switching=tuple(switching),
+        switching=tuple(found.switching),
         area_m=area,
         cell_m=edge,
         cells=cells,
-        unresolved=tuple(unresolved),
+        unresolved=tuple((float(x), float(y)) for x, y in unresolved),
         empty_outside=search.outside_is_empty(area),
+        moving=moving,
     )
+
+
+@dataclass
+class _Found:
+    """Points of rest that are known so far."""
+
+    roots: list[NDArray[np.float64]]
+    """Isolated equilibria."""
+    flat: list[NDArray[np.float64]]
+    """One of each continuum."""
+    switching: list[SwitchingPoint]
+    start: NDArray[np.float64]
+    """(2,) of the robot, m."""
+
+    def add(
+        self,
+        search: CellSearch,
+        field_: ForceField,
+        group: Leftover,
+        edge: float,
+        *,
+        first: bool,
+    ) -> None:
+        """Looks for points of rest in and about a group of cells.
+
+        Of a continuum the point nearest to the robot's start stands for all.
+        """
+        near = np.linalg.norm(group.centres - self.start, axis=1).argmin()
+        turned = np.flatnonzero(group.winding)
+        turned = turned[:: max(1, len(turned) // _MOST_TURNED)]
+        weakest = np.argsort(group.strengths)[: _MOST_STARTS if first else 1]
+        starts = (near, *weakest, *turned) if first else (*weakest, *turned[:2])
+        found: list[NDArray[np.float64]] = []
+        flat: list[NDArray[np.float64]] = []
+        for cell in starts:
+            if len(flat) > _MOST_STARTS:
+                break
+            root = nearest_equilibrium(field_, group.centres[cell])
+            if root is None:
+                continue
+            if np.abs(group.centres - root).max(axis=1).min() > 2.0 * edge:
+                continue
+            sizes = np.abs(np.linalg.eigvals(field_.gradient(root)[1]))
+            isolated = sizes.min() > FLAT * max(sizes.max(), 1.0)
+            kept = found if isolated else flat
+            if not _near(root, kept):
+                kept.append(root)
+        self.roots += [root for root in found if not _near(root, self.roots)]
+        if not found and flat:
+            self._add_flat(search, flat[0])
+        for point in search.switching_points(group, edge):
+            if not _near(point.p_WP, [other.p_WP for other in self.switching]):
+                self.switching.append(point)
+
+    def _add_flat(self, search: CellSearch, root: NDArray[np.float64]) -> None:
+        """Keeps of each circle round the source the point nearest to the start."""
+
+        def radius(p: NDArray[np.float64]) -> float:
+            return float(np.linalg.norm(p - search.p_WS))
+
+        def away(p: NDArray[np.float64]) -> float:
+            return float(np.linalg.norm(p - self.start))
+
+        for k, other in enumerate(self.flat):
+            if abs(radius(root) - radius(other)) < _SAME_M:
+                self.flat[k] = min(other, root, key=away)
+                return
+        self.flat.append(root)
+
+    def explain(
+        self, search: CellSearch, cells: NDArray[np.float64], known_m: float
+    ) -> NDArray[np.bool_]:
+        """(n,) whether cells lie about a point of rest that is known."""
+        near = np.zeros(len(cells), dtype=bool)
+        for place in (*self.roots, *(point.p_WP for point in self.switching)):
+            near |= np.linalg.norm(cells - place, axis=1) <= known_m
+        for place in self.flat:
+            near |= np.linalg.norm(cells - place, axis=1) <= known_m
+            # Without a push P is free to move round the source.
+            to = cells - search.p_WS
+            radius = float(np.linalg.norm(place - search.p_WS))
+            close = np.abs(np.linalg.norm(to, axis=1) - radius) <= 0.5 * known_m
+            if radius == 0.0 or not close.any():
+                continue
+            angle = np.arctan2(to[close, 1], to[close, 0])
+            for turn in np.linspace(-0.8, 0.8, 9) * known_m / radius:
+                ring = radius * np.stack(
+                    (np.cos(angle + turn), np.sin(angle + turn)), axis=-1
+                )
+                rests = np.linalg.norm(search.forces(search.p_WS + ring), axis=1)
+                near[np.flatnonzero(close)[rests < NO_FORCE_N]] = True
+        return near
 
 
 def _area(scenario: Scenario) -> SearchArea:
     margin = scenario.attraction.follow_distance_m + 1.0
-    places = [scenario.start.position_m]
-    places += [tuple(b.rectangle(0.0)[:2]) for b in scenario.bodies().values()]
-    low, high = np.min(places, axis=0) - margin, np.max(places, axis=0) + margin
+    places = [np.array(scenario.start.position_m)[None]]
+    places += [rectangle_corners(b.rectangle(0.0)) for b in scenario.bodies().values()]
+    everything = np.concatenate(places)
+    low, high = everything.min(axis=0) - margin, everything.max(axis=0) + margin
     edges = [low[0], high[0], low[1], high[1]]
     return tuple(round(float(edge), 3) for edge in edges)  # type: ignore[return-value]
 
 
 def _near(root: NDArray[np.float64], roots: list[NDArray[np.float64]]) -> bool:
     return any(np.linalg.norm(root - other) < _SAME_M for other in roots)
-
-
-def _roots(
-    field_: ForceField, group: Leftover, edge: float, start: tuple[float, float]
-) -> list[NDArray[np.float64]]:
-    """Zeros of the force in and about a group of cells.
-
-    Of a continuum the point nearest to the robot's start stands for all.
-    """
-    near = np.linalg.norm(group.centres - np.asarray(start), axis=1).argmin()
-    turned = np.flatnonzero(group.winding)
-    weakest = np.argsort(group.strengths)[:_MOST_STARTS]
-    found: list[NDArray[np.float64]] = []
-    flat: list[NDArray[np.float64]] = []
-    for cell in (near, *weakest, *turned):
-        if len(flat) > _MOST_STARTS:
-            break
-        root = nearest_equilibrium(field_, group.centres[cell])
-        if root is None or np.abs(group.centres - root).max(axis=1).min() > 2.0 * edge:
-            continue
-        sizes = np.abs(np.linalg.eigvals(field_.gradient(root)[1]))
-        isolated = sizes.min() > FLAT * max(sizes.max(), 1.0)
-        kept = found if isolated else flat
-        if not _near(root, kept):
-            kept.append(root)
-    return found or flat[:1]
 
 
 def nearest_equilibrium(
@@ -237,29 +402,10 @@ def nearest_equilibrium(
     return p if np.linalg.norm(field_.force(p)) < NO_FORCE_N else None
 
 
-def _switching_points(search: CellSearch, group: Leftover) -> list[SwitchingPoint]:
-    """At most one a group: where the two forces come nearest to cancelling."""
-    if not group.switches.any():
-        return []
-    centres = group.centres[group.switches]
-    first, second, away_1, away_2 = search.opposed(centres)
-    normal = away_1 - away_2
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), 1e-12)[:, None]
-    across_1 = np.einsum("nj,nj->n", first, normal)
-    across_2 = np.einsum("nj,nj->n", second, normal)
-    total = across_1 - across_2
-    share = np.divide(-across_2, total, out=np.full_like(total, -1.0), where=total != 0)
-    sliding = first * share[:, None] + second * (1.0 - share[:, None])
-    opposed = (share >= 0.0) & (share <= 1.0)
-    left = np.where(opposed, np.linalg.norm(sliding, axis=1), np.inf)
-    best = int(left.argmin())
-    if left[best] > group.change[group.switches][best]:
-        return []
-    return [SwitchingPoint(centres[best], bool(across_1[best] > 0.0))]
-
-
 def follow_equilibrium(scenario: Scenario) -> OperatingPoint:
-    """The stable equilibrium at rest that is nearest to the follow distance.
+    """The stable equilibrium at rest that the robot can follow the source at.
+
+    See ``EquilibriumSearch.follow_point``.
 
     Raises:
         InputError: There is no stable equilibrium.

@@ -1,35 +1,62 @@
 """Where forces cancel: a search that leaves out no part of the workspace.
 
-The workspace is cut into square cells. A cell in whose middle the force exceeds
-what it can change by within the cell (a Lipschitz bound of attraction and law,
-the law's taken from samples of the controller every millimetre) holds no
-equilibrium; any other one is quartered, down to a smallest size. What is left
-lies about the equilibria, and Newton's method with the blocks' own gradient
-finds them from there.
+P can rest where some mean of the forces on the two sides of a switch is zero
+(Filippov's convex definition): at a point p whose nearest body is k alone, where
+F_k(p) = pull(p) + push_k(p) = 0; and where several bodies are equally near, wherever
+the convex hull of their F_k(p) holds the origin. The workspace is cut into square
+cells. A cell is left out only if it holds no such point; any other one is quartered.
+
+Why none can be lost. Let c be the middle of a cell, r half its diagonal, and d_k the
+distances from the bodies. Distances change by at most r within the cell, so the nearest
+body of each of its points is one with d_k(c) <= min d(c) + 2 r: these *count*. Within
+the cell F_k changes by at most ``change``: the Lipschitz bound of pull and push
+times r, and the error of the law's table. If there is a unit vector u with
+F_k(c) . u > change for every body that counts, then F_k(p) . u > 0 for all of them at
+every p of the cell, hence for every mean of them, and no hull holds the origin. Where
+one body counts, F_k = 0 needs |pull| = |push_k| as well, so the cell is left out
+where these sizes differ by more than their own changes. Where several count this says
+nothing: two pushes can cancel one another (the middle of a corridor). With
+``aggregation: sum`` the same holds for the sums of pushes of the nearest three.
+Cells are left out as wholes, and the quarters of a cell cover it, so by induction
+every point of rest lies in a cell that is left over.
+
+What the bound takes for granted: the law is convex or concave between two samples, a
+millimetre apart. The bound is then that of the samples joined by chords, and the law
+leaves a chord by at most twice as much as half way.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import label, maximum_filter1d
+from scipy.ndimage import maximum_filter1d
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from analysis.models.force_field import ForceField
-from systems.world.geometry import nearest_point_on_rectangle, rotate
-
-__all__ = ["CONTACT_CELLS", "CellSearch", "Leftover", "SearchArea"]
+from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 
 #: Spacing of the samples of the law, m.
 _SAMPLE_M = 1e-3
 #: Edge of the first cells, m.
 _FIRST_CELL_M = 0.25
 
-#: Nearer to a body than so many smallest cells is contact, and not searched: there
-#: the direction to the nearest point turns within a cell.
-CONTACT_CELLS = 2
+#: Nearer to a body than this is contact, and not searched, m: there the direction to
+#: the nearest point turns within a cell.
+CONTACT_M = 4e-3
+#: Bodies whose pushes are added with ``aggregation: sum``.
+_SLOTS = 3
+#: Steps towards the point of the hull that is nearest to the origin.
+_HULL_STEPS = 6
+#: Steps of Newton's method to a switching point.
+_NEWTON_STEPS = 25
+#: At most so many starts in a group of cells.
+_MOST_STARTS = 200
+#: A length that counts as none, m.
+_SAME_M = 1e-9
 
 #: Smallest x, largest x, smallest y, largest y, m.
 SearchArea = tuple[float, float, float, float]
@@ -40,6 +67,49 @@ def _unit(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
     return vectors / np.maximum(size, 1e-300)[:, None]
 
 
+def _sampled(field: ForceField, farthest: float) -> tuple[NDArray[np.float64], ...]:
+    """Distances, m, law, N, and by how much it leaves the chord after each, N.
+
+    A corner of the law within an interval is made an end of it.
+    """
+
+    def law(c: NDArray[np.float64]) -> NDArray[np.float64]:
+        # At a distance of exactly zero a push has no direction.
+        return field.law(np.maximum(c, 1e-9))
+
+    c = np.arange(0.0, farthest, _SAMPLE_M)
+    f = law(c)
+    off = law(c[:-1] + 0.5 * _SAMPLE_M) - 0.5 * (f[:-1] + f[1:])
+    size = np.abs(off)
+    around = maximum_filter1d(size, 3)
+    others = np.sort(np.stack((np.roll(size, 1), np.roll(size, -1))), axis=0)[1]
+    corners = np.flatnonzero((size == around) & (size > 4.0 * others + 1e-9))
+    moved = False
+    for k in corners[(corners > 0) & (corners < len(c) - 2)]:
+        before, after = (np.diff(f[j : j + 2])[0] / _SAMPLE_M for j in (k - 1, k + 1))
+        if before == after:
+            continue
+        at = (f[k + 1] - after * c[k + 1] - f[k] + before * c[k]) / (before - after)
+        if c[k] < at < c[k + 1]:
+            c[k if at - c[k] < 0.5 * _SAMPLE_M else k + 1], moved = at, True
+    if moved:
+        f = law(c)
+        off = law(0.5 * (c[:-1] + c[1:])) - 0.5 * (f[:-1] + f[1:])
+    # A function that is convex or concave between two samples leaves the chord by at
+    # most twice as much as half way.
+    return c, f, np.append(2.0 * np.abs(off), 0.0)
+
+
+@dataclass(frozen=True)
+class SwitchingPoint:
+    """Where several bodies are equally near, and a mean of their forces is zero."""
+
+    p_WP: NDArray[np.float64]
+    """(2,) m."""
+    attractive: bool
+    """All forces drive P there: it stays about there, chattering."""
+
+
 @dataclass(frozen=True)
 class Leftover:
     """Neighbouring smallest cells that may hold an equilibrium."""
@@ -48,8 +118,6 @@ class Leftover:
     """(n, 2) m."""
     strengths: NDArray[np.float64]
     """(n,) force in the middle, N."""
-    change: NDArray[np.float64]
-    """(n,) by how much it can vary within the cell at most, N."""
     winding: NDArray[np.int64]
     """(n,) turns of the force around each cell: the index of what it holds."""
     switches: NDArray[np.bool_]
@@ -65,90 +133,82 @@ class CellSearch:
 
     def __init__(self, field: ForceField) -> None:
         scenario = field.loop.scenario
-        self._p_WS = field.p_WS
+        self.p_WS = field.p_WS
         self._attraction = scenario.attraction
-        self._all_bodies = scenario.collision_vector.aggregation == "sum"
         self._bodies = [body.rectangle(0.0) for body in scenario.bodies().values()]
+        adds = scenario.collision_vector.aggregation == "sum"
+        self._slots = min(_SLOTS if adds else 1, len(self._bodies))
         farthest = field.reach_m + 1.0
-        self._c = np.arange(0.0, farthest, _SAMPLE_M)
-        # At a distance of exactly zero a push has no direction.
-        self._f = field.law(np.maximum(self._c, 1e-9))
-        self._slope = np.abs(np.diff(self._f, append=self._f[-1])) / _SAMPLE_M
+        self._c, self._f, self._error = _sampled(field, farthest)
+        self._slope = np.abs(np.diff(self._f)) / np.diff(self._c)
+        self._slope = np.append(self._slope, 0.0)
         self._bend = np.abs(self._f) / np.maximum(self._c, _SAMPLE_M)
 
     def left_over(
         self, area: SearchArea, smallest_m: float
-    ) -> tuple[list[Leftover], int, float]:
-        """Cells that cannot be left out, in groups of neighbours.
+    ) -> tuple[NDArray[np.float64], int, float]:
+        """Cells that cannot be left out.
 
         Args:
             area: To search.
             smallest_m: Edge below which cells are not quartered any more, m.
 
         Returns:
-            Groups, number of cells that were looked at, edge of the last cells.
+            Their centres (n, 2), m, number of cells that were looked at, edge of the
+            last cells, m.
         """
         edge = _FIRST_CELL_M
         x = np.arange(area[0] + edge / 2, area[1] + edge / 2, edge)
         y = np.arange(area[2] + edge / 2, area[3] + edge / 2, edge)
         cells = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
-        origin = cells[0] - edge / 2
-        looked_at = 0
-        while True:
-            looked_at += len(cells)
-            excluded, change = self._excluded(cells, edge)
-            cells, change = cells[~excluded], change[~excluded]
-            if edge <= smallest_m or not len(cells):
-                break
-            edge /= 2.0
-            corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
-            cells = (cells[:, None, :] + corners).reshape(-1, 2)
-        return self._groups(cells, change, origin, edge), looked_at, edge
+        looked_at = len(cells)
+        cells = cells[~self._excluded(cells, edge)]
+        while edge > smallest_m and len(cells):
+            looked_at += 4 * len(cells)
+            cells, edge = self.quartered(cells, edge)
+        return cells, looked_at, edge
+
+    def quartered(
+        self, cells: NDArray[np.float64], edge: float
+    ) -> tuple[NDArray[np.float64], float]:
+        """Quarters of cells that cannot be left out.
+
+        Args:
+            cells: (n, 2) centres, m.
+            edge: Of the cells, m.
+
+        Returns:
+            Centres (k, 2), m, and the edge of the quarters, m.
+        """
+        edge /= 2.0
+        corners = edge / 2.0 * np.array([[-1, -1], [-1, 1], [1, -1], [1, 1]])
+        cells = (cells[:, None, :] + corners).reshape(-1, 2)
+        return cells[~self._excluded(cells, edge)], edge
 
     def outside_is_empty(self, area: SearchArea) -> bool:
         """Whether beyond the area the attraction exceeds every repulsion."""
-        x, y = self._p_WS
+        x, y = self.p_WS
         gap = min(x - area[0], area[1] - x, y - area[2], area[3] - y)
         d_f = self._attraction.follow_distance_m
         pull = self._attraction.stiffness_n_m * (gap - d_f)
-        nearest = min(self._distance_to_edge(body, area) for body in self._bodies)
+        corners = np.concatenate([rectangle_corners(body) for body in self._bodies])
+        (x, y), (x0, x1, y0, y1) = corners.T, area
+        nearest = float(np.min([x - x0, x1 - x, y - y0, y1 - y]))
         if nearest <= 0.0:
             return False
         push = float(np.abs(self._f[self._c >= nearest - _SAMPLE_M]).max(initial=0.0))
-        return pull > push * (len(self._bodies) if self._all_bodies else 1)
-
-    @staticmethod
-    def _distance_to_edge(body: NDArray[np.float64], area: SearchArea) -> float:
-        """From the body's circumscribed circle to the area's edge, m."""
-        x, y, _, length, width = body
-        radius = np.hypot(length, width) / 2.0
-        return float(min(x - area[0], area[1] - x, y - area[2], area[3] - y) - radius)
+        return pull > push * self._slots
 
     def forces(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """(n, 2) force at points (n, 2), from the law's samples, N."""
         vectors, distances = self._vectors(points)
         pushes = self._pushes(vectors, distances)
-        if self._all_bodies:
-            return self._pull(points) + pushes.sum(axis=0)
-        nearest = distances.argmin(axis=0)
-        return self._pull(points) + pushes[nearest, np.arange(len(points))]
-
-    def opposed(self, points: NDArray[np.float64]) -> tuple[NDArray[np.float64], ...]:
-        """Of the two nearest bodies: forces (n, 2) each, directions (n, 2) each."""
-        vectors, distances = self._vectors(points)
-        pushes, pull = self._pushes(vectors, distances), self._pull(points)
-        first, second = np.argsort(distances, axis=0)[:2]
-        row = np.arange(len(points))
-        away = -vectors / np.maximum(distances, 1e-12)[..., None]
-        return (
-            pull + pushes[first, row],
-            pull + pushes[second, row],
-            away[first, row],
-            away[second, row],
-        )
+        rank = distances.argsort(axis=0).argsort(axis=0)
+        counted = np.where((rank < self._slots)[..., None], pushes, 0.0)
+        return np.asarray(self._pull(points) + counted.sum(axis=0))
 
     def _pull(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
-        to_source = self._p_WS - points
+        to_source = self.p_WS - points
         distance = np.maximum(np.linalg.norm(to_source, axis=1), 1e-12)[:, None]
         share = 1.0 - self._attraction.follow_distance_m / distance
         return self._attraction.stiffness_n_m * share * to_source
@@ -167,50 +227,77 @@ class CellSearch:
         force = np.interp(distances, self._c, self._f, right=0.0)
         return -vectors * (force / np.maximum(distances, 1e-12))[..., None]
 
-    def _excluded(
-        self, cells: NDArray[np.float64], edge: float
-    ) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
-        """Cells without an equilibrium, and by how much the force varies in each."""
+    def _excluded(self, cells: NDArray[np.float64], edge: float) -> NDArray[np.bool_]:
+        """Cells without a point of rest; see the top of this module."""
         radius = edge * np.sqrt(0.5)
-        reach = radius + _SAMPLE_M
         vectors, distances = self._vectors(cells)
         pull, pushes = self._pull(cells), self._pushes(vectors, distances)
         steep = self._in_cell(self._slope, distances, radius)
         bent = np.maximum(steep, self._in_cell(self._bend, distances, radius))
+        error = self._in_cell(self._error, distances, radius)
         own = self._pull_slope(cells, radius)
-        inside = self._depth(cells) > radius
-        if self._all_bodies:
-            change = (own + bent.sum(axis=0)) * reach
-            strength = np.linalg.norm(pull + pushes.sum(axis=0), axis=1)
-            return (strength > change) | inside, change
-        # A body that may be the nearest somewhere in the cell.
-        counts = distances <= distances.min(axis=0) + 2.0 * radius
-        change = (own + np.where(counts, bent, 0.0).max(axis=0)) * reach
-        forces = pull + pushes
+        # Bodies that may be among the nearest ones somewhere in the cell, and those
+        # that are among them in all of it.
+        ordered = np.sort(distances, axis=0)
+        counts = distances <= ordered[self._slots - 1] + 2.0 * radius
+        if self._slots < len(ordered):
+            surely = distances + 2.0 * radius < ordered[self._slots]
+        else:
+            surely = counts
+        varied = np.where(counts, bent * radius + error, 0.0)
+        most = varied.max(axis=0) if self._slots == 1 else varied.sum(axis=0)
+        change = own * radius + most
+        # A margin for rounding.
+        change = change + 1e-12 * (1.0 + np.abs(pull).sum(axis=1))
         sizes = np.abs(np.linalg.norm(pull, axis=1) - np.linalg.norm(pushes, axis=2))
-        unequal = (sizes > (own + steep) * reach) | ~counts
-        clear = np.zeros(len(cells), dtype=bool)
-        for direction in self._directions(forces, distances, counts):
-            along = np.einsum("knj,nj->kn", forces, direction)
-            clear |= np.where(counts, along, np.inf).min(axis=0) > change
-        return clear | unequal.all(axis=0) | inside, change
+        unequal = sizes > own * radius + steep * radius + error
+        unequal = (unequal | ~counts).all(axis=0)
+        alone = (counts.sum(axis=0) == 1) & (self._slots == 1)
+        clear = self._one_sided(pull, pushes, counts & ~surely, surely, change)
+        contact = distances.min(axis=0) + radius <= CONTACT_M
+        inside = self._depth(cells) > radius
+        return np.asarray(clear | (alone & unequal) | contact | inside)
 
-    @staticmethod
-    def _directions(
-        forces: NDArray[np.float64],
-        distances: NDArray[np.float64],
-        counts: NDArray[np.bool_],
-    ) -> Iterator[NDArray[np.float64]]:
-        """Unit vectors (n, 2) along which all forces of a cell may be positive."""
-        yield _unit(np.where(counts[..., None], forces, 0.0).sum(axis=0))
-        if len(forces) > 1:
-            first, second = np.argsort(distances, axis=0)[:2]
-            row = np.arange(forces.shape[1])
-            a, b = forces[first, row], forces[second, row]
-            step = b - a
+    def _one_sided(
+        self,
+        pull: NDArray[np.float64],
+        pushes: NDArray[np.float64],
+        maybe: NDArray[np.bool_],
+        surely: NDArray[np.bool_],
+        change: NDArray[np.float64],
+    ) -> NDArray[np.bool_]:
+        """(n,) whether all forces of a cell exceed their change along one direction.
+
+        Gilbert's method: the direction is that of a point of the forces' hull,
+        taken nearer to the origin step by step.
+        """
+        fixed = pull + np.where(surely[..., None], pushes, 0.0).sum(axis=0)
+        missing = self._slots - surely.sum(axis=0)
+        if not missing.any():
+            return np.asarray(np.linalg.norm(fixed, axis=1) > change)
+
+        def least(direction: NDArray[np.float64]) -> NDArray[np.float64]:
+            """(n, 2) the force that is least along a direction (n, 2)."""
+            along = np.einsum("knj,nj->kn", pushes, direction)
+            rank = np.where(maybe, along, np.inf).argsort(axis=0).argsort(axis=0)
+            chosen = maybe & (rank < missing)
+            return np.asarray(
+                fixed + np.where(chosen[..., None], pushes, 0.0).sum(axis=0)
+            )
+
+        share = missing / np.maximum(maybe.sum(axis=0), 1)
+        mean = np.where(maybe[..., None], pushes, 0.0).sum(axis=0) * share[:, None]
+        point = fixed + mean
+        clear = np.zeros(len(pull), dtype=bool)
+        for _ in range(_HULL_STEPS):
+            direction = _unit(point)
+            vertex = least(direction)
+            clear |= np.einsum("nj,nj->n", vertex, direction) > change
+            step = vertex - point
             squared = np.maximum(np.einsum("nj,nj->n", step, step), 1e-300)
-            share = np.clip(-np.einsum("nj,nj->n", a, step) / squared, 0.0, 1.0)
-            yield _unit(a + share[:, None] * step)
+            way = np.clip(-np.einsum("nj,nj->n", point, step) / squared, 0.0, 1.0)
+            point = point + way[:, None] * step
+        return clear
 
     def _depth(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         """How deep points lie inside some body, m; negative outside."""
@@ -225,7 +312,7 @@ class CellSearch:
         self, cells: NDArray[np.float64], radius: float
     ) -> NDArray[np.float64]:
         """Largest slope of the attraction within each cell, N/m."""
-        distance = np.linalg.norm(self._p_WS - cells, axis=1) - radius
+        distance = np.linalg.norm(self.p_WS - cells, axis=1) - radius
         d_f = self._attraction.follow_distance_m
         bent = np.where(distance > 0.0, d_f / np.maximum(distance, 1e-12) - 1.0, np.inf)
         bent = bent if d_f > 0.0 else np.zeros_like(bent)
@@ -236,44 +323,168 @@ class CellSearch:
         samples: NDArray[np.float64], distances: NDArray[np.float64], radius: float
     ) -> NDArray[np.float64]:
         """(k, n) largest of a function of distance within each cell."""
-        window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 3
+        # Samples may be moved by half their spacing.
+        window = 2 * int(np.ceil(radius / _SAMPLE_M)) + 5
         largest = maximum_filter1d(samples, window)
         index = np.clip((distances / _SAMPLE_M).astype(int), 0, len(largest) - 1)
         return np.asarray(largest[index])
 
-    def _groups(
-        self,
-        cells: NDArray[np.float64],
-        change: NDArray[np.float64],
-        origin: NDArray[np.float64],
-        edge: float,
-    ) -> list[Leftover]:
-        apart = self._vectors(cells)[1].min(axis=0) > CONTACT_CELLS * edge
-        cells, change = cells[apart], change[apart]
+    def groups(self, cells: NDArray[np.float64], edge: float) -> list[Leftover]:
+        """Cells in groups of neighbours.
+
+        Args:
+            cells: (n, 2) centres, m.
+            edge: Of the cells, m.
+
+        Returns:
+            The groups.
+        """
         if not len(cells):
             return []
-        index = np.floor((cells - origin) / edge).astype(int)
-        grid = np.zeros(index.max(axis=0) + 1, dtype=bool)
-        grid[index[:, 0], index[:, 1]] = True
-        numbers, count = label(grid, structure=np.ones((3, 3)))
-        group = numbers[index[:, 0], index[:, 1]]
-        parts = [group == k + 1 for k in range(count)]
-        return [self._group(cells[part], change[part], edge) for part in parts]
+        index = np.rint((cells - cells.min(axis=0)) / edge).astype(int)
+        # Few cells over a large area: neighbours from a sorted list, not from a grid.
+        tree = cKDTree(index)
+        pairs = tree.query_pairs(1.5, p=np.inf, output_type="ndarray")
+        joined = coo_array(
+            (np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])),
+            shape=(len(cells), len(cells)),
+        )
+        count, group = connected_components(joined, directed=False)
+        order = np.argsort(group, kind="stable")
+        ends = np.cumsum(np.bincount(group, minlength=count))[:-1]
+        return [self._group(cells[part], edge) for part in np.split(order, ends)]
 
-    def _group(
-        self, centres: NDArray[np.float64], change: NDArray[np.float64], edge: float
-    ) -> Leftover:
+    def _group(self, centres: NDArray[np.float64], edge: float) -> Leftover:
         offsets = edge / 2.0 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])
         corners = (centres[:, None, :] + offsets).reshape(-1, 2)
         forces = self.forces(corners).reshape(-1, 4, 2)
         angles = np.arctan2(forces[..., 1], forces[..., 0])
         steps = np.angle(np.exp(1j * (np.roll(angles, -1, axis=1) - angles)))
-        nearest = self._vectors(corners)[1].argmin(axis=0).reshape(-1, 4)
-        switches = (nearest != nearest[:, :1]).any(axis=1) & (not self._all_bodies)
+        ordered = np.sort(self._vectors(centres)[1], axis=0)
+        switches = np.zeros(len(centres), dtype=bool)
+        if self._slots < len(ordered):
+            apart = ordered[self._slots] - ordered[self._slots - 1]
+            switches = apart <= np.sqrt(2.0) * edge
         return Leftover(
             centres=centres,
             strengths=np.linalg.norm(self.forces(centres), axis=1),
-            change=change,
             winding=np.rint(steps.sum(axis=1) / (2 * np.pi)).astype(np.int64),
             switches=switches,
         )
+
+    def switching_points(self, group: Leftover, edge: float) -> list[SwitchingPoint]:
+        """Where two or three bodies are equally near and their forces cancel.
+
+        Args:
+            group: Cells to begin in.
+            edge: Of the cells, m.
+
+        Returns:
+            One for each such point in or next to the group; none with
+            ``aggregation: sum``, whose switches lie between sums.
+        """
+        starts = group.centres[group.switches]
+        if not len(starts) or self._slots > 1:
+            return []
+        starts = starts[:: -(-len(starts) // _MOST_STARTS)]
+        nearest = np.argsort(self._vectors(starts)[1], axis=0)
+        found: list[SwitchingPoint] = []
+        for size in (2, 3)[: len(self._bodies) - 1]:
+            ends = self._newton(starts, nearest[:size])
+            for begin, end, bodies in zip(starts, ends, nearest[:size].T, strict=True):
+                near = np.abs(end - begin).max() <= 2.0 * edge
+                known = any(np.linalg.norm(end - s.p_WP) < 1e-6 for s in found)
+                if near and not known and self._cancels(end, bodies):
+                    found.append(SwitchingPoint(end, self._attracts(end, bodies)))
+        return found
+
+    def _each(
+        self, points: NDArray[np.float64], bodies: NDArray[np.int64]
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Distances (size, n) and forces (size, n, 2) of bodies (size, n)."""
+        vectors, distances = self._vectors(points)
+        row = np.arange(points.shape[0])
+        forces = self._pull(points) + self._pushes(vectors, distances)
+        return distances[bodies, row], forces[bodies, row]
+
+    def _newton(
+        self, starts: NDArray[np.float64], bodies: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """(n, 2) where the bodies are equally near; of two: and forces parallel."""
+
+        def residual(points: NDArray[np.float64]) -> NDArray[np.float64]:
+            distances, forces = self._each(points, bodies)
+            first = distances[0] - distances[1]
+            if len(bodies) == 3:
+                return np.stack((first, distances[0] - distances[2]), axis=-1)
+            (ax, ay), (bx, by) = forces[0].T, forces[1].T
+            scale = np.maximum(np.linalg.norm(forces, axis=2).max(axis=0), 1e-12)
+            return np.stack((first, (ax * by - ay * bx) / scale), axis=-1)
+
+        p, step = starts.copy(), 1e-7
+        for _ in range(_NEWTON_STEPS):
+            value = residual(p)
+            slopes = np.stack(
+                [
+                    (residual(p + step * e) - residual(p - step * e)) / (2.0 * step)
+                    for e in np.eye(2)
+                ],
+                axis=-1,
+            )
+            move = -np.einsum("nij,nj->ni", np.linalg.pinv(slopes, rcond=1e-9), value)
+            size = np.linalg.norm(move, axis=1, keepdims=True)
+            p = p + move * np.minimum(1.0, 0.01 / np.maximum(size, 1e-300))
+        return p
+
+    def _cancels(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
+        """Whether the bodies are nearest at p and the hull holds the origin."""
+        distances, forces = self._each(p[None], bodies[:, None])
+        least = self._vectors(p[None])[1].min()
+        if np.ptp(distances) > _SAME_M or abs(distances[0, 0] - least) > _SAME_M:
+            return False
+        F = forces[:, 0]
+        tiny = 1e-6 * np.linalg.norm(F, axis=1).max()
+        if least <= CONTACT_M or tiny == 0.0:
+            return False
+        if len(F) == 2:
+            across = abs(F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
+            return bool(F[0] @ F[1] < 0.0 and across <= tiny * np.linalg.norm(F[0]))
+        turns = [np.linalg.det(np.array([F[k], F[(k + 1) % 3]])) for k in range(3)]
+        return bool(min(turns) > 0.0 or max(turns) < 0.0)
+
+    def _attracts(self, p: NDArray[np.float64], bodies: NDArray[np.int64]) -> bool:
+        """Whether P is driven to a switching point.
+
+        With the nearest body alone the force is that of a potential U = pull's +
+        Phi(nearest distance), and its directional derivative at p is the largest of
+        -F_k . u where the bodies push: not negative, as the hull holds the origin. Only
+        along the line on which two bodies stay equally near it may be zero; there
+        the force of sliding must lead back.
+        """
+        distances, _ = self._each(p[None], bodies[:, None])
+        if np.interp(distances[0, 0], self._c, self._f, right=0.0) <= 0.0:
+            return False
+        if len(bodies) == 3:
+            return True
+        away = -self._vectors(p[None])[0][bodies, 0]
+        away /= np.linalg.norm(away, axis=1, keepdims=True)
+        normal = _unit((away[0] - away[1])[None])[0]
+        along = np.array([-normal[1], normal[0]])
+        ahead, behind = (
+            self._sliding(p + sign * 1e-4 * along, bodies) @ along for sign in (1, -1)
+        )
+        return bool(ahead - behind < 1e-9)
+
+    def _sliding(
+        self, p: NDArray[np.float64], bodies: NDArray[np.int64]
+    ) -> NDArray[np.float64]:
+        """(2,) mean of two forces that keeps P on the line between their bodies, N."""
+        vectors, distances = (x[bodies, 0] for x in self._vectors(p[None]))
+        away = -vectors / distances[:, None]
+        normal = away[0] - away[1]
+        # Back onto the line, on which the distances are equal.
+        p = p - normal * (distances[0] - distances[1]) / (normal @ normal)
+        forces = self._each(p[None], bodies[:, None])[1][:, 0]
+        across = forces @ normal
+        share = across[1] / (across[1] - across[0])
+        return np.asarray(share * forces[0] + (1.0 - share) * forces[1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any
 
@@ -10,16 +11,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.ideal_loop import IdealLoop
+from analysis.models.ideal_scenarios import moving_bodies
+from systems.framework.elementary import float_of
 from systems.framework.input_error import InputError
-
-__all__ = ["ForceField"]
 
 
 class ForceField:
     """Force against position, of a robot at rest.
 
-    With exact sensing it does not depend on the heading. An obstacle's speed is
-    zero, as the controller has it where a body is seen for the first time.
+    With exact sensing it does not depend on the heading, but for a source straight
+    behind, which pulls a little aside; here the robot has it ahead. An obstacle's
+    speed is zero, as the controller has it where a body is seen for the first time.
 
     Args:
         loop: The all-ideal build.
@@ -31,13 +33,12 @@ class ForceField:
 
     def __init__(self, loop: IdealLoop, time_s: float | None = None) -> None:
         scenario = loop.scenario
-        moving = [o.name for o in scenario.obstacles if o.path().moves]
-        moving += ["source"] if scenario.source.path().moves else []
+        moving = moving_bodies(scenario)
         if moving and time_s is None:
             raise InputError(
                 f"{', '.join(moving)}",
-                "moves, and equilibria are of bodies at rest; "
-                "use frozen_scenario(scenario, time_s), or moving_equilibrium for a "
+                "moves, and equilibria need bodies at rest; use "
+                "frozen_scenario(scenario, time_s), or moving_equilibrium for a "
                 "source at constant velocity",
             )
         self.loop = loop
@@ -147,8 +148,11 @@ class ForceField:
         block.GetInputPort("features").FixValue(context, np.asarray(features))
 
     def _forces(self, p_WP: Any, *, twin: bool) -> Any:
+        # With the source ahead: straight behind, it would pull aside.
+        theta = 0.0 if float_of(p_WP[0]) <= self.p_WS[0] else math.pi
         offset = self.loop.scenario.robot.control_point_m
-        pose = np.array([p_WP[0] - offset, p_WP[1], 0.0 * p_WP[0]])
+        x, y = p_WP[0] - offset * math.cos(theta), p_WP[1] - offset * math.sin(theta)
+        pose = np.array([x, y, theta + 0.0 * p_WP[0]])
         sensor, own = self._sensor(twin=twin)
         sensor.GetInputPort("pose_WB").FixValue(own, pose)
         features = sensor.GetOutputPort("features").Eval(own)

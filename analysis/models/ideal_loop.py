@@ -27,27 +27,15 @@ from analysis.models.diagram_state import (
     set_state,
 )
 from analysis.models.ideal_scenarios import (
-    frozen_scenario,
-    ideal_scenario,
     require_ideal,
 )
 from diagrams import build_sound_follower
+from diagrams.own_code import loaded_digests
 from diagrams.robot import parts_of
 from diagrams.scenario import Scenario
 from diagrams.simulation import simulator_config
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "IdealLoop",
-    "PeriodDerivatives",
-    "Port",
-    "Runner",
-    "frozen_scenario",
-    "ideal_loop",
-    "ideal_scenario",
-    "require_ideal",
-]
 
 #: The tracker's slowest mode decays as 0.27 a tick where hearing is exact.
 SETTLING_TICKS = 40
@@ -123,9 +111,9 @@ class IdealLoop:
             if not block.HasOutputPort(port):
                 raise InputError(
                     "law",
-                    f"{self.scenario.law!r} has no output port {port}, and linear "
-                    "models are of laws that push a virtual mass; use one of these, "
-                    "or simulate",
+                    f"{self.scenario.law!r} has no output port {port}, and "
+                    "linear models need a law that pushes a virtual mass; use "
+                    "such a law, or simulate",
                 )
 
     def _try_law(self) -> None:
@@ -154,7 +142,7 @@ class IdealLoop:
                 "law",
                 f"{self.scenario.law!r} cannot be differentiated "
                 f"({type(own).__name__}: {own}); write it with pydrake.math "
-                "(exp, sqrt, ...) in the place of math and numpy",
+                "(exp, sqrt, ...) instead of math and numpy",
             ) from error
 
     def block(self, role: str, *, twin: bool = False) -> Any:
@@ -372,7 +360,7 @@ class IdealLoop:
 
 
 @lru_cache(maxsize=64)
-def _cached_loop(key: str) -> IdealLoop:
+def _cached_loop(key: str, _own_code: str) -> IdealLoop:
     return IdealLoop(Scenario.model_validate_json(key))
 
 
@@ -385,4 +373,4 @@ def ideal_loop(scenario: Scenario) -> IdealLoop:
     Raises:
         InputError: The scenario has no linear model.
     """
-    return _cached_loop(scenario.model_dump_json())
+    return _cached_loop(scenario.model_dump_json(), str(loaded_digests(scenario)))

@@ -10,14 +10,6 @@ from diagrams.scenario import Scenario
 from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "changed",
-    "frozen_scenario",
-    "ideal_scenario",
-    "require_ideal",
-    "require_rolling",
-]
-
 _ALL_IDEAL: dict[str, Any] = {
     "hearing": "ideal",
     "obstacle_sensing": "ideal",
@@ -62,6 +54,13 @@ def frozen_scenario(scenario: Scenario, time_s: float = 0.0) -> Scenario:
     return changed(scenario, {"source": source, "obstacles": obstacles})
 
 
+def moving_bodies(scenario: Scenario) -> tuple[str, ...]:
+    """Names of the bodies that move, what is followed last."""
+    moving = [body.name for body in scenario.obstacles if body.path().moves]
+    moving += ["source"] if scenario.source.path().moves else []
+    return tuple(moving)
+
+
 def changed(scenario: Scenario, changes: Mapping[str, Any]) -> Scenario:
     """A copy with other values, validated.
 
@@ -87,9 +86,9 @@ def require_rolling(plant: PlantParameters) -> None:
     if plant.friction is not None:
         raise InputError(
             "plant.friction",
-            f"is {plant.friction:g}, and linear models are of wheels that roll; set "
-            "plant.friction to null, which below the limit of friction is the same "
-            "motion",
+            f"is {plant.friction:g}, and linear models need rolling wheels; set "
+            "plant.friction to null, which gives equal motion below the limit of "
+            "friction",
         )
 
 
@@ -107,12 +106,12 @@ def require_ideal(scenario: Scenario) -> None:
         (
             scenario.hearing == "ideal",
             "hearing",
-            "'audio' has no linear model, for a waveform has no equilibrium",
+            "'audio' has no linear model, because a waveform has no equilibrium",
         ),
         (
             scenario.obstacle_sensing == "ideal",
             "obstacle_sensing",
-            "'ultrasonic' has no linear model, for cones jump",
+            "'ultrasonic' has no linear model, because ranges of cones jump",
         ),
         (
             not scenario.odometry.rounding,
@@ -122,7 +121,10 @@ def require_ideal(scenario: Scenario) -> None:
         (
             scenario.guard is None,
             "guard",
-            "a guard decides, which has no derivative; one that passes changes nothing",
+            (
+                "the decisions of a guard have no derivative, and a guard that "
+                "passes a command does not change it"
+            ),
         ),
         (
             hearing.bearing_noise_deg == hearing.range_noise_fraction == 0.0,
@@ -134,6 +136,6 @@ def require_ideal(scenario: Scenario) -> None:
         if not holds:
             raise InputError(
                 field,
-                f"{reason}; linearise ideal_scenario(scenario), which differs in "
-                "sensing alone",
+                f"{reason}; linearize ideal_scenario(scenario), which differs in "
+                "sensing only",
             )

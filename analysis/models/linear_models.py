@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LinearModel", "Mode", "simple_poles"]
-
+#: Sampled poles nearer to z = 1 than this are neutral. Rounding of 1e-10 in a
+#: matrix moves a double pole by its square root, 1e-5.
+NEUTRAL = 1e-5
 #: Poles nearer to z = 0 than this are delays, which have no s-plane image.
 _DELAY = 1e-6
 #: Elements of the matrices that are solved at once.

@@ -16,20 +16,9 @@ from numpy.typing import NDArray
 
 from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.block_models import join_blocks, sampled_blocks
-from analysis.models.ideal_loop import Port
+from analysis.models.diagram_state import Port
 from analysis.models.linear_models import LinearModel, simple_poles
 from analysis.models.operating_points import OperatingPoint
-
-__all__ = [
-    "GradientCheck",
-    "RouteComparison",
-    "blockwise_model",
-    "check_gradient",
-    "compare_routes",
-    "continuous_model",
-    "plant_jacobians",
-    "sampled_model",
-]
 
 _SOURCE: tuple[Port, ...] = (("hearing", "pose_WS"), ("collision", "pose_WS"))
 _INPUTS = ("p_WS_x", "p_WS_y", "theta_WS")

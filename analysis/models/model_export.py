@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from scipy.io import savemat
 
 from analysis.models.linear_models import LinearModel
-from systems.framework.input_error import InputError
-
-__all__ = ["write_models"]
+from analysis.reporting.file_names import distinct_names
 
 
 def write_models(models: Sequence[LinearModel], directory: Path) -> None:
@@ -26,15 +24,10 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
     those of its rows in the first column.
 
     Args:
-        models: With names that differ.
+        models: Of those with one name the second gets a 2 after it, and so on.
         directory: Exists.
-
-    Raises:
-        InputError: Two models have one name.
     """
-    names = [_identifier(model.name) for model in models]
-    if len(set(names)) < len(names):
-        raise InputError("models", f"names {names} are not unique; rename one")
+    names = distinct_names([_identifier(m.name) for m in models], joint="_")
     structs = {name: _struct(model) for name, model in zip(names, models, strict=True)}
     savemat(directory / "models.mat", structs, long_field_names=True)
     folder = directory / "models"
@@ -53,7 +46,7 @@ def write_models(models: Sequence[LinearModel], directory: Path) -> None:
 
 def _identifier(name: str) -> str:
     """A name that MATLAB takes for a variable's."""
-    return re.sub(r"\W+", "_", name).strip("_")
+    return re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
 
 
 def _struct(model: LinearModel) -> dict[str, object]:

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from analysis.models.linear_models import LinearModel
 
-__all__ = ["minimal_model"]
-
 #: A direction shorter than this, of a unit vector's image, is rounding.
 _NEGLIGIBLE = 1e-9
 

@@ -14,25 +14,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from analysis.models.diagram_state import Port
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import Port, ideal_loop
+from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
 from analysis.models.operating_points import OperatingPoint
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "BREAK_POINTS",
-    "DIRECTIONS",
-    "BreakPoint",
-    "Direction",
-    "closed",
-    "cut_model",
-    "open_loop",
-    "target_loop",
-]
 
 BreakPoint = Literal["sensor", "actuator", "wheels"]
 Direction = Literal["along", "across"]

@@ -18,19 +18,11 @@ from scipy.optimize import root_scalar
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from analysis.models.linear_models import LinearModel, Mode
+from analysis.models.linear_models import NEUTRAL, LinearModel, Mode
 from analysis.models.model_reduction import minimal_model
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, nearest_point_on_rectangle
-
-__all__ = [
-    "NO_FORCE_N",
-    "OperatingPoint",
-    "motion_model",
-    "moving_equilibrium",
-    "resting_equilibrium",
-]
 
 Kind = Literal["sink", "saddle", "source"]
 
@@ -38,8 +30,6 @@ Kind = Literal["sink", "saddle", "source"]
 NO_FORCE_N = 1e-9
 #: A stiffness below this share of the largest is that of a continuum.
 FLAT = 1e-6
-#: Poles nearer to z = 1 than this are neutral.
-_NEUTRAL = 1e-7
 #: By then the source has started, and drives straight on to rounding errors, s.
 _STEADY_S = 20.0
 
@@ -113,14 +103,14 @@ class OperatingPoint:
         return tuple(
             mode
             for mode in self.motion.modes
-            if mode.z is not None and abs(mode.z - 1.0) > _NEUTRAL
+            if mode.z is not None and abs(mode.z - 1.0) > NEUTRAL
         )
 
     @property
     def eigenvalues(self) -> NDArray[np.complex128]:
         """Poles of the motion in the s plane, ln(z)/T, rad/s; no neutral ones."""
         poles = self.motion.poles
-        poles = poles[(np.abs(poles - 1.0) > _NEUTRAL) & (np.abs(poles) > 1e-6)]
+        poles = poles[(np.abs(poles - 1.0) > NEUTRAL) & (np.abs(poles) > 1e-6)]
         return np.asarray(np.log(poles) / self.loop.tick_s, dtype=complex)
 
     @property
@@ -221,7 +211,8 @@ def resting_equilibrium(loop: IdealLoop, p_WP: NDArray[np.float64]) -> Operating
         raise InputError(
             "p_WP",
             f"at ({p_WP[0]:g}, {p_WP[1]:g}) a force of {left:.3g} N acts, and "
-            "there is no equilibrium; take one from find_equilibria(scenario).points",
+            "there is no equilibrium; use a point from "
+            "find_equilibria(scenario).points",
         )
     to_source = field_.p_WS - p_WP
     theta = math.atan2(to_source[1], to_source[0])

@@ -21,8 +21,6 @@ from diagrams import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, nearest_point_on_rectangle
 
-__all__ = ["PointMass", "PointMassRuns", "VelocityTermModel", "point_mass"]
-
 VelocityTermModel = Literal["none", "printed", "closing"]
 _TERMS = {"none": 0, "printed": 1, "closing": 2}
 #: Runge-Kutta step of ``PointMass.run``, s: a twentieth of a radian in the

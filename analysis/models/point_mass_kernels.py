@@ -11,13 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from analysis.laws.radial_law import DISTANCE_STEP_M, INCREMENT_STEPS
+from systems.framework.compiling import njit
 from systems.world.geometry import beyond
-
-__all__ = ["forces", "run", "trajectory"]
 
 _Array = NDArray[np.float64]
 _State = tuple[float, float, float, float]

@@ -17,8 +17,6 @@ from numpy.typing import NDArray
 from analysis.run_error import RunError
 from systems.framework.input_error import InputError
 
-__all__ = ["MovieFile"]
-
 #: Pictures a second by the file's ending: a GIF counts time in hundredths of a second.
 FRAMES_PER_S = {".gif": 10.0, ".mp4": 25.0}
 #: What an MP4 needs of ffmpeg.
@@ -40,11 +38,17 @@ class MovieFile:
         ending = self.path.suffix.lower()
         if ending not in FRAMES_PER_S:
             raise _refused(f"{path} is neither .gif nor .mp4; name a file of one kind")
-        if self.path.exists():
-            raise _refused(f"{path} is there already; name another file")
+        try:
+            exists = self.path.exists()
+        except OSError as error:  # a name that is too long
+            raise _refused(f"{path} is not a usable path ({error.strerror})") from None
+        if exists:
+            raise _refused(f"{path} already exists; name another file")
         folder = self.path.parent
         if not folder.is_dir() or not os.access(folder, os.W_OK | os.X_OK):
-            raise _refused(f"{folder} is no directory that can be written; make it")
+            raise _refused(
+                f"{folder} is not a directory that can be written; create it"
+            )
         self.frames_per_s = FRAMES_PER_S[ending]
         self._ffmpeg = _find_ffmpeg() if ending == ".mp4" else ""
 
@@ -69,7 +73,7 @@ class MovieFile:
             RunError: The encoder fails, or the disk does.
         """
         handle, partial = tempfile.mkstemp(
-            prefix=f".{self.path.stem}.", suffix=self.path.suffix, dir=self.path.parent
+            prefix=".movie.", suffix=self.path.suffix, dir=self.path.parent
         )
         os.close(handle)
         try:

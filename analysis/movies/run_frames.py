@@ -29,12 +29,11 @@ from diagrams import RunResult
 from diagrams.bodies import microphones_W, robot_rectangle
 from systems.world.geometry import rectangle_corners
 
-__all__ = ["RunFrames"]
-
 #: Dots a picture's inch; pictures are 8 inch wide.
 DPI = 90
-#: A ring of sound grows to this radius, m, so many times a second.
-RING_M, RINGS_PER_S = 0.7, 3.0
+#: While a source sounds, a ring leaves it every RING_S and grows at RING_M_S to
+#: RING_M. Sound is a hundred times as fast.
+RING_S, RING_M_S, RING_M = 0.15, 3.0, 1.5
 
 
 class RunFrames:
@@ -159,16 +158,28 @@ class RunFrames:
                 marker = self._axes.plot(*pose[:2], "D", color=COLOURS[role], ms=6)
                 found += marker
             for start, end in sound_bursts(sounds[name], self._result.simulated_s):
-                if start <= time < end:
-                    part = (RINGS_PER_S * (time - start)) % 1.0
-                    ring = Circle(
-                        (float(pose[0]), float(pose[1])),
-                        0.15 + RING_M * part,
-                        fill=False,
-                        edgecolor=COLOURS[role],
-                        alpha=1.0 - part,
-                    )
-                    found.append(self._axes.add_patch(ring))
+                if start <= time < end + RING_M / RING_M_S:
+                    since, lasts = time - start, end - start
+                    found += self._rings(pose[:2], since, lasts, COLOURS[role])
+        return found
+
+    def _rings(
+        self, center: tuple[float, float], since: float, lasts: float, color: str
+    ) -> list[Any]:
+        """Rings of a burst that began so long ago and lasts so long, s."""
+        found = []
+        for left in np.arange(0.0, min(since, lasts), RING_S):
+            radius = RING_M_S * (since - left)
+            if radius < RING_M:
+                circle = Circle(
+                    center,
+                    radius,
+                    fill=False,
+                    edgecolor=color,
+                    linewidth=1.8,
+                    alpha=1.0 - radius / RING_M,
+                )
+                found.append(self._axes.add_patch(circle))
         return found
 
     def _robot(

@@ -22,13 +22,6 @@ from analysis.nonlinear.harmonic_balance import (
 from analysis.nonlinear.velocity_terms import VARIANTS, Variant
 from diagrams import Scenario, simulate
 
-__all__ = [
-    "ContactOscillation",
-    "OscillationRun",
-    "contact_oscillation",
-    "simulate_oscillation",
-]
-
 #: Depth and width of the box, m: wider than P ever strays.
 _BOX_M = (0.1, 1.0)
 #: Follow distance of the run, m: behind the box and clear of the master robot.

@@ -21,18 +21,6 @@ from analysis.models.point_mass import PointMass, point_mass
 from diagrams import Scenario, simulate
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "BOX_M",
-    "BOX_X_M",
-    "TO_GO_M",
-    "EquilibriumMap",
-    "RestPoint",
-    "boxes_scenario",
-    "gap_map",
-    "local_minima",
-    "offset_map",
-]
-
 #: Footprint of the boxes, m: along and across the line to the source; printed.
 BOX_M = (0.05, 0.1)
 #: Place of the boxes, and what is left to go behind them, m.
@@ -215,7 +203,7 @@ def _map(
     parameter, numbers, boxes, cell_m = varied
     if sensing not in _SENSING:
         words = ", ".join(repr(word) for word in _SENSING)
-        raise InputError("sensing", f"{sensing!r} is none of {words}")
+        raise InputError("sensing", f"{sensing!r} is unknown; use one of {words}")
     values = tuple(float(v) for v in numbers)
     points = []
     for value in values:

@@ -20,8 +20,6 @@ from analysis.linear.contact_mode import motion_chain
 from analysis.models.linear_models import LinearModel
 from analysis.nonlinear.velocity_terms import Variant, sensed_speeds
 
-__all__ = ["OscillationPrediction", "predict_oscillation"]
-
 #: Phases of a cycle at which the law is evaluated.
 _PHASES = 64
 

@@ -16,14 +16,6 @@ from analysis.nonlinear.stiffness_ratio import RatioMap
 from analysis.nonlinear.velocity_terms import VelocityTermAnalysis
 from analysis.reporting.palette import COLOURS
 
-__all__ = [
-    "plot_contact_oscillation",
-    "plot_equilibrium_maps",
-    "plot_phase_portrait",
-    "plot_ratio_map",
-    "plot_velocity_terms",
-]
-
 _STYLES = {"printed": (COLOURS["robot"], "-"), "closing": (COLOURS["source"], "--")}
 
 
@@ -212,8 +204,8 @@ def plot_ratio_map(found: RatioMap) -> Figure:
     """Head-on equilibria of the active law over k_ref/K_0."""
     figure = Figure(figsize=(6.0, 3.8), layout="constrained")
     axes = figure.subplots()
-    outer = "held along the line, slips off to the side: saddle"
-    inner = "the vanishing push gives way: source"
+    outer = "held along the line, not to the side: saddle"
+    inner = "the push vanishes, P moves on: source"
     ratios, colours = found.ratios, COLOURS
     axes.semilogx(ratios, found.outer_m, "-", color=colours["robot"], label=outer)
     axes.semilogx(ratios, found.inner_m, "--", color=colours["source"], label=inner)

@@ -12,8 +12,6 @@ from analysis.laws.head_on import HeadOn, head_on
 from analysis.models.point_mass import PointMass, VelocityTermModel
 from diagrams import Scenario
 
-__all__ = ["PhasePortrait", "certified_speeds", "head_on_model", "phase_portrait"]
-
 #: Half the width of the obstacle's face, m, and its depth.
 _FACE_M = (4.0, 0.1)
 

@@ -13,8 +13,6 @@ from analysis.laws.head_on import head_on
 from diagrams import Scenario
 from systems.laws.active_impedance_controller import active_force
 
-__all__ = ["RatioMap", "stiffness_ratio_map"]
-
 #: Spacing of the distances at which forces are compared, m.
 _RATIO_STEP_M = 2e-3
 

@@ -21,13 +21,6 @@ from analysis.laws.radial_law import INCREMENT_STEPS
 from analysis.models.point_mass import STEP_S, point_mass
 from diagrams import Scenario
 
-__all__ = [
-    "EnergyBalance",
-    "VelocityTermPassivity",
-    "energy_balance",
-    "velocity_term_passivity",
-]
-
 
 @dataclass(frozen=True)
 class VelocityTermPassivity:

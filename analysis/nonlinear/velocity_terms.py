@@ -19,16 +19,6 @@ from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
 from systems.laws.impedance import obstacle_speed
 
-__all__ = [
-    "DescribingFunction",
-    "OneSidedModel",
-    "VelocityTermAnalysis",
-    "VelocityTermVariant",
-    "describe_velocity_term",
-    "sensed_speeds",
-    "velocity_term_analysis",
-]
-
 Variant = Literal["printed", "closing"]
 VARIANTS: tuple[Variant, ...] = get_args(Variant)
 #: Points of a cycle in the describing function's integrals.

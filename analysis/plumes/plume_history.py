@@ -13,8 +13,6 @@ from diagrams.scenario import Scenario
 from diagrams.world_blocks import world_blocks
 from systems.odor.odor_plume import concentration
 
-__all__ = ["PlumeInstant", "concentration_map", "plume_history"]
-
 
 class PlumeInstant(NamedTuple):
     """Wind and plume at an instant."""

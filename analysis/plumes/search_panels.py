@@ -10,8 +10,6 @@ from matplotlib.axes import Axes
 from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
 
-__all__ = ["call_time", "search_panels"]
-
 #: Names of what a robot is at, by number, of each kind of search.
 _PHASES = {
     "song2011": ("", "1 initial", "2 upwind", "3 gradient", "4 local"),

@@ -14,8 +14,6 @@ from analysis.plumes.plume_history import plume_history
 from diagrams import RunResult
 from systems.odor.odor_plume import PUFF_SIZE, PUFFS_BEGIN
 
-__all__ = ["record_searches", "record_switch"]
-
 #: The plume is shown so often, s, and by so many discs, from the source downwind.
 _PERIOD_S, _DISCS = 0.5, 30
 #: Discs are so far apart, m, and each shows the puff next to its distance.

@@ -13,10 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["AlignedDelays", "fit_aligned_delays"]
+from systems.framework.compiling import njit
 
 _BANDS = 24
 _LEAST_BANDS = 4

@@ -19,14 +19,6 @@ from systems.sound.acoustics import AcousticParameters, sound_speed
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "ROBOT_ARRAY",
-    "ArrayGeometry",
-    "KnownArray",
-    "load_geometry",
-    "make_geometry",
-]
-
 # Positions that are farther apart are in other units than metres.
 _LARGEST_M = 30.0
 
@@ -127,7 +119,7 @@ class ArrayGeometry(Parameters):
                 raise InputError("channels", "one is named twice; name each once")
         if self.sound_speed is not None and self.temperature_c is not None:
             raise InputError(
-                "sound_speed", "given together with temperature_c; keep one of them"
+                "sound_speed", "is given together with temperature_c; keep one of them"
             )
         self._check_band()
         shape = ArrayShape.of(self.microphones)
@@ -144,11 +136,11 @@ class ArrayGeometry(Parameters):
 
     def _check_band(self) -> None:
         if self.band is not None and self.band[0] >= self.band[1]:
-            raise InputError("band", "must rise, as [300, 8000]")
+            raise InputError("band", "must rise, for example [300, 8000]")
         if self.band is not None and self.band[1] - self.band[0] < _LEAST_BAND_HZ:
             raise InputError(
                 "band",
-                f"{list(self.band)} is too narrow to tell delays; give at least "
+                f"{list(self.band)} is too narrow to measure delays; give at least "
                 f"{_LEAST_BAND_HZ:g} Hz",
             )
 
@@ -157,20 +149,20 @@ class ArrayGeometry(Parameters):
         if std is not None and covariance is not None:
             raise InputError(
                 "position_std_m",
-                "given together with position_covariance_m2; keep one of them",
+                "is given together with position_covariance_m2; keep one of them",
             )
         if isinstance(std, tuple) and len(std) != shape.count:
             raise InputError(
                 "position_std_m",
-                f"{len(std)} given for {shape.count} microphones; give one for all, "
-                "or one for each",
+                f"has {len(std)} values for {shape.count} microphones; give one "
+                "for all, or one for each",
             )
         if covariance is not None:
             _check_covariance(covariance, shape)
         if self.sound_speed_std is not None and self.temperature_std_c is not None:
             raise InputError(
                 "sound_speed_std",
-                "given together with temperature_std_c; keep one of them",
+                "is given together with temperature_std_c; keep one of them",
             )
 
     @property
@@ -274,7 +266,8 @@ def make_geometry(
         raise InputError("geometry", _first_error(error)) from None
     except (TypeError, ValueError):
         raise InputError(
-            "geometry", "is no list of places; give [x, y] or [x, y, z] of each, m"
+            "geometry",
+            "is not a list of positions; give [x, y] or [x, y, z] of each in m",
         ) from None
 
 
@@ -294,7 +287,7 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
         content = parse_yaml(path.read_text(encoding="utf-8"), "geometry")
     except InputError as error:
         raise InputError(
-            "geometry", f"{str(path)!r} is not YAML that can be used; {error.message}"
+            "geometry", f"{str(path)!r} is not usable as YAML: it {error.message}"
         ) from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(
@@ -304,8 +297,8 @@ def load_geometry(path: str | Path) -> ArrayGeometry:
     if not isinstance(content, dict) or "microphones" not in content:
         raise InputError(
             "geometry",
-            f"{str(path)!r} names no microphones; write for instance "
-            "'microphones: [[0, 0.4], [0, 0], [0, -0.4]]'",
+            f"{str(path)!r} lists no microphones; write for example 'microphones: "
+            "[[0, 0.4], [0, 0], [0, -0.4]]'",
         )
     try:
         return ArrayGeometry(**content)

@@ -14,13 +14,6 @@ from analysis.recordings.array_geometry import ROBOT_ARRAY, ArrayGeometry
 from systems.framework.input_error import InputError
 from systems.sound.sound_file import read_sound
 
-__all__ = [
-    "RecordedSamples",
-    "array_mismatch",
-    "chosen_microphones",
-    "recorded_samples",
-]
-
 _RATES_HZ = (8_000, 192_000)
 
 
@@ -56,7 +49,9 @@ def recorded_samples(
     if isinstance(recording, str | Path):
         if sample_rate_hz is not None:
             raise InputError(
-                "sample_rate_hz", "is that of samples; leave it out, a file has its own"
+                "sample_rate_hz",
+                "applies to samples only; leave it out, because a file states its "
+                "own rate",
             )
         samples, rate = read_sound(recording, "recording")
         found = RecordedSamples(samples, rate, repr(str(recording)))
@@ -69,7 +64,7 @@ def recorded_samples(
 
 def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSamples:
     if sample_rate_hz is None:
-        raise InputError("sample_rate_hz", "is not said; give that of the samples, Hz")
+        raise InputError("sample_rate_hz", "is missing; give the sample rate in Hz")
     if not (math.isfinite(sample_rate_hz) and sample_rate_hz == round(sample_rate_hz)):
         raise InputError(
             "sample_rate_hz", f"is {sample_rate_hz!r}; give a whole number of Hz"
@@ -81,15 +76,15 @@ def _given(recording: ArrayLike, sample_rate_hz: float | None) -> RecordedSample
     if given.ndim != 2 or len(given) > given.shape[1]:
         raise InputError(
             "recording",
-            f"{where}; give (microphones, samples), one row a microphone: transpose "
-            "what soundfile.read returns",
+            f"{where}; give (microphones, samples), one row per microphone: transpose "
+            "the result of soundfile.read",
         )
     samples = given.astype(np.float64)
     if given.dtype.kind in "iu":
         samples /= np.iinfo(given.dtype).max  # as files are read: full scale is 1
     if not np.isfinite(samples).all() or not samples.any():
         raise InputError(
-            "recording", f"{where} is silent or not finite; give what was recorded"
+            "recording", f"{where} is silent or not finite; give recorded samples"
         )
     return RecordedSamples(samples, round(sample_rate_hz), where)
 
@@ -120,9 +115,9 @@ def array_mismatch(geometry: ArrayGeometry, channels: int, rate: int) -> str:
     if geometry.channels is None and count > needed:
         default = geometry.microphones == ROBOT_ARRAY.microphones
         remedy = (
-            "give the places of its microphones by --geometry FILE"
+            "give the positions of its microphones with --geometry FILE"
             if default
-            else "name the channels to use in the geometry file, as "
+            else "name the channels to use in the geometry file, for example "
             f"'channels: {list(range(needed))}'"
         )
         whose = "the robot's own array" if default else "the array"

@@ -22,8 +22,6 @@ from systems.delays.copied_channels import copied_pairs
 from systems.delays.pair_correlations import PairCorrelations, correlate_pairs
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["ChannelFault", "find_channel_faults"]
-
 # Below the median of all channels by this, a channel is dead, dB; above it by
 # this, the source is at it.
 _DEAD_DB = 30.0
@@ -144,8 +142,8 @@ def _unreadable(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
         return ChannelFault(
             "nan",
             (k,),
-            f"channel {k + 1}: sample {wrong[0]} is not a number ({wrong.size} are "
-            "not); repair the file",
+            f"channel {k + 1}: sample {wrong[0]} is not a number ({wrong.size} "
+            "samples in all); repair the file",
         )
     if channel.size and np.ptp(channel) == 0.0:
         return _dead(k, f"all samples are {channel[0]:g}")
@@ -159,8 +157,8 @@ def _copied(
         ChannelFault(
             "copied",
             (int(use[i]), int(use[j])),
-            f"channels {use[i] + 1} and {use[j] + 1}: the same samples in both, but "
-            "for gain and delay; record every microphone on a channel of its own",
+            f"channels {use[i] + 1} and {use[j] + 1}: their samples are equal apart "
+            "from gain and delay; record every microphone on its own channel",
         )
         for i, j in copied_pairs(samples, sample_rate_hz)
     ]
@@ -179,7 +177,7 @@ def _clipped(k: int, channel: NDArray[np.float64]) -> ChannelFault | None:
     return ChannelFault(
         "clipped",
         (k,),
-        f"channel {k + 1}: clipped, {100 * share:.2g} % of its samples stand at an "
+        f"channel {k + 1}: clipped, {100 * share:.2g} % of its samples are at an "
         "extreme; record with less gain",
     )
 
@@ -204,8 +202,8 @@ def _levels(
                     "near",
                     (channel,),
                     f"channel {channel + 1}: {over:.0f} dB above the others: the "
-                    "source is at its microphone, or gains differ; move the source "
-                    "away from the array, or set equal gains",
+                    "source is close to its microphone, or gains differ; move the "
+                    "source away from the array, or set equal gains",
                 )
             )
     return faults
@@ -221,7 +219,7 @@ def _strangers(
     if use.size < 3 or best.max() < _COHERENT:
         return []
     return [
-        _dead(channel, "nothing in it belongs to the sound of the others")
+        _dead(channel, "it has nothing in common with the sound in the others")
         for k, channel in enumerate(use.tolist())
         if best[k] < _INCOHERENT
     ]
@@ -249,8 +247,8 @@ def _inverted(
         ChannelFault(
             "inverted",
             (int(use[k]),),
-            f"channel {use[k] + 1}: inverted, its correlation with the others is "
-            "negative; exchange the wires of its microphone, or the sign of its "
+            f"channel {use[k] + 1}: inverted, because its correlation with the others "
+            "is negative; exchange the wires of its microphone, or the sign of its "
             "samples",
         )
         # Channels that share nothing with the rest have any sign.
@@ -299,7 +297,7 @@ def _scale_fault(scale: DelayScale, shape: ArrayShape) -> ChannelFault:
         "size",
         (),
         f"{said} can have: the source is straight {where} it, or the positions are "
-        "not in m; check them",
+        "not in m; check the positions",
     )
 
 
@@ -312,8 +310,8 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
             ChannelFault(
                 "swapped",
                 tuple(sorted({k for pair in exchanges for k in pair})),
-                f"channels {names}: exchanged, the delays fit the geometry only the "
-                "other way round; exchange them in 'channels'",
+                f"channels {names}: exchanged, because the delays fit the geometry "
+                "only in the other order; exchange them in 'channels'",
             )
         ]
     share = misfit(delays)
@@ -323,8 +321,8 @@ def _order(delays: FrameDelays) -> list[ChannelFault]:
         ChannelFault(
             "geometry",
             (),
-            f"channels: {100 * share:.0f} % of the delays belong to no place outside "
-            "the array; check the microphones' positions (in m), their order and the "
+            f"channels: {100 * share:.0f} % of the delays fit no place outside the "
+            "array; check the microphones' positions (in m), their order and the "
             "speed of sound",
         )
     ]

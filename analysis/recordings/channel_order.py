@@ -19,14 +19,6 @@ from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "FrameDelays",
-    "exchanged",
-    "exchanged_channels",
-    "levels_contradict",
-    "misfit",
-]
-
 # Delays fit where they are right to this part of a sample, to this share of what
 # sound needs across the array, or to so many deviations of the microphones' places.
 _FIT_SAMPLES = 0.25

@@ -17,8 +17,6 @@ from scipy.stats import theilslopes
 
 from analysis.recordings.channel_faults import ChannelFault
 
-__all__ = ["STRETCH_S", "clock_drift", "common_lags", "recording_drift"]
-
 #: Length of a stretch, s: clocks that are off by 100 ppm drift by 50 us in it.
 STRETCH_S = 0.5
 
@@ -110,7 +108,7 @@ def clock_drift(
         "drift",
         tuple(late),
         f"{_names(late)}: {clock} from that of {_names(others)} by "
-        f"{1e6 * abs(fastest):.0f} us a second; record all channels by one clock",
+        f"{1e6 * abs(fastest):.0f} us per second; record all channels with one clock",
     )
 
 

@@ -13,8 +13,6 @@ import numpy as np
 
 from analysis.recordings.channel_order import FrameDelays
 
-__all__ = ["REACHES_M", "DelayScale", "delay_scale"]
-
 #: Where delays do not fit an array they are looked for within these lengths, m.
 REACHES_M = (0.3, 3.0)
 

@@ -19,8 +19,6 @@ from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 from systems.sound.sound_file import read_sound
 
-__all__ = ["HeardSound", "heard_sound", "sightings_of"]
-
 _RATES_HZ = (8_000, 192_000)
 
 # Where a geometry names no band, and up to which share of the sample rate.
@@ -103,7 +101,7 @@ def sightings_of(
     if not recording.starts.size:
         raise InputError(
             "recording",
-            f"{where}: {channels.shape[1]} samples are less than one frame of "
+            f"{where} has {channels.shape[1]} samples, fewer than one frame of "
             f"{recording.window.size}; record longer",
         )
     found: list[Sighting] = []
@@ -169,9 +167,9 @@ def _channels(
     if len(samples) < needed or not exact:
         raise InputError(
             "recording",
-            f"{where} has {len(samples)} channels, and the array "
-            f"{len(geometry.columns)} microphones; name one column for each in "
-            "'channels' of the geometry file",
+            f"{where} has {len(samples)} channels, and the array has "
+            f"{len(geometry.columns)} microphones; name one column for each "
+            "microphone in 'channels' of the geometry file",
         )
     if not _RATES_HZ[0] <= rate <= _RATES_HZ[1]:
         low, high = _RATES_HZ
@@ -190,8 +188,8 @@ def _channels(
     if not from_s < end <= length + 1.0 / rate:
         raise InputError(
             "recording",
-            f"{where} has {length:.3f} s, of which {from_s:g} to {end:g} s are no "
-            "part; mend from_s and to_s",
+            f"{where} has {length:.3f} s, and {from_s:g} to {end:g} s are not "
+            "within it; correct from_s and to_s",
         )
     part = slice(round(from_s * rate), round(end * rate))
     return np.ascontiguousarray(samples[list(geometry.columns), part]), rate

@@ -9,21 +9,17 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.hearing.voting import (
+from systems.hearing.voting.direction_votes import (
     DirectionVotes,
-    VotedSource,
     VotePlan,
     cast_votes,
-    gather_sources,
-    is_steady,
     join_votes,
-    steered_only,
-    vote_plan,
 )
+from systems.hearing.voting.listening_plan import vote_plan
 from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
+from systems.hearing.voting.steady_sound import is_steady, steered_only
+from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
 from systems.sound.array_shape import ArrayShape
-
-__all__ = ["FollowedSource", "HeardSource", "HeardSources", "heard_sources"]
 
 # Samples of a channel that vote at once.
 _BLOCK = 2**16

@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike, NDArray
 from analysis.recordings.array_geometry import (
     ArrayGeometry,
     KnownArray,
-    load_geometry,
     make_geometry,
 )
 from analysis.recordings.array_match import (
@@ -31,17 +30,6 @@ from analysis.recordings.recording_spectra import RecordingSpectra
 from analysis.recordings.source_placement import has_place, place_source
 from analysis.recordings.wavefront_misfit import late_channel
 from systems.framework.input_error import InputError
-
-__all__ = [
-    "ArrayGeometry",
-    "HeardRecording",
-    "LocateResult",
-    "SourceEstimate",
-    "hear",
-    "load_geometry",
-    "locate",
-    "located",
-]
 
 # Where a geometry names no band.
 _BAND_HZ = (300.0, 15_000.0)
@@ -182,7 +170,7 @@ def hear(
     if not recording.starts.size:
         raise InputError(
             "recording",
-            f"{name} has {samples.shape[1]} samples, less than one frame of "
+            f"{name} has {samples.shape[1]} samples, fewer than one frame of "
             f"{recording.window.size}; record longer",
         )
     search, sightings, estimates = _estimates(recording, known)

@@ -15,8 +15,6 @@ from analysis.recordings.locate_result import LocateResult
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS, draw_grid
 from analysis.reporting.plain_values import write_json
 
-__all__ = ["plot_locate", "write_locate"]
-
 # Tracks are not drawn over longer pauses, s.
 _GAP_S = 0.5
 
@@ -69,12 +67,14 @@ def plot_locate(result: LocateResult) -> Figure:
 def _title(result: LocateResult) -> str:
     heard = f"heard in {len(result.estimates)} of {result.frames} frames"
     if result.heard.steady:
-        heard += "; steady: one source, or several, is not told"
+        heard += "; steady sound: the number of sources is unknown"
     elif len(result.heard.sources) > 1:
         heard += f"; {len(result.heard.sources)} sources"
     summary = result.summary()
     if not result.estimates or "range" in summary["observable"]:
         return heard
+    if any(each.range_m is not None for each in result.estimates):
+        return f"{heard}; no single range"
     return f"{heard}; range not observable"
 
 

@@ -16,8 +16,6 @@ from analysis.recordings.heard_sources import HeardSource, HeardSources
 from analysis.recordings.source_placement import PlacedSource
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["LocateResult", "SourceEstimate"]
-
 # Estimates this near to the commonest direction are of one source, deg.
 _NEAR_DEG = 15.0
 

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from analysis.recordings.locate_result import LocateResult, SourceEstimate
 
-__all__ = ["locate_text"]
-
 _WHY_NOTHING = (
-    "; there is silence or noise, or the positions (in m) or the speed of sound are "
-    "not those of the array, or the source is within 0.2 m of its centre"
+    "; the recording is silent or noise, or the positions (in m) or the speed of "
+    "sound do not match the array, or the source is within 0.2 m of its center"
 )
 
 _COLUMNS = (
@@ -38,22 +36,25 @@ def _direction(result: LocateResult) -> list[str]:
     parts = []
     if summary["bearing_deg"] is not None:
         parts.append(
-            f"bearing {summary['bearing_deg']:.2f} deg "
-            f"(std {summary['bearing_std_deg']:.2f}, of which "
-            f"{summary['bearing_systematic_deg']:.2f} by errors of array and air)"
+            f"bearing {summary['bearing_deg']:.2f} deg (std "
+            f"{summary['bearing_std_deg']:.2f}, of which "
+            f"{summary['bearing_systematic_deg']:.2f} from errors of array and air)"
         )
     if summary["elevation_deg"] is not None:
         parts.append(
             f"elevation {summary['elevation_deg']:.1f} deg "
             f"(std {summary['elevation_std_deg']:.1f})"
         )
-    lines = [", ".join(parts) or "direction not observable: the row is slanted"]
+    lines = [
+        ", ".join(parts)
+        or "direction not observable: the row of microphones is slanted"
+    ]
     for other in summary["alternatives"]:
         text = f"or bearing {other['bearing_deg']:.2f} deg"
         if other["elevation_deg"] is not None:
             text += f", elevation {other['elevation_deg']:.1f} deg"
         cause = "a row" if summary["ambiguity"] == "front_back" else "a plane"
-        lines.append(f"{text}: {cause} of microphones cannot tell")
+        lines.append(f"{text}: {cause} of microphones cannot distinguish them")
     if summary["elevation_deg"] is None:
         lines.append("elevation not observable with this array")
     return lines
@@ -61,12 +62,19 @@ def _direction(result: LocateResult) -> list[str]:
 
 def _range(result: LocateResult) -> str:
     summary = result.summary()
+    ranges = [e.range_m for e in result.estimates if e.range_m is not None]
+    if summary["range_m"] is None and ranges:
+        return (
+            f"no single range: {len(ranges)} of {len(result.estimates)} estimates have "
+            f"one, from {min(ranges):.3f} to {max(ranges):.3f} m"
+        )
     if summary["range_m"] is None:
         size = 100.0 * result.shape.aperture_m
         return f"range not observable (microphones within {size:.1f} cm)"
     return (
-        f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f}, of which "
-        f"{summary['range_systematic_m']:.3f} by errors of array and air, alike in all)"
+        f"range {summary['range_m']:.3f} m (std {summary['range_std_m']:.3f}, of "
+        f"which {summary['range_systematic_m']:.3f} from errors of array and air, "
+        "equal in all)"
     )
 
 
@@ -74,10 +82,10 @@ def _sources(result: LocateResult) -> list[str]:
     """Where there are several; one is what the lines above speak of."""
     sources = result.heard.sources
     if result.heard.steady:
-        return ["the sound is steady: one source, or several, is not told"]
+        return ["the sound is steady: the number of sources is unknown"]
     if len(sources) < 2:
         return []
-    lines = [f"{len(sources)} sources; the lines above are of the main one"]
+    lines = [f"{len(sources)} sources; the lines above describe the main source"]
     lines += [
         f"  bearing {source.bearing_deg:7.1f} deg, {100.0 * source.share:3.0f} % of "
         f"what is heard, confidence {source.confidence:.2f}"

@@ -19,8 +19,6 @@ from scipy.signal import butter, sosfilt
 
 from analysis.recordings.recording_spectra import ABOVE_NOISE, RecordingSpectra
 
-__all__ = ["AFTER_S", "OnsetSpectra"]
-
 # A window begins so long before an onset, beside what sound takes along the array, and
 # ends as softly.
 _BEFORE_S = 0.003

@@ -12,8 +12,6 @@ from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.channel_order import exchanged
 from systems.framework.input_error import InputError
 
-__all__ = ["channels_without_faults"]
-
 # What leaves nothing to locate with.
 _FATAL = ("nan", "dead", "copied", "units", "drift")
 
@@ -52,7 +50,7 @@ def channels_without_faults(
         further = sorted({k + 1 for f in rest for k in f.channels if f is not first})
         names = ", ".join(map(str, further[:_MOST_NAMED]))
         names += " ..." if len(further) > _MOST_NAMED else ""
-        more = f"; see to channels {names} as well" if rest else ""
+        more = f"; check channels {names} as well" if rest else ""
         raise InputError("recording", f"{where}: {first.message}{more}")
     inverted = [k for f in faults if f.kind == "inverted" for k in f.channels]
     if inverted:

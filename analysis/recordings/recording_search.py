@@ -23,8 +23,6 @@ from systems.hearing.steered_response import (
 )
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["RecordingSearch", "Sighting"]
-
 # Least mean weight of a stretch's snapshots: the rest is silence or echo.
 _LEAST_WEIGHT = 0.02
 # A response counts above that of a diffuse field by this many deviations of

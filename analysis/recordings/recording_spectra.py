@@ -16,8 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["ABOVE_NOISE", "RecordingSpectra"]
-
 WINDOW_S = 0.032
 #: Windows are at least this many times as long as sound takes along the array.
 TRAVELS = 6.0

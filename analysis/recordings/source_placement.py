@@ -22,8 +22,6 @@ from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["PlacedSource", "has_place", "place_source", "tolerance"]
-
 # Reflections move each channel by its own, for each part that is not coherent by
 # this share of what sound takes along the array, or of the time within which an
 # echo cannot be told apart. From simulated rooms.

@@ -21,8 +21,6 @@ from systems.hearing.multilateration import locate_source, whitening_matrix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["Lateness", "channel_lateness", "late_channel"]
-
 # Stretches that are looked at; they lie anywhere in the recording.
 _MOST_STRETCHES = 64
 _LEAST_STRETCHES = 3

@@ -14,8 +14,6 @@ from analysis.reporting.palette import COLOURS
 from diagrams import RunResult
 from systems.world.geometry import rotate
 
-__all__ = ["Arrow", "arrows", "record_arrows", "scale_m_n"]
-
 #: Arrows are recorded so often; a browser interpolates, 1/s.
 ARROWS_PER_S = 8.0
 #: Length of the greatest force, and of the shortest arrow, m.

@@ -12,8 +12,6 @@ from typing import NamedTuple
 from analysis.replays.time_charts import Chart
 from analysis.reporting.html_page import COLOURS_CSS
 
-__all__ = ["Layer", "ReplayFacts", "replay_page"]
-
 _HERE = Path(__file__).parent
 #: How Meshcat's page gives its viewer a message.
 _HANDLE = "viewer.handle_command_bytearray("
@@ -45,6 +43,8 @@ class ReplayFacts(NamedTuple):
     """Paths in Meshcat's tree, and names of what is there."""
     robots: Sequence[tuple[str, str]]
     """Paths and names of what the view can follow."""
+    warnings: Sequence[str] = ()
+    """About the scenario, below the legend."""
 
 
 def replay_page(meshcat_page: str, facts: ReplayFacts) -> str:
@@ -130,9 +130,11 @@ def _panels(facts: ReplayFacts) -> Iterator[str]:
     plain = "".join(_entry(layer) for layer in facts.layers if not layer.paths)
     switched = "".join(_entry(layer) for layer in facts.layers if layer.paths)
     names = '<li><label><input type="checkbox" checked><span></span>names</label></li>'
+    lines = "".join(f"<li>{html.escape(text)}</li>" for text in facts.warnings)
+    warnings = f"<h2>Warnings</h2><ul>{lines}</ul>" if lines else ""
     yield (
         f'<aside aria-label="Legend"><h2>Legend</h2><ul>{plain}</ul>'
-        f"<h2>Show</h2><ul>{switched}{names}</ul></aside>"
+        f"<h2>Show</h2><ul>{switched}{names}</ul>{warnings}</aside>"
     )
     chart = (
         '<div class="chart"><select aria-label="Quantity">'

@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from diagrams import RunResult
 
-__all__ = ["Chart", "time_chart"]
-
 #: A curve has so many points at most; a screen shows no more.
 MOST_POINTS = 1200
 
@@ -106,7 +104,7 @@ def _series(line: Line2D, across_s: float | None) -> dict[str, Any]:
 
 
 def _style(line: Line2D) -> str:
-    if line.get_drawstyle() == "steps-pre":
+    if line.get_drawstyle() == "steps-post":
         return "steps"
     styles = {"None": "dots", "-": "line"}
     return styles.get(str(line.get_linestyle()), "dashes")
@@ -115,13 +113,9 @@ def _style(line: Line2D) -> str:
 def _steps(
     t: NDArray[np.float64], values: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """The begin of each value, and the end of the last.
-
-    A row tells of the time since the row before it.
-    """
+    """The begin of each value, and the end of the last."""
     new = np.flatnonzero(np.r_[True, values[1:] != values[:-1]])
-    begins = np.r_[t[:1], t[np.maximum(new[1:] - 1, 0)]]
-    return np.r_[begins, t[-1:]], np.r_[values[new], values[-1:]]
+    return np.r_[t[new], t[-1:]], np.r_[values[new], values[-1:]]
 
 
 def _short(values: NDArray[np.float64], digits: int) -> list[float | None]:

@@ -16,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.reporting.palette import text_colour
 
-__all__ = ["BodyLabel", "spread_labels"]
-
 _POINTS_PER_INCH = 72.0
 #: From a body to its words, pt, and from which on a line leads to it.
 _GAPS_PT, _LEAD_FROM_PT = (2.0, 8.0, 15.0, 24.0, 34.0, 46.0), 8.0

@@ -7,8 +7,6 @@ from typing import Any
 
 from analysis.reporting.html_page import Cell, number, table
 
-__all__ = ["fact_table", "readable_name", "row_table"]
-
 #: Endings of names, longest first, and what they stand for.
 _UNITS = {
     "_n_s_m": "N s/m",

@@ -21,27 +21,6 @@ from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties
 from matplotlib.mathtext import math_to_image
 
-__all__ = [
-    "COLOURS_CSS",
-    "ZERO",
-    "Cell",
-    "Judged",
-    "bullets",
-    "definitions",
-    "equation",
-    "figure_html",
-    "file_links",
-    "heading",
-    "links",
-    "note",
-    "number",
-    "page",
-    "paragraph",
-    "picture",
-    "section",
-    "table",
-]
-
 _HERE = Path(__file__).parent
 #: Variables with the colours of pages, by day and by night.
 COLOURS_CSS = (_HERE / "page_colours.css").read_text("utf-8")

@@ -8,15 +8,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = [
-    "Estimate",
-    "Interval",
-    "bootstrap_interval",
-    "median_interval",
-    "wilson_interval",
-    "with_interval",
-]
-
 
 class Interval(NamedTuple):
     """Where a figure lies, in all likelihood."""

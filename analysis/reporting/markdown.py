@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-__all__ = ["markdown_head", "markdown_row", "markdown_table"]
-
 
 def markdown_row(cells: Iterable[object]) -> str:
     """One line of a table."""

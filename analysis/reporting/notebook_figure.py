@@ -6,8 +6,6 @@ from io import BytesIO
 
 from matplotlib.figure import Figure
 
-__all__ = ["NotebookFigure"]
-
 #: As wide as a page is read.
 _DPI = 100
 

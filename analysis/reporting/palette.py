@@ -7,17 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-__all__ = [
-    "COLOURS",
-    "ROBOT_COLOURS",
-    "SERIES_COLOURS",
-    "contrast",
-    "draw_grid",
-    "faintest",
-    "luminance",
-    "text_colour",
-]
-
 #: Okabe and Ito's palette, told apart with any colour vision; its light ones darker, so
 #: that lines stand out from white by 3 to 1 (WCAG 2.2, 1.4.11). Their orange is brown:
 #: one between would be their vermilion to who sees no green. Sound is laid below.

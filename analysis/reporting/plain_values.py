@@ -13,8 +13,6 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-__all__ = ["plain", "write_json"]
-
 
 def plain(value: Any) -> Any:
     """Mappings, lists, strings, numbers, truth values and null only.
@@ -52,7 +50,9 @@ def _leaf(value: Any) -> Any:
         return value.model_dump(mode="json")
     if isinstance(value, Enum | Path):
         return str(value)
-    raise TypeError(f"{type(value).__name__} has no plain form; give its numbers")
+    raise TypeError(
+        f"{type(value).__name__} has no plain form; pass its numbers instead"
+    )
 
 
 def write_json(document: Any, path: Path) -> None:

@@ -5,8 +5,6 @@ from __future__ import annotations
 import platform
 from importlib.metadata import PackageNotFoundError, version
 
-__all__ = ["SCHEMA_VERSION", "versions"]
-
 #: Raised when a key of the JSON documents changes its meaning.
 SCHEMA_VERSION = 1
 #: Packages that can change a result.

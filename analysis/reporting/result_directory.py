@@ -12,8 +12,6 @@ from pathlib import Path
 
 from systems.framework.input_error import InputError, shortened
 
-__all__ = ["ResultDirectory", "check_directory", "take_directory", "whole_directory"]
-
 #: Parent of numbered directories.
 _BASE = "results"
 
@@ -137,8 +135,8 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
     """
     shown = shortened(str(out), 80)
     try:
-        str(out).encode()
         path = Path(out).expanduser().resolve()
+        str(path).encode()
         is_file = path.exists() and not path.is_dir()
         is_empty = parent or not path.is_dir() or not any(path.iterdir())
         is_fixed = not parent and (path == Path.cwd() or path.is_mount())
@@ -147,12 +145,12 @@ def check_directory(out: str | Path, *, parent: bool = False) -> Path:
     except (OSError, RuntimeError, ValueError) as error:
         # Names too long, home directories of nobody, and zero bytes.
         reason = getattr(error, "strerror", None) or error
-        raise _refused(f"{shown} is no usable path ({reason})") from None
+        raise _refused(f"{shown} is not a usable path ({reason})") from None
     if is_file:
         raise InputError("out", f"{shown} is a file; name a directory")
     if is_fixed:
         raise InputError(
-            "out", f"{shown!r} cannot be replaced; name a directory that is not there"
+            "out", f"{shown!r} cannot be replaced; name a directory that does not exist"
         )
     if not is_empty:
         raise _refused(f"{shown} is not empty")

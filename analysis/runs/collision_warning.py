@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-from diagrams.simulation import RunResult
+from diagrams.run_result import RunResult
+from systems.framework.compiling import njit
 from systems.world.geometry import fan_ranges
-
-__all__ = ["collision_warning"]
 
 #: An echo is a body's if the range that was read is so near to that body's, m.
 SAME_M = 0.03

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from analysis.runs.known_space import KnownSpace
 
-__all__ = ["FloorLayer", "clipped", "floor_layers", "merged_cells"]
-
 
 class FloorLayer(NamedTuple):
     """Cells that come and go together."""

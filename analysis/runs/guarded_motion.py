@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagrams import RunResult
-from systems.safety.braking import BrakingNumbers, braked, roll_on
+from systems.framework.compiling import njit
+from systems.safety.braking import BrakingNumbers, braked, roll_on, rolled_speeds
 from systems.safety.motion_guard import MotionGuard
 from systems.safety.sensing_monitor import SENSING_FAULTS
-
-__all__ = ["GUARD_ACTIONS", "GuardedMotion", "Halt", "guarded_motion", "halts_of"]
 
 #: What a guard does with a command, by its number in a run's table.
 GUARD_ACTIONS = ("passed", "slowed", "turned", "braked", "halted")
@@ -57,7 +55,8 @@ def guarded_motion(result: RunResult) -> GuardedMotion | None:
     names = "p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"
     poses = np.column_stack([columns[name] for name in names])
     sides = "wheel_speed_left", "wheel_speed_right"
-    commands = np.column_stack([columns[name] for name in sides])
+    # Of the tick before each, from rest.
+    commands = np.column_stack([np.r_[0.0, columns[name][:-1]] for name in sides])
     return GuardedMotion(
         np.rint(columns["guard_action"]).astype(np.int64),
         _resting_poses(poses, commands, braking),
@@ -120,16 +119,17 @@ def _resting_poses(
         numbers: How the robot brakes.
     """
     rests = np.empty(poses.shape)
-    speeds, tick_s = (0.0, 0.0), numbers.tick_s
+    speeds, kept = (0.0, 0.0), numbers.part.kept**numbers.parts
     for k in range(len(poses)):
         pose = poses[k, 0], poses[k, 1], poses[k, 2]
         command = commands[k, 0], commands[k, 1]
         if k > 0:
-            _, speeds = roll_on(pose, speeds, command, tick_s, numbers)
+            speeds = rolled_speeds(speeds, command, kept)
         now = speeds
         while True:
             command = braked(command, numbers)
-            pose, now = roll_on(pose, now, command, tick_s, numbers)
+            for _ in range(numbers.parts):
+                pose, now = roll_on(pose, now, command, numbers)
             fastest = max(abs(now[0]), abs(now[1])) * numbers.wheel_radius_m
             if command[0] == 0.0 and command[1] == 0.0 and fastest < _REST_M_S:
                 break

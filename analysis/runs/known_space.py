@@ -14,16 +14,9 @@ from systems.framework.step_block import RunFacts
 from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap
 
-__all__ = [
-    "KnownSpace",
-    "has_known_space",
-    "known_space",
-    "logged_readings",
-    "remembered_space",
-]
-
 #: Columns of a run without which the map cannot be worked out.
 _POSE = ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated")
+_WHEELS = ("wheel_speed_left", "wheel_speed_right")
 #: What a user's own block must not stand in for: its ages or its map are not ours.
 _OURS = ("ultrasonic", "free_space")
 
@@ -80,7 +73,12 @@ def has_known_space(result: RunResult) -> bool:
     if result.several or scenario.own_guard is None:
         return False
     own = {import_own(name, "blocks").FACTS.part for name in scenario.blocks}
-    columns = {*_POSE, *_numbered("range", scenario), *_numbered("echo", scenario)}
+    columns = {
+        *_POSE,
+        *_WHEELS,
+        *_numbered("range", scenario),
+        *_numbered("echo", scenario),
+    }
     return own.isdisjoint(_OURS) and columns <= result.columns.keys()
 
 
@@ -99,6 +97,8 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         parameters=scenario.free_space,
         sensors=sensors,
         robot=scenario.robot,
+        odometry=scenario.odometry,
+        plant=scenario.plant,
         tick_s=tick_s,
     )
     integrator = scenario.integrator
@@ -126,20 +126,28 @@ def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ..
         result: The run of one guarded robot.
 
     Yields:
-        (sensors,) ranges, m, echoes, 0 or 1, and ages of them, s, and (3,) the pose by
-        the odometry, m and rad.
+        (sensors,) ranges, m, echoes, 0 or 1, and ages of them, s, (3,) the pose by
+        the odometry, m and rad, and (2,) the wheel speeds commanded until then, rad/s.
     """
     scenario, columns, tick_s = result.scenario, result.columns, result.scenario.tick_s
     sensors = scenario.ultrasonic
     ticks = np.rint(result.time / tick_s).astype(np.int64)
     # Of sensors that fire in turn the log does not tell which one has just fired.
     since = (ticks[:, None] - sensors.turns(tick_s)) % sensors.round_ticks(tick_s)
-    ranges, echo, poses = (
+    ranges, echo, poses, wheels = (
         np.column_stack([columns[name] for name in names])
-        for names in (_numbered("range", scenario), _numbered("echo", scenario), _POSE)
+        for names in (
+            _numbered("range", scenario),
+            _numbered("echo", scenario),
+            _POSE,
+            _WHEELS,
+        )
     )
+    # A row has the command from its tick on; until then it was that of the row before.
+    wheels = np.vstack([np.zeros(2), wheels[:-1]])
     for row in range(len(ticks)):
-        yield ranges[row], echo[row], since[row] * tick_s, poses[row]
+        age = since[row] * tick_s
+        yield ranges[row], echo[row], age, poses[row], wheels[row]
 
 
 def known_space(result: RunResult, times: ArrayLike) -> KnownSpace | None:

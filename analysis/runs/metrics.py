@@ -7,7 +7,6 @@ from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from analysis.runs.collision_warning import collision_warning
@@ -22,11 +21,10 @@ from analysis.runs.smoothness import (
     turn_reversals,
     windows,
 )
-from diagrams.simulation import RunResult
+from diagrams.run_result import RunResult
 from diagrams.stop_rules import ROUNDING_S
+from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, control_point_velocity
-
-__all__ = ["following_error", "frames_with_sound", "run_metrics"]
 
 #: A detection is off when it is farther from the source than this, m.
 OUTLIER_M = 0.5
@@ -231,7 +229,10 @@ def _force_metrics(result: RunResult) -> dict[str, float | None]:
         return {"control_effort_rms_n": None, "push_work_j": None}
     repulsion = result.vector("repulsion")
     force = result.vector("attraction") + repulsion
-    push = np.sum(repulsion * result.vector("v_WP"), axis=0)
+    # The push of a tick changes the velocity from that of the row before to its own.
+    after = result.vector("v_WP")
+    before = np.column_stack([np.zeros(2), after[:, :-1]])
+    push = np.sum(repulsion * (before + after) / 2.0, axis=0)
     return {
         "control_effort_rms_n": _rms(_lengths(force)),
         "push_work_j": float(np.sum(push)) * result.scenario.tick_s,
@@ -324,7 +325,8 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
     heard = new & (columns["detected"] > 0.5)
     ranged = heard & (columns["range_valid"] > 0.5)
     away = result.vector("p_WS_estimated") - result.vector("p_WS")
-    error = _lengths(away[:, ranged])
+    # The target goes by an estimate from the tick after it on.
+    error = _lengths(away[:, 1:][:, ranged[:-1]])
     return {
         "frames_with_sound": int(np.count_nonzero(sounding)),
         "frames_with_sound_heard": int(np.count_nonzero(sounding & heard)),
@@ -337,35 +339,34 @@ def _hearing_metrics(result: RunResult) -> dict[str, Any]:
 
 
 def frames_with_sound(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether a tick's estimate is new, and its frame held sound for half or more.
+    """(n,) whether a frame ends at a tick that held sound for half or more.
 
-    The sound arrives by what it takes for the way, but with ideal hearing, and the
-    estimate a tick after the frame's end. The gate tells: a recording's own pauses
-    count as sound.
+    The sound arrives by what it takes for the way, but with ideal hearing. The gate
+    tells: a recording's own pauses count as sound.
     """
     return _new_frames(result) & _sounding(result)
 
 
 def _sounding(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether the frame of a tick's estimate held sound for half or more."""
+    """(n,) whether the last frame held sound for half or more."""
     scenario, time = result.scenario, result.time
     travel = np.zeros(len(time))
     if scenario.hearing == "audio":
-        # The distance as it was at the frame's end, half a frame too late.
-        travel[1:] = result.columns["source_range_true"][:-1] / scenario.acoustics.c
+        # The distance as it is at the frame's end, half a frame too late.
+        travel = result.columns["source_range_true"] / scenario.acoustics.c
     elif not scenario.ideal_hearing.burst_gaps:
-        return time >= 0.5 * scenario.tick_s
-    middle = scenario.tick_s + 0.5 * scenario.microphones.frame_s
+        return np.ones(len(time), dtype=bool)
+    middle = 0.5 * scenario.microphones.frame_s
     sounds: NDArray[np.bool_] = scenario.sound.sounds(time - middle - travel)
     return sounds
 
 
 def _new_frames(result: RunResult) -> NDArray[np.bool_]:
-    """(n,) whether a tick is the first with the estimate of its frame."""
+    """(n,) whether a frame of the run ends at a tick."""
     tick_s = result.scenario.tick_s
     ticks_a_frame = round(result.scenario.microphones.frame_s / tick_s)
     ticks = np.rint(result.time / tick_s).astype(int)
-    fresh: NDArray[np.bool_] = (ticks - 1) % ticks_a_frame == 0
+    fresh: NDArray[np.bool_] = (ticks > 0) & (ticks % ticks_a_frame == 0)
     return fresh
 
 

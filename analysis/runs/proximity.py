@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.bodies import rectangles_at
-from diagrams.simulation import RunResult
+from diagrams.run_result import RunResult
+from systems.framework.compiling import njit
 from systems.world.geometry import contact_time, rectangle_clearance
 
-__all__ = ["Proximity", "least_clearances"]
-
-#: Below this clearance the time between two ticks is searched, m: more than robot
-#: and obstacle cover in a tick.
+#: Below this clearance the time between two ticks is searched, m, and below what robot
+#: and body cover in it.
 NEAR_M = 0.1
 #: Parts into which a tick is cut there.
 PARTS = 10
@@ -57,13 +55,17 @@ class Proximity:
         """(m,) least clearance from each body, between ticks too, m.
 
         A tick's clearance says little about a box that passes in 25 ms. Where
-        it is below ``NEAR_M`` a tick is cut into ten: the robot's pose is
-        interpolated, the bodies are where their paths say, and other robots on
-        straight lines between ticks.
+        it is below ``NEAR_M``, or below what both cover in the tick, the tick is cut
+        into ten: the robot's pose is interpolated, the bodies are where their paths
+        say, and other robots on straight lines between ticks.
         """
         clearance, least = self._clearances
-        near = clearance < NEAR_M
-        ticks = np.flatnonzero(near[:-1] | near[1:])
+        gone = np.hypot(*np.diff(self.robot[:, :2], axis=0).T)
+        if len(self.bodies):
+            ways = np.diff(self.bodies[:, :, :2], axis=1)
+            gone = gone + np.hypot(ways[..., 0], ways[..., 1]).max(axis=0)
+        near = np.minimum(clearance[:-1], clearance[1:]) < np.maximum(NEAR_M, gone)
+        ticks = np.flatnonzero(near)
         if len(ticks) == 0:
             return least
         part = np.arange(1, PARTS) / PARTS

@@ -42,15 +42,6 @@ from diagrams.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.sound.parameters import SoundParameters
 
-__all__ = [
-    "known_times",
-    "record_run",
-    "ring_at",
-    "time_charts",
-    "wheel_angles",
-    "write_replay",
-]
-
 #: Meshcat records at most so many frames a second.
 FRAMES_PER_S = 32.0
 #: Length of a piece of trail, s.
@@ -96,8 +87,9 @@ def write_replay(
     also the plume, and a lamp over each robot (``analysis.plumes.search_replay``).
 
     Round the scene: a clock that can be moved, a legend whose layers can be switched
-    off, and curves over time whose cursor follows the clock. ``#t=2.5`` behind the
-    address begins there. The page needs a browser with WebGL, but no network.
+    off, the warnings about the scenario, and curves over time whose cursor follows the
+    clock. ``#t=2.5`` behind the address begins there. The page needs a browser with
+    WebGL, but no network.
 
     Args:
         result: The run.
@@ -135,6 +127,7 @@ def _facts(result: RunResult, clearance: Mapping[str, ArrayLike]) -> ReplayFacts
         time_charts(result, clearance),
         [*robots, *sources, *obstacles],
         robots,
+        [str(each) for each in result.warnings],
     )
 
 

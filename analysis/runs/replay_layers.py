@@ -9,8 +9,6 @@ from analysis.runs.known_space import has_known_space
 from analysis.runs.scene import followed_sources, lightened, looks
 from diagrams import RunResult
 
-__all__ = ["replay_layers"]
-
 
 def replay_layers(
     result: RunResult, paths: dict[str, str], estimates: dict[str, str]
@@ -44,7 +42,7 @@ def _bodies(result: RunResult) -> list[Layer]:
         if name in followed:
             found.append(Layer(name, "what is followed", (COLOURS["source"],)))
         else:
-            text = "sounds, and is not followed"
+            text = "emits sound, and the robot does not follow it"
             found.append(Layer(name, text, (COLOURS["interferer"],)))
     if scenario.obstacles:
         found.append(Layer("obstacles", "", (COLOURS["obstacle"],)))
@@ -65,7 +63,7 @@ def _of_sensors(
         if f"echo_{number}" in own.columns
     ]
     if cones:
-        text = "of ultrasound; with an echo, without"
+        text = "ultrasonic; with or without an echo"
         both = COLOURS["echo"], COLOURS["empty"]
         found.append(Layer("cones", text, both, tuple(cones)))
     balls = [
@@ -77,7 +75,11 @@ def _of_sensors(
     if balls:
         colours = tuple(look.estimates for look in looks(result))
         routes = any(own.scenario.route for own in result.robots.values())
-        text = "the target on the way" if routes else "where the source is taken to be"
+        text = (
+            "the target on the route"
+            if routes
+            else ("where the robot assumes the source")
+        )
         label = "targets" if routes else "estimates"
         found.append(Layer(label, text, colours, tuple(balls)))
     return found
@@ -92,7 +94,7 @@ def _of_laws(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         if arrow.name != "law"
     ]
     if forces:
-        text = f"attraction, repulsion; 1 N is {m_per_n:g} m long"
+        text = f"attraction and repulsion; an arrow of {m_per_n:g} m is 1 N"
         colours = COLOURS["attraction"], COLOURS["repulsion"]
         found.append(Layer("forces", text, colours, tuple(forces)))
     laws = tuple(arrow_path(path, "law") for path in paths.values())
@@ -100,9 +102,9 @@ def _of_laws(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         own.scenario.follow_distance_m and own.scenario.searches is None
         for own in result.robots.values()
     ):
-        text, laws = "way commanded for 1 s; follow distance", (*laws, "follow")
+        text, laws = "path of 1 s at the command; follow distance", (*laws, "follow")
     else:
-        text = "way commanded for 1 s"
+        text = "path of 1 s at the command"
     return [*found, Layer("law", text, (COLOURS["law"],), laws)]
 
 
@@ -116,15 +118,15 @@ def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         return []
     circles = tuple(f"guard/{paths[name]}" for name in guarded)
     colours = COLOURS["passed"], COLOURS["lessened"], COLOURS["hit"]
-    found = [Layer("guard", "passed on, gave less, braked", colours, circles)]
+    found = [Layer("guard", "passed the command, slowed, braked", colours, circles)]
     if any(has_known_space(own) for own in guarded.values()):
         own_looks = [look for look in looks(result) if look.result.name in guarded]
         shades = tuple(lightened(look.seen, 0.35) for look in own_looks)
         floors = tuple(f"known/{paths[name]}" for name in guarded)
-        found.append(Layer("known floor", "seen free; dots: echoes", shades, floors))
+        found.append(Layer("known floor", "seen as free; dots: echoes", shades, floors))
     if any(own.scenario.law == "guarded" for own in guarded.values()):
         rings = tuple(f"tracked/{paths[name]}" for name in guarded)
-        text = "bodies taken to move"
+        text = "bodies that the robot takes as moving"
         found.append(Layer("tracked", text, (COLOURS["tracked"],), rings))
     return found
 
@@ -132,7 +134,7 @@ def _of_guards(result: RunResult, paths: dict[str, str]) -> list[Layer]:
 def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     scenario = result.full_scenario
     colours = tuple(look.colour for look in looks(result))
-    found = [Layer("trails", "where they have been", colours, ("trail",))]
+    found = [Layer("trails", "past positions", colours, ("trail",))]
     if scenario.room is not None:
         found.append(Layer("walls", "of the room", (COLOURS["wall"],), ("room",)))
     if scenario.odor is not None:
@@ -144,7 +146,9 @@ def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
         for path in (f"{robot}/lamp", f"{robot}/radio")
     ]
     if lamps:
-        text = "grey rests, yellow senses, blue moves, green found, orange gave up"
+        text = (
+            "gray: at rest; yellow: senses; blue: moves; green: found; orange: gave up"
+        )
         found.append(Layer("lamps", text, (COLOURS["sound"],), tuple(lamps)))
     adaptive = [
         f"{paths[name]}/{gain}"
@@ -155,6 +159,6 @@ def _of_world(result: RunResult, paths: dict[str, str]) -> list[Layer]:
     ]
     if adaptive:
         colours = COLOURS["source"], COLOURS["robot"], COLOURS["obstacle"]
-        text = "K, D, K_e; as high as at first: 15 cm"
+        text = "K, D and K_e; a bar of 15 cm is the initial value"
         found.append(Layer("gains", text, colours, tuple(adaptive)))
     return found

@@ -22,25 +22,6 @@ from diagrams import RunResult, Scenario
 from diagrams.participants import SourceParameters
 from systems.base.robot import microphones_B
 
-__all__ = [
-    "RINGS",
-    "add_disc_edge",
-    "add_floor",
-    "add_floor_part",
-    "add_gain_bar",
-    "add_hit",
-    "add_obstacles",
-    "add_robot",
-    "add_room",
-    "add_source",
-    "add_star",
-    "add_trail",
-    "floor_rectangle",
-    "set_stage",
-    "shown_rectangle",
-    "upright",
-]
-
 #: Heights are not modelled; these look right, m.
 ROBOT_HEIGHT_M = 0.16
 MICROPHONE_HEIGHT_M = 0.30

@@ -9,8 +9,6 @@ from scipy.spatial import KDTree
 
 from analysis.runs.proximity import Proximity
 
-__all__ = ["near_and_after", "route_metrics", "yaw_ripple"]
-
 #: An obstacle is met while the body is nearer to it than this, m: the S of Engelbrecht
 #: 2021; and for so long after, s.
 MET_M, AFTER_S = 1.0, 5.0

@@ -11,6 +11,7 @@ from analysis.reporting.html_page import (
     definitions,
     file_links,
     heading,
+    note,
     page,
     paragraph,
     picture,
@@ -20,14 +21,12 @@ from analysis.reporting.html_page import (
 from analysis.runs.scene import run_title
 from diagrams import RunResult
 
-__all__ = ["run_page"]
-
 #: What lies beside the page, and what is in it.
 _FILES = {
     "replay.html": "the run in three dimensions, with curves over time",
-    "trajectory.parquet": "a row a tick, SI units",
-    "scenario.yaml": "all that the run depended on; `phonotaxis simulate` takes it",
-    "summary.json": "the figures of this page, for programs",
+    "trajectory.parquet": "one row per tick, SI units",
+    "scenario.yaml": "all inputs of the run; `phonotaxis simulate` runs it again",
+    "summary.json": "the numbers of this page, for programs",
 }
 
 
@@ -58,8 +57,8 @@ def run_page(
         parts["From above"] = [picture("trajectory.png", caption)]
     whose = {f"_{name}": f": {name}" for name in result.several} or {"": ""}
     for title, file, text, owners in (
-        ("Over time", "time_series{}.png", "What was heard, felt and done", whose),
-        ("Blocks", "diagram{}.svg", "Blocks, and what joins them", {"": "", **whose}),
+        ("Over time", "time_series{}.png", "Sensors and commands over time", whose),
+        ("Blocks", "diagram{}.svg", "Blocks and their connections", {"": "", **whose}),
     ):
         shown = [
             picture(file.format(ending), f"{text}{who}.")
@@ -83,8 +82,9 @@ def _anchor(title: str) -> str:
 def _summary(
     result: RunResult, rows: Mapping[str, str], *, has_replay: bool
 ) -> list[str]:
-    """Of several robots, a list for each below the list of all."""
-    parts, begin = [], 0
+    """Warnings, and of several robots a list for each below the list of all."""
+    begin = 0
+    parts = [note(f"Warning: `{x.field}`: {x.message}") for x in result.warnings]
     names = list(rows)
     starts = [names.index(name) for name in result.several]
     for end in [*starts, len(names)]:
@@ -101,11 +101,11 @@ def _summary(
         parts.append(definitions(shown))
         begin = end
     if has_replay:
-        watch = [("replay.html", "the whole run, to watch")]
+        watch = [("replay.html", "the whole run as an animation")]
         if result.collision is not None:
             moment = max(result.collision.time - 1.0, 0.0)
             watch.append(
-                (f"replay.html#t={moment:.2f}", "a second before the collision")
+                (f"replay.html#t={moment:.2f}", "one second before the collision")
             )
         parts.append(file_links(watch))
     return parts
@@ -113,7 +113,9 @@ def _summary(
 
 def _figures(result: RunResult, summary: Mapping[str, Any]) -> list[str]:
     metrics: Mapping[str, Any] = summary["metrics"]
-    text = paragraph("docs/metrics.md says what each of them is, and where it is from.")
+    text = paragraph(
+        "See docs/metrics.md for the definition and the source of each metric."
+    )
     names = list(result.several)
     if not names:
         return [text, fact_table(metrics)]

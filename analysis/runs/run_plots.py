@@ -34,16 +34,6 @@ from analysis.runs.trajectory_artists import (
 from diagrams import RunResult
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "Panel",
-    "clearance_panel",
-    "heard_bursts",
-    "map_axes",
-    "plot_time_series",
-    "plot_trajectory",
-    "time_panels",
-]
-
 #: Draws one quantity of one robot over time.
 Panel = Callable[[Axes, RunResult], None]
 
@@ -117,7 +107,7 @@ def _draw_odor(axes: Axes, result: RunResult) -> None:
         axes.contour(
             x, y, dense, levels=levels[:1], colors=edge, linewidths=0.5, zorder=0.6
         )
-        label = "odour at the end (0.1, 0.3, 1, 3 times C1)"
+        label = "odor at the end (0.1, 0.3, 1, 3 times C1)"
         axes.scatter([], [], marker="s", s=40, color="#D9AECB", label=label)
     place = odor.position_m
     style: dict[str, Any] = {"color": COLOURS["odor"], "ms": 12, "ls": "none"}
@@ -198,8 +188,8 @@ def plot_time_series(result: RunResult, clearance: ArrayLike | None = None) -> F
     if distance is not None and distance.shape != result.time.shape:
         raise InputError(
             "clearance",
-            f"{distance.shape} values for {result.time.shape} ticks; "
-            "give the clearance of the same run (analysis.runs.proximity)",
+            f"{distance.shape} values for {result.time.shape} ticks; give the "
+            "clearance of this run (analysis.runs.proximity)",
         )
     if distance is not None:
         panels.append(clearance_panel(distance))
@@ -292,7 +282,7 @@ def _goal(axes: Axes, result: RunResult) -> None:
     axes.plot(result.time, off, color=COLOURS["robot"], label="to the target")
     replans = np.flatnonzero(np.diff(columns["replans"]))
     for count, tick in enumerate(replans.tolist()):
-        label = None if count else "new way"
+        label = None if count else "new route"
         axes.axvline(result.time[tick + 1], color="black", ls=":", lw=1.0, label=label)
     axes.set_ylabel("distance of P\n(m)")
     axes.set_ylim(bottom=0.0)
@@ -361,9 +351,9 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
     for number, name in enumerate(GUARD_ACTIONS):
         done = actions == number
         colour = COLOURS["empty" if number == 0 else "source"]
-        # A row tells of the tick before it. The edge hides seams between ticks.
+        # The edge hides seams between ticks.
         axes.broken_barh(
-            [(time - tick_s, tick_s) for time in result.time[done]],
+            [(time, tick_s) for time in result.time[done]],
             (number - 0.35, 0.7),
             facecolor=colour,
             edgecolor=colour,
@@ -376,7 +366,7 @@ def _guard_actions(axes: Axes, result: RunResult) -> None:
         result.time,
         actions,
         color=COLOURS["robot"],
-        drawstyle="steps-pre",
+        drawstyle="steps-post",
         linewidth=0.7,
         label="what it did",
         zorder=3,
@@ -392,7 +382,13 @@ def _guard_distances(axes: Axes, result: RunResult) -> None:
     axes.plot(time, spare, color=COLOURS["robot"], label="to spare")
     guard = result.scenario.own_guard
     if guard is not None and guard.obstacle_speed_m_s > 0.0:
-        axes.plot(time, view, color=COLOURS["left"], lw=1.0, label="to spare, in view")
+        axes.plot(
+            time,
+            view,
+            color=COLOURS["left"],
+            lw=1.0,
+            label="to spare, obstacles in view",
+        )
     way, colour = columns["guard_stopping_distance"], COLOURS["source"]
     axes.plot(time, way, color=colour, label="needed to stop")
     axes.axhline(0.0, color="black", lw=0.6)

@@ -19,8 +19,6 @@ from diagrams import RunResult, build_sound_follower, write_scenario
 from diagrams.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
-__all__ = ["run_summary", "summary_rows", "summary_text", "write_run"]
-
 
 def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
     """The JSON document of a run.
@@ -39,6 +37,7 @@ def run_summary(result: RunResult, out: Path | None) -> dict[str, Any]:
         "seed": result.full_scenario.seed,
         "engine": result.engine,
         **_outcome(result),
+        "warnings": [asdict(each) for each in result.warnings],
         "metrics": run_metrics(result),
         "timing": {
             "wall_s": result.wall_s,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from collections import Counter
+from dataclasses import dataclass
 from zlib import crc32
 
 import numpy as np
@@ -10,15 +12,6 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from diagrams.stop_rules import SUCCESSFUL
-
-__all__ = [
-    "ALL_RUNS",
-    "SUCCESSES",
-    "bootstrap_seed",
-    "collisions",
-    "column",
-    "successes",
-]
 
 #: Figures that any run has, however it ended.
 ALL_RUNS = (
@@ -93,3 +86,34 @@ def bootstrap_seed(seed: int, name: str) -> int:
         32 bits: figures are resampled independently of each other.
     """
     return crc32(json.dumps([seed, name]).encode())
+
+
+@dataclass(frozen=True)
+class WarningCount:
+    """In how many runs a field of the scenario was warned about."""
+
+    field: str
+    runs: int
+    message: str
+    """Of the first of these runs."""
+
+
+def warning_counts(rows: pd.DataFrame) -> list[WarningCount]:
+    """The warnings of many runs, field by field.
+
+    Args:
+        rows: Runs; their column ``warnings`` is JSON, as ``summary.json`` has it. There
+            may be none of that name.
+
+    Returns:
+        The commonest first; empty where there are no warnings.
+    """
+    runs, messages = Counter[str](), dict[str, str]()
+    for text in rows.get("warnings", ()):
+        told = json.loads(text)
+        runs.update({each["field"] for each in told})
+        for each in told:
+            messages.setdefault(each["field"], each["message"])
+    # In the order of the messages, so that no order of a set shows.
+    fields = sorted(messages, key=lambda field: -runs[field])
+    return [WarningCount(name, runs[name], messages[name]) for name in fields]

@@ -19,23 +19,6 @@ from systems.sound.parameters import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate
 from systems.world.parameters import ObstacleParameters
 
-__all__ = [
-    "Look",
-    "bounds",
-    "compose",
-    "contact_point",
-    "followed_sources",
-    "lightened",
-    "looks",
-    "moving_and_static",
-    "picture_times",
-    "run_title",
-    "sensor_pose",
-    "sound_bursts",
-    "tick_at",
-    "touching_point",
-]
-
 #: Spacings of instants that a reader can count in, s.
 _NICE_PERIODS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 30.0, 60.0)
 
@@ -80,13 +63,13 @@ class Look(NamedTuple):
     path_label: str = "path of the control point P"
     body_label: str = "robot with its microphones"
     """Empty: the path's colour tells."""
-    estimates_label: str = "estimates of the source, faint: early"
+    estimates_label: str = "estimates of the source; faint ones are early"
     seen: str = COLOURS["seen"]
     """Of the floor that it knows to be free, much lightened."""
     echoes: str = COLOURS["echoes"]
     """Colour of where its echoes came from."""
-    seen_label: str = "seen free, at the end"
-    echoes_label: str = "where echoes came from"
+    seen_label: str = "seen as free at the end"
+    echoes_label: str = "places that echoes came from"
 
 
 def looks(result: RunResult) -> list[Look]:
@@ -101,13 +84,13 @@ def looks(result: RunResult) -> list[Look]:
             own,
             colour,
             colour,
-            f"{name}, path of P" if own.scenario.route else f"path of {name}'s P",
+            f"{name}, path of P" if own.scenario.route else f"path of P of {name}",
             "" if own.scenario.has_goal else f"{name} with its microphones",
-            f"{name}'s estimates, faint: early",
+            f"estimates of {name}; faint ones are early",
             colour,
             colour,
-            f"seen free by {name}, at the end",
-            f"where {name}'s echoes came from",
+            f"seen as free by {name} at the end",
+            f"places that echoes to {name} came from",
         )
         for (name, own), colour in zip(result.several.items(), colours, strict=False)
     ]

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from analysis.runs.proximity import Proximity
 
-__all__ = ["ARMS_M", "search_metrics"]
-
 #: Arms of the hearing robot and of the one that it comes to, m (Song 2011, 2.1, 3.1):
 #: nearer than this their brackets can touch.
 ARMS_M = 0.15 + 0.20

@@ -5,12 +5,10 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, segment_clearance
-
-__all__ = ["shortest_path_length"]
 
 #: Tangents that a quarter circle round a corner is made of: 0.6 % too long.
 TANGENTS = 6

@@ -6,17 +6,10 @@ import math
 from functools import cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from scipy.fft import rfft
 
-__all__ = [
-    "jerk",
-    "log_dimensionless_jerk",
-    "spectral_arc_length",
-    "turn_reversals",
-    "windows",
-]
+from systems.framework.compiling import njit
 
 #: Half of the time over which ``jerk`` fits a cubic, s: 5 samples at 25 ms.
 JERK_HALF_WINDOW_S = 0.125

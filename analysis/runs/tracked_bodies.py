@@ -18,8 +18,6 @@ from systems.planning.hazards import (
     track_hazards,
 )
 
-__all__ = ["TrackedBodies", "tracked_bodies"]
-
 
 @dataclass(frozen=True)
 class TrackedBodies:
@@ -68,7 +66,7 @@ def tracked_bodies(result: RunResult, times: ArrayLike) -> TrackedBodies | None:
     for row, (read, space) in enumerate(
         zip(readings, remembered_space(result), strict=True)
     ):
-        ranges, echo, ages, pose = read
+        ranges, echo, ages, pose, _ = read
         followed = (*targets[row].tolist(), own.source_radius_m)
         time = float(result.time[row])
         track_hazards(

@@ -29,18 +29,6 @@ from diagrams.bodies import microphones_W, robot_rectangle
 from diagrams.participants import SourceParameters
 from systems.world.geometry import rectangle_corners
 
-__all__ = [
-    "draw_collision",
-    "draw_cones",
-    "draw_estimates",
-    "draw_known_space",
-    "draw_obstacles",
-    "draw_robot",
-    "draw_room",
-    "draw_sources",
-    "times_apart",
-]
-
 #: A body is drawn again when it has moved so far, m.
 APART_M = 0.25
 #: Instants at which the cones are drawn.
@@ -208,14 +196,15 @@ def draw_estimates(axes: Axes, look: Look) -> None:
     result, columns = look.result, look.result.columns
     if "target_valid" not in columns or "detected" not in columns:
         return
-    heard = (columns["detected"] > 0.5) & (columns["target_valid"] > 0.5)
+    # The target goes by an estimate from the tick after it on.
+    heard = (columns["detected"][:-1] > 0.5) & (columns["target_valid"][1:] > 0.5)
     if not heard.any():
         return
     colour = look.estimates
-    part = result.time[heard] / max(result.simulated_s, 1e-9)
+    part = result.time[1:][heard] / max(result.simulated_s, 1e-9)
     least = faintest(colour)
     colours = [(*to_rgb(colour), least + (1.0 - least) * p) for p in part]
-    x, y = result.vector("p_WS_estimated")[:, heard]
+    x, y = result.vector("p_WS_estimated")[:, 1:][:, heard]
     axes.scatter(
         x,
         y,

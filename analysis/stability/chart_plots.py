@@ -18,15 +18,6 @@ from analysis.linear.root_locus import RootLocus
 from analysis.linear.sampled_stability import PolesAgainstPeriod, StabilityChart
 from analysis.reporting.palette import COLOURS
 
-__all__ = [
-    "plot_chart",
-    "plot_contact_limits",
-    "plot_delay_check",
-    "plot_gap_chart",
-    "plot_poles_against_period",
-    "plot_root_loci",
-]
-
 _LINES = ("#0072B2", "#D55E00", "#009E73", "#A8498A", "#7A5200")
 #: The mark of the scenario's own design.
 _CURRENT: dict[str, Any] = {"color": "#F0E442", "markeredgecolor": "black"}
@@ -58,7 +49,7 @@ def plot_chart(chart: StabilityChart) -> Figure:
     axes.set_xlabel(chart.x_name)
     axes.set_ylabel(chart.y_name)
     axes.set_title(chart.title, fontsize=10)
-    figure.colorbar(mesh, ax=axes, label="growth (1/s); blue decays")
+    figure.colorbar(mesh, ax=axes, label="growth (1/s); blue: decay")
     return figure
 
 

@@ -9,8 +9,6 @@ from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
 
-__all__ = ["chosen_laws", "chosen_robot"]
-
 
 def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...]:
     """The same scenario under one law after the other.
@@ -52,8 +50,9 @@ def chosen_laws(scenario: Scenario, names: Sequence[str]) -> tuple[Scenario, ...
         if not routed and law in LAWS and LAWS[law].plans:
             raise InputError(
                 "law",
-                f"{law!r} has no linear model, for it plans and decides; use "
-                f"{', '.join(every)}, with --guard on for what a guard promises",
+                f"{law!r} plans and decides, so that it has no linear model; use "
+                f"{', '.join(every)}, and add --guard on to include the promises of "
+                "the guard",
             )
     return tuple(
         scenario_from_mapping({**scenario.model_dump(), "law": law})
@@ -77,14 +76,16 @@ def chosen_robot(scenario: Scenario, name: str | None) -> tuple[Scenario, str]:
     """
     names = list(scenario.all_robots)
     if name is not None and name not in names:
-        raise InputError("robot", f"{name!r} is none; use {', '.join(names)}")
+        raise InputError(
+            "robot", f"{name!r} is not a robot of the scenario; use {', '.join(names)}"
+        )
     chosen = names[0] if name is None else name
     others = [each for each in names if each != chosen]
     if not others:
         return scenario.of_robot(chosen), ""
     # Alone there is nobody to hear it.
     alone = scenario.of_robot(chosen).model_copy(update={"loudspeaker": None})
-    note = f"the report is of robot {chosen!r} alone, without {', '.join(others)}"
+    note = f"the report covers robot {chosen!r} alone, without {', '.join(others)}"
     if name is None:
-        note += "; --robot chooses another"
+        note += "; the option robot selects another robot"
     return alone, note

@@ -20,14 +20,6 @@ from analysis.stability.verdicts import Verdict
 from diagrams import Scenario
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "Finding",
-    "LawAnalysis",
-    "Part",
-    "Study",
-    "analyse_law",
-]
-
 
 @dataclass(frozen=True)
 class Study:
@@ -46,7 +38,9 @@ class Study:
         """
         if self.found.get(key) is None:
             raise InputError(
-                f"{key}", "has no result, on which this part is built; mend that first"
+                f"{key}",
+                "has no result, and this part depends on it; correct the problem "
+                "of that part first",
             )
         return self.found[key]
 
@@ -68,6 +62,8 @@ class Part:
     """Entries of the JSON document; none: the data as it is, under the key."""
     models: Callable[[Any], Sequence[LinearModel]] | None = None
     """Linear models that are written as files."""
+    notes: Callable[[Any], Sequence[str]] | None = None
+    """What the first page must say before the numbers; none: nothing."""
 
 
 @dataclass(frozen=True)
@@ -107,6 +103,16 @@ class LawAnalysis:
             for finding in self.findings.values()
             if finding.part.models and not finding.problem
             for model in finding.part.models(finding.data)
+        )
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Of all parts, for the first page; sentences."""
+        return tuple(
+            note
+            for finding in self.findings.values()
+            if finding.part.notes and not finding.problem
+            for note in finding.part.notes(finding.data)
         )
 
     @property

@@ -33,8 +33,6 @@ from analysis.reporting.html_page import (
 from analysis.stability.law_analysis import Part, Study
 from systems.framework.input_error import InputError
 
-__all__ = ["LinearModels", "OperatingPoints", "linear_parts", "point_document"]
-
 #: Elements of a matrix below this are printed as a dot.
 _ZERO = 1e-12
 #: Matrices of more columns are printed in small type.
@@ -51,7 +49,7 @@ class OperatingPoints:
 
     search: EquilibriumSearch
     at: OperatingPoint
-    """The stable equilibrium nearest to the follow distance."""
+    """The stable equilibrium nearest to the follow distance, in free reach."""
     moving: OperatingPoint | None
     """Following a source that moves on; none: there is no such state."""
     no_moving: str
@@ -82,6 +80,7 @@ def linear_parts(*, full: bool) -> tuple[Part, ...]:
             _operating_points,
             _render_points,
             document=_points_document,
+            notes=lambda data: data.search.notes,
         ),
         Part(
             "linear_models",
@@ -164,16 +163,17 @@ def _render_points(data: OperatingPoints, name: str) -> list[str]:
     return [
         paragraph(data.search.statement),
         paragraph(
-            "The heading at rest is free; its neutral poles are left out. Offset: how "
-            "much farther from the source than the follow distance. The report is "
-            f"about the sink at ({data.at.p_WP[0]:.3f}, {data.at.p_WP[1]:.3f}) m."
+            "The heading at rest is free, so that its neutral poles are left out. The "
+            "offset is the distance from the source minus the follow distance. The "
+            f"report is about the sink at ({data.at.p_WP[0]:.3f}, "
+            f"{data.at.p_WP[1]:.3f}) m."
         ),
         table(headings, rows, caption="Equilibria at rest"),
         moving,
         figure_html(
             plot_equilibria(data.search),
             name,
-            "Equilibria of P over the floor, and the force on it.",
+            "Equilibria of P on the floor, and the force on P.",
         ),
     ]
 
@@ -234,18 +234,21 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
     continuous = data.continuous
     checks: list[list[Cell]] = [
         [
-            "two routes: AutoDiff of a whole period, blocks joined by `control`",
+            (
+                "two computations: AutoDiff of a whole period, and blocks joined by "
+                "`control`"
+            ),
             f"{routes.states} states",
             routes.matrix_difference,
         ],
-        ["poles of the two routes", "simple, nonzero", routes.pole_difference],
+        ["poles of the two computations", "simple, nonzero", routes.pole_difference],
         [
             "AutoDiff against central differences",
             ", ".join(f"`{x}`" for x in check.largest_at),
             check.largest_difference,
         ],
         [
-            "corner: left against right difference",
+            "corner: left difference against right difference",
             ", ".join(f"`{x}`" for x in check.kink_at),
             check.kink,
         ],
@@ -253,10 +256,10 @@ def _render_models(data: LinearModels, name: str) -> list[str]:
     tick_ms = 1e3 * (data.sampled.period_s or 0.0)
     return [
         paragraph(
-            "Deviations from the operating point, SI units. Continuous: without "
-            "sampling and without the tick of latency. Sampled: one period of "
-            f"{tick_ms:g} ms of the built diagram, {routes.states} states; its "
-            "matrices are in the exported files."
+            "The states are deviations from the operating point, in SI units. The "
+            "continuous model has no sampling and no tick of latency. The sampled "
+            f"model is one period of {tick_ms:g} ms of the built diagram, with "
+            f"{routes.states} states; its matrices are in the exported files."
         ),
         table(["check", "of", "largest difference"], checks),
         *(
@@ -330,7 +333,7 @@ def _render_step(data: StepCheck, name: str) -> list[str]:
     found: list[tuple[str, Oscillation | None]] = [
         ("predicted by the linear model", data.predicted),
         ("simulated, exact sensors", data.ideal),
-        ("simulated, the scenario's own sensors", data.full),
+        ("simulated, sensors of the scenario", data.full),
     ]
     rows: list[list[Cell]] = [
         [title, each.frequency_rad_s, each.damping_ratio]
@@ -340,16 +343,17 @@ def _render_step(data: StepCheck, name: str) -> list[str]:
     return [
         paragraph(
             f"P starts {data.step_m:g} m off the operating point, along the line to "
-            f"the source. Exact sensors: {100.0 * data.frequency_error:z.2f} % off in "
-            f"frequency and {100.0 * data.damping_error:z.2f} % in damping. The "
-            "scenario's own sensors (in a full report) differ more: echoes of cones "
-            "are not nearest points, and hearing has its noise and its silences."
+            "the source. With exact sensors the prediction is "
+            f"{100.0 * data.frequency_error:z.2f} % off in frequency and "
+            f"{100.0 * data.damping_error:z.2f} % off in damping. With the sensors of "
+            "the scenario (in a full report) the difference is larger: a cone does "
+            "not report the nearest point, and hearing has noise and silences."
         ),
         table(["", "rad/s", "damping ratio"], rows),
         figure_html(
             plot_step(data),
             name,
-            "A small step: the linear model, released at rest, and simulation. Where "
-            "the law's velocity term acts from afar it pushes once as a run begins.",
+            "A small step: the linear model, released at rest, and simulation. A law "
+            "whose velocity term acts from afar pushes once at the beginning of a run.",
         ),
     ]

@@ -30,16 +30,15 @@ from analysis.models.operating_points import OperatingPoint
 from analysis.reporting.html_page import Cell, figure_html, number, paragraph, table
 from analysis.stability.law_analysis import Part, Study
 
-__all__ = ["Margins", "least_damped", "margin_parts"]
-
 #: What decides what a margin says, for readers.
 _EXPLANATION = (
-    "Each loop is cut at one place, the others stay closed: at the sensor (what "
-    "hearing says of the source), at the actuator (the law's acceleration) and at the "
-    "commanded wheel speeds, along the line to the source and across it. Gain margins "
-    "are the least growth and the least fall of the gain that is too much; the phase "
-    "margin is the least lag or lead. A disk margin counts gain and phase changes at "
-    "once; the gains and phases within which it vouches for the loop stand beside it."
+    "Each loop is cut at one place while the others stay closed: at the sensor (the "
+    "source as it is heard), at the actuator (the law's acceleration) or at the "
+    "commanded wheel speeds, along the line to the source and across it. The gain "
+    "margins are the smallest increase and the smallest decrease of the gain that "
+    "make the loop unstable; the phase margin is the smallest such lag or lead. A "
+    "disk margin covers changes of gain and phase at the same time; the table lists "
+    "the gains and phases for which it guarantees stability."
 )
 #: Faster modes are those of motors and filters, rad/s.
 _SLOW_RAD_S = 12.0
@@ -204,13 +203,14 @@ def _render(data: Margins, name: str) -> list[str]:
                 *(f"skew {d.skew:+g}" for d in data.implemented[0].margins.disks),
             ],
             disks,
-            caption="Disk margins: size alpha; gain in dB; phase within +- deg",
+            caption="Disk margins: size alpha; range of the gain in dB; phase, plus or "
+            "minus, in deg",
         ),
         figure_html(plot_bode(loops), f"{name}-bode", "Bode diagram with margins."),
         figure_html(
             plot_nyquist(loops),
             f"{name}-nyquist",
-            "Nyquist curves, with the disk that they must stay out of.",
+            "Nyquist curves, and the disk that they must not enter.",
         ),
         figure_html(plot_nichols(loops), f"{name}-nichols", "Nichols diagram."),
         *(

@@ -18,8 +18,6 @@ from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS
 from systems.laws.law import Equation
 
-__all__ = ["Latency", "Limit", "ModelSheet", "ParameterRow", "model_sheet"]
-
 #: Parts of a scenario that a loop with exact sensors depends on.
 _PARTS = ("attraction", "repulsion", "robot", "plant", "tracker", "sound")
 #: Fields of theirs that it does not depend on.
@@ -40,37 +38,47 @@ _ROUTE_PARTS = ("repulsion", "robot", "plant", "route", "objects")
 
 #: Conventions and assumptions, for every law.
 _CONVENTIONS = (
-    "World frame W on the floor. Body frame B midway between the wheels, x forward.",
-    "Angles counter-clockwise, in rad unless a name ends in `_deg`; SI units.",
     (
-        "P, ahead of the axle by epsilon, carries the virtual mass M. What the robot "
-        "weighs acts by way of the motor lag alone."
+        "World frame W is on the floor. Body frame B is midway between the wheels, "
+        "with x forward."
+    ),
+    (
+        "Angles are counter-clockwise, in rad unless a name ends in `_deg`; all units "
+        "are SI."
+    ),
+    (
+        "P is ahead of the axle by epsilon and carries the virtual mass M. The weight "
+        "of the robot acts through the motor lag only."
     ),
 )
 _ASSUMPTIONS = (
     *_CONVENTIONS,
     (
-        "Linear models are of the build with exact sensors (`hearing` and "
-        "`obstacle_sensing` ideal, odometry not rounded), made by the builder that "
-        "simulates. Noise, converter, estimator and cones are in simulations only."
+        "Linear models describe the diagram with exact sensors (`hearing` and "
+        "`obstacle_sensing` ideal, odometry not rounded); the builder of simulations "
+        "makes this diagram. Only simulations have noise, converter, estimator and "
+        "cones."
     ),
     (
-        "They hold while |v_P| and the wheels stay below their limits, and while no "
-        "echo comes or goes."
+        "They are valid while |v_P| and the wheels stay below their limits, and while "
+        "no echo appears or disappears."
     ),
     (
-        "The heading follows the motion of P and is neutral at rest: its poles at 0 "
-        "(z = 1) are left out where stability is judged."
+        "The heading follows the motion of P and is neutral at rest: judgments of "
+        "stability leave out its poles at 0 (z = 1)."
     ),
 )
 _ROUTE_ASSUMPTIONS = (
     *_CONVENTIONS,
     (
-        "Linear models are of law, wheel command, plant and odometry (not rounded) "
-        "with the gains held; objects are seen as they are, their latency late."
+        "Linear models describe law, wheel command, plant and odometry (not rounded) "
+        "with constant gains; the object sensor is exact and has its latency."
     ),
-    "They hold while |v_P|, the acceleration and the wheels stay below their limits.",
-    "Planner, safety filter and what adapts are in no linear model.",
+    (
+        "They are valid while |v_P|, the acceleration and the wheels stay below their "
+        "limits."
+    ),
+    "No linear model has the planner, the safety filter or the adaptation.",
 )
 
 
@@ -215,9 +223,19 @@ def _envelope(scenario: Scenario) -> tuple[Limit, ...]:
         Limit("speed of P", robot.top_speed_m_s, "m/s", "limit of the state v_P"),
         Limit("wheel speed", robot.top_wheel_speed, "rad/s", "both scaled together"),
         Limit("speed of the source", scenario.source.speed_m_s, "m/s", "this scenario"),
-        Limit("nearest echo", sensors.minimum_range_m, "m", "nearer reads as this"),
-        Limit("farthest echo", sensors.maximum_range_m, "m", "beyond: no echo"),
-        Limit("age of a target", scenario.tracker.maximum_age_s, "s", "older: brake"),
+        Limit(
+            "nearest echo",
+            sensors.minimum_range_m,
+            "m",
+            "nearer obstacles are reported at this distance",
+        ),
+        Limit("farthest echo", sensors.maximum_range_m, "m", "no echo beyond it"),
+        Limit(
+            "age of a target",
+            scenario.tracker.maximum_age_s,
+            "s",
+            "the robot brakes if it is older",
+        ),
     )
 
 
@@ -226,20 +244,20 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
     half, frame = tick / 2.0, f"middle of a {tick * 1e3:g} ms frame"
     sound, lag = scenario.sound, scenario.plant.motor_lag_s
     silent = max(sound.period_s - sound.on_s, 0.0)
-    hold = Latency("source", "velocity held for a tick", half, "WheelSpeedCommand")
+    hold = Latency("source", "velocity held for one tick", half, "WheelSpeedCommand")
     motor = Latency("source", "motor lag", lag, "first order")
     return (
         Latency("source", "sound collected", half, frame),
-        Latency("source", "estimate computed", tick, "TDOAEstimator: a tick"),
+        Latency("source", "estimate computed", tick, "TDOAEstimator: one tick"),
         Latency(
             "source",
             "silence between bursts",
             silent**2 / (2.0 * sound.period_s),
-            f"up to {silent:g} s; 0 while the source sounds; bridged by the tracker",
+            f"up to {silent:g} s; 0 while the source sounds; the tracker bridges it",
         ),
         hold,
         motor,
-        Latency("obstacle", "echo measured", 0.0, "travelling time not modelled"),
+        Latency("obstacle", "echo measured", 0.0, "travel time is not modeled"),
         Latency("obstacle", hold.part, hold.mean_s, hold.remark),
         Latency("obstacle", motor.part, motor.mean_s, motor.remark),
     )
@@ -275,8 +293,11 @@ _SEARCH_MOTION = (
 )
 
 _SEARCH_ASSUMPTIONS = (
-    "Margins are those of the heading loop while it drives ahead, within all limits.",
-    "What a step decides is no part of a linear model.",
+    (
+        "The margins describe the heading loop while the robot drives ahead, within "
+        "all limits."
+    ),
+    "The decisions of a step are not part of a linear model.",
 )
 
 
@@ -285,14 +306,16 @@ def _search_envelope(scenario: Scenario) -> tuple[Limit, ...]:
     beyond = scenario.heading_control.turning_beyond_deg
     return (
         Limit("speed of a wheel", motors, "m/s", "at full duty"),
-        Limit("output of the PID", beyond, "deg", "beyond it turns on the spot"),
+        Limit(
+            "output of the PID", beyond, "deg", "the robot turns on the spot beyond it"
+        ),
     )
 
 
 def _search_latencies(scenario: Scenario) -> tuple[Latency, ...]:
     held = scenario.tick_s / 2.0
     return (
-        Latency("heading", "duties held for a tick", held, "MotorDriver"),
+        Latency("heading", "duties held for one tick", held, "MotorDriver"),
         Latency("heading", "motor lag", scenario.plant.motor_lag_s, "first order"),
     )
 
@@ -317,7 +340,7 @@ def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
         row
         for path in ("target", "obstacle")
         for row in (
-            Latency(path, "velocity held for a tick", held, "WheelSpeedCommand"),
+            Latency(path, "velocity held for one tick", held, "WheelSpeedCommand"),
             Latency(path, "motor lag", scenario.plant.motor_lag_s, "first order"),
         )
     ]

@@ -49,8 +49,6 @@ from analysis.reporting.plain_values import plain
 from analysis.stability.law_analysis import Part, Study
 from systems.framework.input_error import InputError
 
-__all__ = ["extended_parts", "nonlinear_parts"]
-
 
 def nonlinear_parts(*, full: bool) -> tuple[Part, ...]:
     """Velocity terms, oscillation before an obstacle, certified starts, energy.
@@ -77,6 +75,7 @@ def nonlinear_parts(*, full: bool) -> tuple[Part, ...]:
             "Certified starts",
             lambda study: (_certified(study, full=full),),
             _render_certificates,
+            notes=lambda _: (_ABOUT_P,),
             fresh=True,
         ),
         Part(
@@ -97,18 +96,19 @@ def _render_terms(data: VelocityTermAnalysis, name: str) -> list[str]:
     ]
     return [
         paragraph(
-            "The laws see s = |dC/dt| (`printed`) or the closing speed (`closing`), "
-            "which both have a corner at rest. A linear model holds on one side of it. "
-            "Over a whole oscillation the printed term damps on the way in what it "
-            "drives on the way out; what is left is a push away from the obstacle."
+            "The laws use s = |dC/dt| (`printed`) or the closing speed (`closing`), "
+            "and both have a corner at rest. A linear model is valid on one side of "
+            "the corner. Over a whole oscillation the printed term takes as much "
+            "energy on the way in as it gives on the way out; the net effect is a "
+            "push away from the obstacle."
         ),
         fact_table(facts, skip=["variants"]),
         row_table(sides, caption="One-sided linear models, M x'' + D x' + K x = 0"),
         figure_html(
             plot_velocity_terms(data),
             name,
-            "Describing functions at the equilibrium: damping by the first harmonic "
-            "and bias, against the amplitude of the speed.",
+            "Describing functions at the equilibrium: damping by the first harmonic, "
+            "and bias, over the amplitude of the speed.",
         ),
     ]
 
@@ -134,17 +134,18 @@ def _render_oscillation(data: ContactOscillation, name: str) -> list[str]:
         "velocity term",
         "",
         "amplitude (m)",
-        "centre (m)",
+        "center (m)",
         "rad/s",
         "run ended",
     ]
     return [
         paragraph(
-            "P runs head-on against a wide box with the goal behind it. Harmonic "
+            "P runs head-on against a wide box that has the goal behind it. Harmonic "
             "balance with the sampled chain from acceleration to motion predicts how "
-            "an oscillation of each amplitude grows; a limit cycle is where growth "
-            "turns to decay. No prediction: the oscillation decays at all amplitudes, "
-            "or grows until the speed limit stops it."
+            "an oscillation of each amplitude grows; a limit cycle is at the "
+            "amplitude where growth turns to decay. Without a predicted cycle the "
+            "oscillation decays at all amplitudes, or grows until the speed limit "
+            "stops it."
         ),
         table(headings, rows),
         figure_html(
@@ -155,6 +156,11 @@ def _render_oscillation(data: ContactOscillation, name: str) -> list[str]:
     ]
 
 
+#: For the first page.
+_ABOUT_P = (
+    "A certificate is about the point P only: another part of the body may still "
+    "touch something."
+)
 #: Simulated starts on each side of the certificate's border.
 STARTS = 300
 #: Starts of the full diagram, with exact hearing.
@@ -192,24 +198,27 @@ def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[s
     return [
         paragraph(
             "In the model of the certificate (P alone, continuous time, exact nearest "
-            "points, bodies at rest) the energy V cannot grow. A start whose energy is "
-            "below that of every path to contact never collides. The full diagram has "
-            "cones, a rectangular body and motor lag, which the certificate leaves "
-            "out: a full report has its collision rate from certified starts."
+            "points, bodies at rest) the energy V cannot grow. A start never collides "
+            "if its energy is below the energy of every path to contact. The full "
+            "diagram has cones, a rectangular body and motor lag, which the "
+            "certificate leaves out: a full report states the collision rate of the "
+            "full diagram from certified starts."
         ),
         fact_table(facts, skip=["passivity", "trials", "diagram", "kind"]),
         figure_html(
             plot_energy_certificate(found.certificate),
             f"{name}-map",
-            "Largest certified speed of P over the floor. White: not even rest is "
-            "certified.",
+            "Largest certified speed of P at each place on the floor. At white places "
+            "not even rest is certified.",
             scale=True,
         ),
-        fact_table(facts["trials"], caption="Simulated starts, certificate's model"),
+        fact_table(
+            facts["trials"], caption="Simulated starts in the model of the certificate"
+        ),
         figure_html(
             plot_certificate_trials(found.trials),
             f"{name}-trials",
-            "Simulated starts by outcome, over the certified region.",
+            "Outcomes of simulated starts, and the certified region.",
         ),
         fact_table(facts["diagram"], caption="Certified starts in the full diagram")
         if found.diagram
@@ -220,15 +229,15 @@ def _render_certificates(data: tuple[CertifiedStarts, ...], name: str) -> list[s
 def _render_balance(data: EnergyBalance, name: str) -> list[str]:
     return [
         paragraph(
-            "The velocity term gives energy when it pushes along the motion. It is "
-            "covered where the attraction's damping takes at least as much at every "
-            "speed."
+            "The velocity term adds energy when it pushes along the motion. The loop "
+            "is passive where the attraction's damping takes at least as much energy "
+            "at every speed."
         ),
         fact_table(plain(data)),
         figure_html(
             plot_energy_balance(data),
             name,
-            "Energy along a run of the point model, and the work of its parts.",
+            "Energy during a run of the point model, and the work of each force.",
         ),
     ]
 
@@ -248,42 +257,50 @@ def extended_parts() -> tuple[Part, ...]:
                 gap_map(study.scenario, sensing=sensing) for sensing in _GAP_SENSING
             ),
             _maps(
-                "Where P comes to rest before two boxes, against the gap between them. "
-                "With exact sensing: minima of the energy, of the nearest box alone or "
-                "of the sum of both. With cones: the ends of simulated runs."
+                "The figures show where P comes to rest before two boxes, over the "
+                "gap between the boxes. With exact sensing these places are minima of "
+                "the energy, of the nearest box alone or of the sum of both boxes. "
+                "With cones they are the ends of simulated runs."
             ),
             fresh=True,
         ),
         Part(
             "offset_maps",
-            "Beside one obstacle",
+            "Before one obstacle off the line",
             lambda study: tuple(
                 offset_map(study.scenario, sensing=sensing)
                 for sensing in _OFFSET_SENSING
             ),
             _maps(
-                "Where P comes to rest before one box, against how far it stands off "
-                "the line to the source. To exact sensing a point, a disc or a corner "
-                "is a saddle, never a trap; a flat face holds P as wide as it is."
+                "The figures show where P comes to rest before one box, over the "
+                "distance of the box from the line to the source. With exact sensing "
+                "a point, a disc or a corner makes a saddle and never a trap; a flat "
+                "face traps P over its whole width."
             ),
         ),
-        Part("stiffness_ratio_map", "Against k_ref/K_0", _ratio_map, _render_ratio_map),
+        Part(
+            "stiffness_ratio_map",
+            "Equilibria over k_ref/K_0",
+            _ratio_map,
+            _render_ratio_map,
+        ),
         _part(
             "phase_portrait",
             "Phase portrait, head-on",
             lambda study: phase_portrait(study.scenario),
             plot_phase_portrait,
-            "Distance to a wide face and its rate of change, with the goal behind it. "
-            "Of the starts on a grid: how many collide, and how many are certified.",
+            "The figure shows the distance to a wide face and its rate of change, "
+            "with the goal behind the face. The numbers state how many starts on a "
+            "grid collide and how many are certified.",
         ),
         _part(
             "sos_region",
             "Region of attraction by sums of squares",
             lambda study: sos_region(study.scenario),
             plot_sos_region,
-            "A polynomial model with motor lag, head-on, which the energy certificate "
-            "leaves out. Found with Clarabel, cross-checked with CSDP, and proved "
-            "once more in rational arithmetic.",
+            "The model is polynomial and head-on, and has the motor lag that the "
+            "energy certificate leaves out. Clarabel found the region, CSDP "
+            "cross-checked it, and a proof in rational arithmetic confirms it.",
             document=lambda data: {"certificates": [data]},
         ),
         _part(
@@ -291,8 +308,8 @@ def extended_parts() -> tuple[Part, ...]:
             "Moving source and moving obstacle",
             lambda study: disturbance_bounds(study.scenario),
             plot_disturbance_bounds,
-            "How far a moving source pulls P off, and for how long a start stays "
-            "certified before a moving obstacle.",
+            "The figures show how far a moving source pulls P off its place, and how "
+            "long a start stays certified before a moving obstacle.",
         ),
     )
 
@@ -321,7 +338,7 @@ def _listed(values: tuple[float, ...]) -> str:
 def _ratio_map(study: Study) -> RatioMap:
     if study.scenario.law != "active":
         raise InputError(
-            "law", "the ratio k_ref/K_0 is one of the active law of 2019; choose active"
+            "law", "only the active law of 2019 has the ratio k_ref/K_0; choose active"
         )
     return stiffness_ratio_map(study.scenario)
 
@@ -329,11 +346,12 @@ def _ratio_map(study: Study) -> RatioMap:
 def _render_ratio_map(data: RatioMap, name: str) -> list[str]:
     return [
         paragraph(
-            "Head-on equilibria of the active law as k_ref/K_0 varies: the outer one, "
-            "at which P is held up, and the inner one, where the force that vanishes "
-            "at contact gives way. Where they meet, nothing holds P any more."
+            "The figure shows the head-on equilibria of the active law as "
+            "k_ref/K_0 varies. P stops at the outer equilibrium; at the inner "
+            "one P moves on, because the force vanishes at contact. Where the "
+            "two meet, no force stops P any more."
         ),
-        figure_html(plot_ratio_map(data), name, "Equilibria against k_ref/K_0."),
+        figure_html(plot_ratio_map(data), name, "Head-on equilibria over k_ref/K_0."),
     ]
 
 

@@ -32,25 +32,12 @@ from analysis.models.open_loops import BreakPoint
 from diagrams import Scenario, library_scenarios
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "GainChoice",
-    "GainFigures",
-    "GainThresholds",
-    "RecommendedGains",
-    "WholeLoop",
-    "attraction_loop",
-    "gain_figures",
-    "recommend_gains",
-]
-
 #: Springs beside the present one, as multiples of it.
 _SPRINGS = (0.5, 1.0, 2.0, 4.0)
 #: Dampers that are tried, as multiples of the critical one.
 _DAMPERS = np.geomspace(0.05, 3.0, 30)
 #: Where the loop is cut.
 _CUTS: tuple[BreakPoint, ...] = ("sensor", "actuator")
-#: Frequencies of the search, rad/s; the final figures are refined between them.
-_OMEGA = np.geomspace(3e-2, 3e1, 300)
 
 
 @dataclass(frozen=True)
@@ -157,22 +144,24 @@ class RecommendedGains:
         today, best = self.today, self.recommended
         if best is None:
             return (
-                "No damping meets everything: the law is too stiff before an obstacle, "
-                "or the motors are too slow. Lower the law's stiffness first."
+                "No damping meets all requirements: the law is too stiff before an "
+                "obstacle, or the motors are too slow. Lower the law's stiffness "
+                "first."
             )
         same_spring = best.stiffness_n_m == today.stiffness_n_m
         if same_spring and best.damping_n_s_m <= today.damping_n_s_m:
-            return "The current gains meet everything asked of the attraction here."
+            return "The current gains meet all requirements of the attraction."
         return (
             f"Recommended: `{self.command}`. It costs distance: P stays "
             f"{best.following_lag_m:.2f} m instead of {today.following_lag_m:.2f} m "
-            "behind the follow point of the moving source, which a shorter follow "
-            "distance can take back, for it overshoots less. It gains: 2 % is reached "
-            f"in {best.settling_s:.1f} s instead of {today.settling_s:.1f} s; a law "
-            f"may be as stiff as {best.largest_law_stiffness_n_m:.0f} N/m instead of "
-            f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A stiffer "
-            "K_r with more D_r lags less and leaves less delay margin."
-            f"{self._of_the_law}"
+            "behind the follow point of the moving source. A shorter follow distance "
+            "can make up for this, because P overshoots less. The gain is a faster "
+            f"response: P settles to 2 % in {best.settling_s:.1f} s instead of "
+            f"{today.settling_s:.1f} s, and a law may be as stiff as "
+            f"{best.largest_law_stiffness_n_m:.0f} N/m instead of "
+            f"{today.largest_law_stiffness_n_m:.0f} N/m before an obstacle. A larger "
+            "K_r with a larger D_r has less lag and leaves less delay "
+            f"margin.{self._of_the_law}"
         )
 
     @property
@@ -182,10 +171,10 @@ class RecommendedGains:
         if whole is None or whole.meets(self.thresholds):
             return ""
         return (
-            " This is of the attraction's loop alone. With the law's push off the "
-            "source's body in it the same gains leave a gain margin of "
-            f"{whole.gain_margin_db:.2f} dB and {whole.phase_margin_deg:.1f} deg of "
-            f"phase (weakest: {whole.weakest})."
+            " These numbers are for the attraction's loop alone. If the loop includes "
+            "the law's push off the source's body, the same gains leave a gain margin "
+            f"of {whole.gain_margin_db:.2f} dB and {whole.phase_margin_deg:.1f} deg "
+            f"of phase (weakest: {whole.weakest})."
         )
 
 
@@ -272,8 +261,7 @@ def recommend_gains(
     if today == 0.0:
         raise InputError(
             "attraction.stiffness_n_m",
-            "is 0, and gains of a loop that is not there "
-            "cannot be recommended; set it above 0",
+            "is 0, so that there is no loop to recommend gains for; set it above 0",
         )
     choices = tuple(_choice(scenario, share * today, thresholds) for share in springs)
     best = _best(choices, today)
@@ -338,14 +326,11 @@ def _meets(scenario: Scenario, thresholds: GainThresholds) -> bool:
     if _contact_radius(scenario, thresholds) >= 1.0:
         return False
     for at in _CUTS:
-        L = attraction_loop(scenario, at).response(_OMEGA)[0, 0]
-        S = 1.0 / (1.0 + L)
-        crossing = np.flatnonzero(np.diff(np.sign(np.abs(L) - 1.0)))
-        angles = np.degrees(np.abs(np.angle(-L[[*crossing, *(crossing + 1)]])))
+        margins = loop_margins(attraction_loop(scenario, at))
         if (
-            angles.min(initial=180.0) < thresholds.phase_margin_deg
-            or np.abs(S).max() > thresholds.sensitivity_peak
-            or 1.0 / np.abs(S - 0.5).max() < thresholds.disk_margin
+            margins.phase_margin_deg < thresholds.phase_margin_deg
+            or margins.sensitivity_peak > thresholds.sensitivity_peak
+            or margins.disk.alpha < thresholds.disk_margin
         ):
             return False
     return True

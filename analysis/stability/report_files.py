@@ -16,8 +16,6 @@ from analysis.stability.report_page import stability_page
 from analysis.stability.verdicts import compare_verdicts, shown_value
 from diagrams import write_scenario
 
-__all__ = ["stability_document", "stability_text", "write_stability"]
-
 
 def stability_document(
     analyses: Sequence[LawAnalysis], out: Path | None
@@ -69,6 +67,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
                 parts[key] = earlier + value if isinstance(earlier, list) else value
     return {
         "law": analysis.law,
+        "notes": list(analysis.notes),
         **parts,
         "model": plain(asdict(analysis.sheet)),
         "seconds": {f.part.key: round(f.seconds, 3) for f in findings},
@@ -76,7 +75,7 @@ def _law_document(analysis: LawAnalysis) -> dict[str, Any]:
 
 
 def stability_text(document: dict[str, Any]) -> str:
-    """The verdicts on one screen."""
+    """The verdicts on one screen, and what must be known before they are used."""
     rows = document.get("comparison")
     if rows is None:
         verdicts = document["verdicts"]
@@ -85,14 +84,19 @@ def stability_text(document: dict[str, Any]) -> str:
     laws = list(rows[0]["values"]) if rows else []
     width = max(22, 2 + max(map(len, laws), default=0))
     heads = "".join(f"{law:>{width}}" for law in laws)
-    lines = [f"{'':<34}{'threshold':>14}{heads}"]
+    name = max(34, 2 + max((len(row["name"]) for row in rows), default=0))
+    lines = [f"{'':<{name}}{'threshold':>14}{heads}"]
     for row in rows:
         cells = "".join(
             f"{_value(row['values'][law], row['unit']):>{width - 10}}"
             f"{_mark(row['verdicts'][law]):>10}"
             for law in laws
         )
-        lines.append(f"{row['name']:<34}{row['threshold']:>14}{cells}")
+        lines.append(f"{row['name']:<{name}}{row['threshold']:>14}{cells}")
+    documents = document.get("laws", [document])
+    for each in documents:
+        before = f"{each['law']}: " if len(documents) > 1 else ""
+        lines += [f"note: {before}{note}" for note in each.get("notes", ())]
     return "\n".join(lines)
 
 

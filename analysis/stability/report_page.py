@@ -27,8 +27,6 @@ from analysis.stability.verdicts import VerdictRow, compare_verdicts, shown_valu
 from systems.laws.catalogue import law_title
 from systems.laws.law import Equation
 
-__all__ = ["stability_page"]
-
 
 def stability_page(analyses: Sequence[LawAnalysis]) -> str:
     """The report as HTML, with everything in it."""
@@ -60,13 +58,24 @@ def _summary(analyses: Sequence[LawAnalysis]) -> str:
         f"{sum(v.verdict != 'not applicable' for v in found)} criteria pass."
         for law, found in verdicts.items()
     ]
-    parts = [about, bullets(counts), _verdict_table(rows, list(verdicts))]
+    parts = [about, bullets(counts), *_notes(analyses)]
+    parts.append(_verdict_table(rows, list(verdicts)))
     parts += [
         paragraph(f"{law_title(a.law)}: {gains.advice}")
         for a in analyses
         if (gains := a.data("recommended_gains"))
     ]
     return section("summary", "Summary", parts)
+
+
+def _notes(analyses: Sequence[LawAnalysis]) -> list[str]:
+    """What must be known before the numbers, law by law where there are several."""
+    found = [
+        note_ if len(analyses) == 1 else f"{law_title(analysis.law)}: {note_}"
+        for analysis in analyses
+        for note_ in analysis.notes
+    ]
+    return [paragraph("Before you use the numbers:"), bullets(found)] if found else []
 
 
 def _verdict_table(rows: Sequence[VerdictRow], laws: Sequence[str]) -> str:

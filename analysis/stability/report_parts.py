@@ -17,8 +17,6 @@ from analysis.stability.search_parts import SEARCH_CRITERIA, search_parts
 from analysis.stability.verdict_parts import verdict_parts
 from diagrams import Scenario
 
-__all__ = ["parts", "parts_for"]
-
 
 def parts(
     *,

@@ -26,8 +26,6 @@ from analysis.reporting.html_page import Cell, figure_html, paragraph, table
 from analysis.stability.law_analysis import Part
 from diagrams import Scenario
 
-__all__ = ["LoopRobustness", "loop_robustness", "robustness_parts"]
-
 #: Random points of the box, in a short and in a full report.
 _SAMPLES = (25, 200)
 
@@ -150,18 +148,19 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
     ]
     return [
         paragraph(
-            f"{len(cloud.values)} random points of the box below, and its worst "
-            f"corner. Stable: {100.0 * cloud.stable_share:.0f} % of the points. In the "
+            f"The analysis takes {len(cloud.values)} random points within the ranges "
+            "below, and the worst corner of these ranges. "
+            f"{100.0 * cloud.stable_share:.0f} % of the points are stable. In the "
             f"worst case the slowest mode {'decays' if rate < 0 else 'grows'} by "
-            f"{abs(rate):.3g} 1/s, damping ratio {cloud.worst_damping_ratio:.3f} "
-            f"(nominal {nominal:.3f})."
+            f"{abs(rate):.3g} 1/s and its damping ratio is "
+            f"{cloud.worst_damping_ratio:.3f} (nominal {nominal:.3f})."
         ),
         table(headings, boxes),
         figure_html(
             plot_pole_cloud(cloud),
             f"{name}-cloud",
-            "Poles over the box, ln(z)/T of the sampled loop. Poles faster than "
-            "12 1/s are left out.",
+            "Poles within the ranges of all parameters, ln(z)/T of the sampled loop. "
+            "Poles faster than 12 1/s are left out.",
         ),
         table(
             [
@@ -176,7 +175,7 @@ def _render(data: LoopRobustness, name: str) -> list[str]:
         figure_html(
             plot_sensitivities(data.sensitivities),
             f"{name}-sensitivity",
-            "What each interval does to the slowest pole, to first order. Orange: "
-            "less decay, or a higher frequency.",
+            "Change of the slowest pole over each interval, to first order. Orange "
+            "marks less decay or a higher frequency.",
         ),
     ]

@@ -44,8 +44,6 @@ from analysis.trajectory.trajectory_plots import (
     plot_gain_bounds,
 )
 
-__all__ = ["ChainStudy", "route_parts"]
-
 #: Fields of a loop's margins that go to the JSON document.
 _MARGINS = (
     "stable", "gain_margin_db", "phase_margin_deg", "delay_margin_s",
@@ -63,7 +61,7 @@ class ChainStudy:
 
 
 def route_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """Frozen gains, bounds, adaptation, chains; and what the report has not.
+    """Frozen gains, bounds, adaptation, chains; and which parts do not apply.
 
     Args:
         left_out: Titles of the parts of a robot that follows a sound.
@@ -106,7 +104,7 @@ def route_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
         ),
         Part(
             "left_out",
-            "What this report has not",
+            "Parts that do not apply",
             lambda study: titles,
             _render_left_out,
         ),
@@ -158,11 +156,11 @@ def _render_frozen(data: Sequence[FrozenPoint], name: str) -> list[str]:
     ]
     return [
         paragraph(
-            "The loop about P's target with its gains held as they are: law, wheel "
-            "command, plant and odometry as built, each linearised, over a tick. On "
-            "the route it drives at the target's speed; a contact is with a wall "
-            "across its way, at rest, K and D along the way. A safety filter that has "
-            "nothing to do is the wheel command, and limits are not reached."
+            "The models describe the loop about P's target with constant gains: law, "
+            "wheel command, plant and odometry as built, each linearized, over one "
+            "tick. On the route the robot drives at the target's speed. In contact a "
+            "wall at rest is across its path; K and D act along the path. The safety "
+            "filter does not intervene, and no limit is reached."
         ),
         table(
             ["place", "K (N/m)", "D (N s/m)", "poles ln(z)/T (rad/s)", "growth (1/s)",
@@ -208,22 +206,24 @@ def _render_bounds(data: GainBounds, name: str) -> list[str]:
     contacts = "any number of" if math.isinf(data.contacts) else f"{data.contacts:g}"
     return [
         paragraph(
-            f"With D = {number(damping)} N s/m (K = {number(stiffness)} N/m as set), a "
-            f"motor lag of {number(data.mass.motor_lag_s)} s and ticks of "
-            f"{number(data.mass.tick_s * 1e3)} ms. By bisection on the one-period "
-            "matrix of the blocks, and by the closed form that warns before a run."
+            f"The bounds are for D = {number(damping)} N s/m (K is set to "
+            f"{number(stiffness)} N/m), a motor lag of "
+            f"{number(data.mass.motor_lag_s)} s and ticks of "
+            f"{number(data.mass.tick_s * 1e3)} ms. They come from bisection on the "
+            "one-period matrix of the blocks, and from the closed form that is used "
+            "for warnings before a run."
         ),
         table(
-            ["the place that springs act on", "stable below K (N/m)", "closed form",
+            ["position that springs act on", "stable below K (N/m)", "closed form",
              f"damping ratio {WELL_DAMPED:g} up to K (N/m)"],
             rows,
         ),
         paragraph(
-            f"Dampers act on the velocity of the virtual mass. Together they may reach "
+            "Dampers act on the velocity of the virtual mass. Together they may reach "
             f"{number(data.most_damping_n_s_m)} N s/m; 2 M/T is "
-            f"{number(data.closed_damping_n_s_m)}. So {contacts} contacts may be "
-            "summed with their full damping: a scan of more beams has to be made "
-            "objects first."
+            f"{number(data.closed_damping_n_s_m)}. Therefore {contacts} contacts may "
+            "act at once with full damping: combine a scan of more beams into objects "
+            "first."
         ),
         figure_html(plot_gain_bounds(data), name, "Bounds of K over D."),
     ]  # fmt: skip
@@ -271,25 +271,26 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
     frequency, ratio = data.reference
     return [
         paragraph(
-            f"Reference: w_n = {number(frequency)} rad/s, xi = {number(ratio)}, poles "
+            f"The reference has w_n = {number(frequency)} rad/s, xi = "
+            f"{number(ratio)}, the poles "
             f"{', '.join(number(_plain(pole)) for pole in data.reference_poles)} "
-            f"rad/s, over a tick "
-            f"{', '.join(number(_plain(z)) for z in data.held_poles)}: "
-            "it is exact, and stable for every xi above 0."
+            "rad/s, and over a tick the poles "
+            f"{', '.join(number(_plain(z)) for z in data.held_poles)}. The sampled "
+            "reference is exact, and it is stable for every xi above 0."
             + (
-                " It has the nominal gains, so that there is nothing to learn: what is "
-                "learnt comes of contacts, limits and the motors."
+                " It has the nominal gains, so that there is nothing to learn on free "
+                "floor: contacts, limits and motors cause all that the law learns."
                 if data.matched
                 else ""
             )
         ),
         paragraph(_of_lyapunov(data)),
         paragraph(
-            f"Rate: gamma = {number(data.rate)}. Without a cure K and D run away from "
-            f"{number(data.critical.rate)} on where the target swings by "
-            f"{number(data.critical.amplitude_m)} m, the lag at which it pulls P "
-            f"through a contact: {number(data.margin)} times the current. gamma_crit "
-            "a\u00b2 is "
+            f"The adaptation rate is gamma = {number(data.rate)}. Without a remedy K "
+            f"and D run away at rates from {number(data.critical.rate)} on, "
+            f"{number(data.margin)} times the current rate, if the target swings by "
+            f"{number(data.critical.amplitude_m)} m; this is the lag at which the "
+            "target pulls P through a contact. gamma_crit a\u00b2 is "
             + ", ".join(
                 f"{number(each.product)} at {number(each.amplitude_m)} m"
                 for each in data.products
@@ -297,7 +298,7 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             + "."
         ),
         table(
-            ["time (s)", "gradient, closed form", "this rule", "as it is"],
+            ["time (s)", "gradient, closed form", "no remedy", "with the remedies"],
             [
                 [float(time), *values]
                 for time, *values in zip(
@@ -308,22 +309,27 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
                     strict=True,
                 )
             ],
-            caption=f"Drift: K (N/m) under a push of {number(data.drift.push_n)} N "
-            "that the reference does not know; (K_0\u2074 + 4 gamma F\u00b2 t)^(1/4), "
-            "and simulated without and with the cures",
+            caption=
+                f"Drift of K (N/m) under a push of {number(data.drift.push_n)} N that "
+                "the reference does not include: closed form (K_0\u2074 + 4 gamma "
+                "F\u00b2 t)^(1/4), and simulation without and with the remedies"
+            ,
         ),
         table(
             ["", f"after {number(data.jam.jam_s)} s of jam",
              f"{number(data.jam.after_s)} s later"],
             [
                 [text, data.jam.end_n_m[k], data.jam.left_n_m[k]]
-                for k, text in enumerate(("without a cure", "as it is"))
+                for k, text in enumerate(("no remedy", "with the remedies"))
             ],
-            caption="Jam: K (N/m) behind a wall that holds P while the target goes on, "
-            "which then is gone; infinite: the loop is unstable with what it learnt",
+            caption=
+                "Jam: K (N/m) while a wall holds P and the target moves on, and after "
+                "the wall is gone; infinite means that the loop is unstable with the "
+                "gains that it learned"
+            ,
         ),
         table(
-            ["cure", "field", "", "what it does"],
+            ["remedy", "field", "", "effect"],
             [
                 [cure.name, f"`{cure.field}`", "on" if cure.active else "off",
                  cure.effect]
@@ -331,9 +337,9 @@ def _render_adaptation(data: AdaptationStability, name: str) -> list[str]:
             ],
         ),
         paragraph(
-            "K and D are bounded whatever happens."
+            "K and D are always bounded."
             if data.bounded
-            else "Nothing bounds K and D: `projected` would."
+            else "Nothing bounds K and D; set `projected` to bound them."
         ),
         figure_html(
             plot_adaptation(data), name, "Lyapunov function, and drift under a push."
@@ -349,18 +355,20 @@ def _of_lyapunov(data: AdaptationStability) -> str:
     run = data.lyapunov
     if run is None:
         return (
-            f"The rule {data.rule!r} is a gradient: no function is known that always "
-            "falls, and it is stable only below a rate."
+            f"The rule {data.rule!r} is a gradient rule: no Lyapunov function is "
+            "known for it, and it is stable only below a certain rate."
         )
     return (
         "V = w_n\u00b2 |e|\u00b2/2 + |e_v|\u00b2/2 + (\u0394K\u00b2 + "
-        "\u0394D\u00b2)/(2 gamma), from gains that are half of the wanted ones, "
+        "\u0394D\u00b2)/(2 gamma), starts from gains that are half of the wanted "
+        "gains, and "
         + ("falls all the time" if run.falls else "rises")
-        + f" in continuous time: largest rise {number(run.largest_rise)} of its start. "
-        f"Sampled, with motors, it may rise by {number(run.sampled_rise)} a tick; "
-        f"after a minute {number(float(run.continuous[-1]))} and "
-        f"{number(float(run.sampled[-1]))} are left. Contacts are not in V: they are a "
-        "disturbance to it."
+        + f" in continuous time: its largest rise is {number(run.largest_rise)} of "
+        "its initial value. In the sampled loop with motors it may rise by "
+        f"{number(run.sampled_rise)} per tick. After one minute "
+        f"{number(float(run.continuous[-1]))} of it remain in continuous time, "
+        f"and {number(float(run.sampled[-1]))} in the sampled loop. V does not "
+        "include contacts: they act as a disturbance."
     )
 
 
@@ -437,15 +445,16 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
     pairs = range(1, len(data.braked[0].overshoot_m) + 1)
     return [
         paragraph(
-            "Robots like this one on a line, each with the place behind the one before "
-            "it as its target, by the same law, with and without that robot's "
-            "velocity. What its object sensor sees is exact. In contact the zones of "
-            "neighbours meet, and each pushes the other. Amplification: the largest "
-            "over frequency of how much the last one swings for a swing of the first. "
-            "A safety filter does nothing in it."
+            "Robots like this one drive on a line by the same law. The target of each "
+            "robot is a place behind its predecessor, with feed-forward of the "
+            "predecessor's velocity or without it. The object sensors are exact. In "
+            "contact the zones of neighbors meet, and the neighbors push each other. "
+            "The amplification is the amplitude of the last robot over the amplitude "
+            "of the first robot, at the frequency where this ratio is largest. The "
+            "safety filter does not intervene."
         ),
         table(
-            [*headings, "simulated, off by", "a disturbance"],
+            [*headings, "error of simulation", "a disturbance"],
             rows,
             caption="Amplification from the first to the last robot",
         ),
@@ -453,14 +462,16 @@ def _render_chain(data: ChainStudy, name: str) -> list[str]:
         table(
             ["chain", *(f"robots {k} and {k + 1}" for k in pairs)],
             brakes,
-            caption="The first robot brakes from the target's speed to rest: how far "
-            "each gap falls below where it ends, mm",
+            caption="How far each gap falls below its final value, mm, when the first "
+            "robot brakes from the target's speed to rest",
         ),
         figure_html(
             plot_chain(chain, data.runs),
             f"{name}-response",
-            "A pair over frequency; eight robots where their chain amplifies most, or "
-            "at a robot's natural frequency where nothing grows; a pair over D, apart.",
+            "Left: amplification by a pair of robots over frequency. Middle: eight "
+            "robots at the frequency where their chain amplifies most, or at a "
+            "robot's natural frequency if nothing grows. Right: a pair out of "
+            "contact, over D.",
         ),
         figure_html(
             plot_braked_chains(data.braked),
@@ -475,28 +486,35 @@ def _of_chain(chain: RobotChain) -> str:
     calm = [name for name in chain.peaks if name not in growing]
     text = ""
     if growing:
-        text += f"A disturbance grows along the chain: {'; '.join(growing)}. "
+        text += (
+            "A disturbance grows along the chain in these cases: "
+            f"{'; '.join(growing)}. "
+        )
     if calm:
-        text += f"It does not grow: {'; '.join(calm)}. "
+        text += f"It does not grow in these cases: {'; '.join(calm)}. "
     text += (
-        "Out of contact, with the whole velocity of the one before, it grows for every "
-        f"D: at low frequency |G| is above 1. Without it, it does not from D = "
-        f"{number(chain.least_damping_n_s_m)} N s/m on at K = "
-        f"{number(chain.stiffness_n_m)} N/m (in contact from "
-        f"{number(chain.least_damping_in_contact_n_s_m)}), but gaps grow by D/K = "
-        f"{number(chain.time_headway_s)} s times the speed."
+        "Out of contact, with feed-forward of the predecessor's whole velocity, it "
+        "grows for every D, because |G| is above 1 at low frequency. Without "
+        f"feed-forward it does not grow at K = {number(chain.stiffness_n_m)} N/m if D "
+        f"is at least {number(chain.least_damping_n_s_m)} N s/m (in contact at least "
+        f"{number(chain.least_damping_in_contact_n_s_m)} N s/m), but then gaps grow "
+        f"by D/K = {number(chain.time_headway_s)} s times the speed."
     )
     if chain.most_feed_forward >= 0.0:
         share = 100.0 * chain.most_feed_forward
-        text += f" Up to {number(share, 3)} % of the velocity may be fed forward."
+        text += (
+            f" Up to {number(share, 3)} % of the velocity may be fed forward without "
+            "growth."
+        )
     return text
 
 
 def _render_left_out(data: Sequence[str], name: str) -> list[str]:
     return [
         paragraph(
-            "Left out, for they are of a robot that follows a sound: its follow "
-            "distance, its tracker, its bursts and its law's push."
+            "The following parts do not apply, because they are about a robot that "
+            "follows a sound: its follow distance, its tracker, its bursts and its "
+            "law's push."
         ),
         bullets(data),
     ]

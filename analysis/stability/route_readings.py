@@ -13,10 +13,8 @@ from analysis.trajectory.frozen_gains import WELL_DAMPED
 from analysis.trajectory.route_loop import route_law
 from systems.ranging.parameters import OBJECT_SLOTS
 
-__all__ = ["ROUTE_CRITERIA"]
-
 _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
-_CHAIN = "l2 string stability: no frequency is amplified; 1e-6 is rounding"
+_CHAIN = "l2 string stability: no frequency is amplified; 1e-6 allows for rounding"
 _OURS = "ours"
 
 
@@ -98,20 +96,20 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "damping ratio out of contact", "", "at least", WELL_DAMPED,
         "it hardly overshoots its target",
         "it overshoots its target",
-        "ours: 5 % of overshoot",
+        "set by this project: 5 % of overshoot",
     ): _frozen(
         lambda points: min(p.damping_ratio for p in points if p.at.wall_m is None)
     ),
     Criterion(
         "least damping ratio", "", "at least", 0.4,
-        "nor does it swing before a wall",
-        "it swings for several cycles somewhere in a zone",
+        "it does not swing before a wall either",
+        "somewhere in the zone of a wall it swings for several cycles",
         "usual: 0.4 to 0.8 (Astrom and Murray)",
     ): _frozen(lambda points: min(point.damping_ratio for point in points)),
     Criterion(
         "least phase margin", "deg", "at least", 45.0,
-        "the loop stands the usual extra phase, lag or lead",
-        "a small extra phase makes it oscillate",
+        "the loop tolerates the usual extra phase lag or lead",
+        "a small extra phase makes the loop oscillate",
         _MARGINS,
     ): _margin("phase_margin_deg"),
     Criterion(
@@ -127,22 +125,24 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "usual: M_s of 1.2 to 2.0 (Astrom and Murray)",
     ): _margin("sensitivity_peak", largest=True),
     Criterion(
-        "least delay margin", "s", "at least", 0.1,
-        "four more ticks of delay do no harm",
-        "less than four more ticks of delay make it oscillate",
-        "ours: four ticks",
+        "least delay margin of the loop without sampling", "s", "at least", 0.1,
+        "0.1 s more delay does no harm",
+        "less than 0.1 s more delay makes it oscillate",
+        "set by this project: four ticks of 25 ms; phase margin divided by crossover "
+        "frequency",
     ): _margin("delay_margin_s"),
     Criterion(
-        "springs of the stable sum", "", "below", 1.0,
-        "target and contact together are soft enough, even a tick late",
-        "target and contact together are too stiff where places are a tick late",
+        "sum of all springs, share of the stable limit", "", "below", 1.0,
+        "target and contact together are soft enough, even if positions are one tick "
+        "late",
+        "target and contact together are too stiff if positions are one tick late",
         "stability, with the damping of the target alone",
     ): _springs,
     Criterion(
-        "contacts that may be summed", "", "at least", float(OBJECT_SLOTS),
-        "dampers of all objects that are seen may act at once",
-        "dampers of some of the objects at once turn the velocity round at each tick",
-        "D + n D_e < 2 M/T, with all that the object sensor may show",
+        "contacts that may act at once", "", "at least", float(OBJECT_SLOTS),
+        "the dampers of all objects that it sees may act at once",
+        "the dampers of several objects at once reverse the velocity at each tick",
+        "D + n D_e < 2 M/T, with as many objects as the sensor can report",
     ): _of("gain_bounds", lambda data: data.contacts, "bounds were not computed"),
     Criterion(
         "rise of the Lyapunov function", "", "at most", 1e-9,
@@ -151,33 +151,35 @@ ROUTE_CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "rounding",
     ): _adaptation(_rise),
     Criterion(
-        "critical rate, of the current", "", "above", 1.0,
+        "critical adaptation rate over the current rate", "", "above", 1.0,
         "K and D do not run away where the target leads by the largest lag",
         "K and D run away where the target leads by the largest lag",
-        "simulated, without contacts and cures",
+        "simulated without contacts and without the remedies",
     ): _adaptation(lambda data: data.margin),
     Criterion(
-        "stiffness learnt, of the stable", "", "below", 1.0,
-        "what it learns behind a wall leaves it stable",
-        "what it learns behind a wall makes it unstable when that is gone",
-        "90 s of jam, then the target rests; with the cures of the scenario",
+        "stiffness learned in a jam, share of the stable limit", "", "below", 1.0,
+        "it stays stable with the stiffness that it learns behind a wall",
+        "the stiffness that it learns behind a wall makes it unstable when the wall "
+        "is gone",
+        "after 90 s of jam the target rests; with the remedies of the scenario",
     ): _jammed,
     Criterion(
-        "growth along a chain, fed forward", "", "at most", 1.0 + 1e-6,
-        "no robot swings more than the first where each follows the one before",
-        "a disturbance grows from robot to robot",
+        "chain amplification with feed-forward", "", "at most", 1.0 + 1e-6,
+        "no robot swings more than the first robot if each follows its predecessor",
+        "a disturbance grows from robot to robot along the chain",
         _CHAIN,
     ): _chain("with feed-forward"),
     Criterion(
-        "the same without its velocity", "", "at most", 1.0 + 1e-6,
-        "no robot swings more than the first where each follows the one before",
-        "a disturbance grows from robot to robot",
+        "chain amplification without feed-forward", "", "at most", 1.0 + 1e-6,
+        "no robot swings more than the first robot if each follows its predecessor",
+        "a disturbance grows from robot to robot along the chain",
         _CHAIN,
     ): _chain("without feed-forward"),
     Criterion(
-        "the same in contact", "", "at most", 1.0 + 1e-6,
-        "nor where their zones meet",
-        "it does where their zones meet",
+        "chain amplification in contact", "", "at most", 1.0 + 1e-6,
+        "where zones of neighboring robots meet, no robot swings more than the first "
+        "robot",
+        "where zones of neighboring robots meet, a disturbance grows along the chain",
         _CHAIN,
-    ): _chain("in contact, without"),
+    ): _chain("in contact, without feed-forward"),
 }  # fmt: skip

@@ -6,10 +6,8 @@ import math
 from typing import Any
 
 from analysis.reporting.html_page import Cell, number, paragraph, table
-from analysis.safety.guarantees import Guarantees, guarantees
 from analysis.stability.law_analysis import Part
-
-__all__ = ["safety_parts"]
+from diagrams.scenario_warnings.guarantees import Guarantees, guarantees
 
 
 def safety_parts() -> tuple[Part, ...]:
@@ -39,15 +37,15 @@ def _render(data: Guarantees, prefix: str) -> list[str]:
     ]
     gap = 360.0 - data.seen_angle_deg
     return [
-        paragraph(f"What the guard promises here: {data.promise}."),
+        paragraph(f"The guard promises here: {data.promise}."),
         paragraph(
-            f"At top speed it needs {number(data.needed_way_m)} m of clear floor ahead "
-            f"of the axle; its sensors can see {number(data.seen_way_m)} m. They see "
-            f"{number(data.seen_angle_deg)} deg of the round, {number(gap)} deg less "
-            "than all."
+            f"At top speed the robot needs {number(data.needed_way_m)} m of clear "
+            f"floor ahead of the axle; its sensors see {number(data.seen_way_m)} m. "
+            f"They cover {number(data.seen_angle_deg)} deg of the full circle; "
+            f"{number(gap)} deg are not covered."
         ),
         table(["assumption", "of", "value", "limit", "margin", ""], rows),
-        paragraph("Theorems, assumptions and their tests: docs/safety.md."),
+        paragraph("See docs/guard.md for theorems, assumptions and their tests."),
     ]
 
 

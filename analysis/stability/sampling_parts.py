@@ -49,14 +49,6 @@ from analysis.stability.recommended_gains import (
     recommend_gains,
 )
 
-__all__ = [
-    "BurstCycles",
-    "SampledLoop",
-    "SamplingCharts",
-    "gain_parts",
-    "sampling_parts",
-]
-
 #: Length of the runs that check delay margins in a short and a full report, s.
 _CHECK_S = (60.0, 300.0)
 #: Simulated cycles of the sound, as above.
@@ -186,10 +178,11 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
     ]
     parts = [
         paragraph(
-            "The delay that may be added before the loop oscillates, in fractions of a "
-            "tick: the spectral radius of the one-period map with the delay in it is "
-            "bisected. At the sensor an estimate comes later than the tracker takes it "
-            "to; at the wheels a command does."
+            "A delay margin is the delay that may be added before the loop "
+            "oscillates, in fractions of a tick. It comes from bisection on the "
+            "spectral radius of the one-period map with that delay. A delay at the "
+            "sensor makes an estimate later than the tracker assumes; a delay at the "
+            "wheels makes a command later."
         ),
         table(["late at", "motion", "delay (s)", "ticks", "rad/s"], rows),
     ]
@@ -201,15 +194,17 @@ def _render_sampled(data: SampledLoop, name: str) -> list[str]:
         ]
         parts.append(
             table(
-                ["of the margin", "delay (s)", "growth (1/s)", "rad/s"],
+                ["share of the margin", "delay (s)", "growth (1/s)", "rad/s"],
                 checks,
-                caption="The diagram with that delay at the sensor, simulated for "
+                caption="Simulation of the diagram with that delay at the sensor, for "
                 f"{data.check.below.duration_s:g} s after a small kick",
             )
         )
         parts.append(
             figure_html(
-                plot_delay_check(data.check), name, "Just below the margin, and above."
+                plot_delay_check(data.check),
+                name,
+                "Runs just below the margin and just above it.",
             )
         )
     return parts
@@ -260,18 +255,19 @@ def _render_bursts(data: BurstCycles, name: str) -> list[str]:
     cycles = round(data.runs[0].time_s[-1] / first.period_s)
     return [
         paragraph(
-            f"The source sounds for {first.on_s:g} s in every {first.period_s:g} s. In "
-            "between, the target rests in W (`world`), moves with the robot (`robot`) "
-            "or goes on with its own velocity (`motion`). A multiplier is the share of "
-            "what was off that is left after a cycle, about rest: from the product of "
-            f"the one-period matrices, and fitted to {cycles} simulated cycles after a "
-            "kick along the line to the source, which shows the motion along it only."
+            f"The source sounds for {first.on_s:g} s in every {first.period_s:g} s. "
+            "Between two bursts, the target rests in W (`world`), moves with the "
+            "robot (`robot`) or goes on with its own velocity (`motion`). A "
+            "multiplier is the share of a deviation from rest that remains after one "
+            "cycle. It comes from the product of the one-period matrices, and from a "
+            f"fit to {cycles} simulated cycles after a kick along the line to the "
+            "source; the fit shows the motion along this line only."
         ),
         table(["hold", "multipliers", "simulated, along", "stable"], rows),
         figure_html(
             plot_gap_chart(data.gaps),
             name,
-            "Growth against the silence between bursts, for each way to hold.",
+            "Growth over the silence between bursts, for each way to hold the target.",
         ),
     ]
 
@@ -313,14 +309,15 @@ def _render_loci(data: Sequence[RootLocus], name: str) -> list[str]:
     ]
     return [
         paragraph(
-            "Poles as one gain varies, ln(z)/T of the sampled loop: of the loop to the "
-            "target, and of the contact mode where the law is stiffest."
+            "The figures show the poles ln(z)/T of the sampled loop as one gain "
+            "varies, for the loop to the target and for the contact mode where the "
+            "law is stiffest."
         ),
         table(["gain", "loop", "current", "stability ends at"], rows),
         figure_html(
             plot_root_loci(data),
             name,
-            "Root loci; the current poles are marked.",
+            "Root loci with marks at the current poles.",
             scale=True,
         ),
     ]
@@ -338,13 +335,14 @@ def _render_sampling(data: SamplingCharts, name: str) -> list[str]:
             caption="Sampled double integrator: closed form against eigenvalues",
         ),
         paragraph(
-            f"The loop to the target stays stable up to a sample period of "
-            f"{data.period.longest_stable_s:.3g} s; it is {data.period.today_s:g} s."
+            "The loop to the target stays stable up to a sample period of "
+            f"{data.period.longest_stable_s:.3g} s; the current period is "
+            f"{data.period.today_s:g} s."
         ),
         figure_html(
             plot_poles_against_period(data.period),
             f"{name}-period",
-            "Poles against the sample period.",
+            "Poles over the sample period.",
             scale=True,
         ),
         *(
@@ -374,9 +372,10 @@ def _render_contact(data: ContactLimits, name: str) -> list[str]:
     return [
         paragraph(
             "Before an obstacle the law's spring adds to K_r, while the damping is "
-            "still D_r. The largest springs that come to rest, against the motors' lag "
-            f"and the age of an echo (ticks of {data.tick_s * 1e3:g} ms). "
-            f"This scenario: {lag:g} s and {ticks} ticks."
+            "still D_r. The table lists the largest springs with which the robot "
+            "comes to rest, over the motors' lag and the age of an echo (in ticks of "
+            f"{data.tick_s * 1e3:g} ms). This scenario has {lag:g} s and {ticks} "
+            "ticks."
         ),
         table(headings, rows, caption=caption),
         figure_html(plot_contact_limits(data), name, "Limits of the contact mode."),
@@ -404,7 +403,7 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
     rows: list[list[Cell]] = [
         ["Current gains"],
         _figures(today),
-        ["Least D_r that meets all"],
+        ["Least D_r that meets all requirements"],
     ]
     rows += [
         _figures(choice.figures)
@@ -414,13 +413,15 @@ def _render_gains(data: RecommendedGains, name: str) -> list[str]:
     ]
     return [
         paragraph(
-            f"Asked for: damping ratio {t.damping_ratio:g}, phase margin "
-            f"{t.phase_margin_deg:g} deg, M_s {t.sensitivity_peak:g}, disk margin "
-            f"{t.disk_margin:.2f}, at sensor and actuator, and rest before an obstacle "
-            f"with echoes {t.spare_ticks} tick late. The loop is the attraction's, "
-            "sampled, with motor lag; margins count both ways. Lag: how far P stays "
-            "behind the follow point of a source that moves as this scenario's. "
-            "Stiffest law: the largest spring to obstacles that comes to rest."
+            f"The requirements are a damping ratio of {t.damping_ratio:g}, a phase "
+            f"margin of {t.phase_margin_deg:g} deg, M_s of {t.sensitivity_peak:g}, a "
+            f"disk margin of {t.disk_margin:.2f}, at sensor and actuator, and rest "
+            f"before an obstacle with echoes that are {t.spare_ticks} tick late. The "
+            "loop is the sampled loop of the attraction with motor lag; margins are "
+            "the least in both directions. The lag is the distance of P behind the "
+            "follow point of a source that moves like the source of this scenario. "
+            "The stiffest law is the largest spring to obstacles with which P comes "
+            "to rest."
         ),
         table(headings, rows),
         paragraph(data.advice),

@@ -10,13 +10,11 @@ from analysis.stability.law_analysis import Part, Study
 from analysis.stability.verdict_readings import Reading
 from analysis.stability.verdicts import Criterion
 
-__all__ = ["SEARCH_CRITERIA", "search_parts"]
-
 _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
 
 
 def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
-    """The heading loop; and what the report has not.
+    """The heading loop; and which parts do not apply.
 
     Args:
         left_out: Titles of the parts of a robot that follows a sound.
@@ -27,7 +25,7 @@ def search_parts(left_out: Sequence[str]) -> tuple[Part, ...]:
     titles = tuple(left_out)
     return (
         Part("heading_loop", "The loop of the heading", _heading_loop, _render),
-        Part("left_out", "What this report has not", lambda _: titles, _render_left),
+        Part("left_out", "Parts that do not apply", lambda _: titles, _render_left),
     )
 
 
@@ -45,19 +43,21 @@ def _heading_loop(study: Study) -> HeadingLoopMargins:
 def _render(data: HeadingLoopMargins, name: str) -> list[str]:
     return [
         paragraph(
-            "A searching robot stands, decides on a heading, and turns to it while it "
-            "drives: compass, PID, pulse widths, motors and the heading that comes of "
-            "the wheels, with the PID and the motors held over a tick. The loop is cut "
-            "at the deviation. Within L and all limits it is linear; a larger one "
-            "turns on the spot, slower than the linear loop would. Steps, phases and "
-            "finds are no matter of linear models: docs/olfaction.md has their shares."
+            "A searching robot stops, decides on a heading, and turns to it while it "
+            "drives. The loop has a compass, a PID controller, pulse widths, motors "
+            "and the heading that the wheels produce; PID output and motor duties are "
+            "held over a tick. The loop is cut at the deviation of the heading. It is "
+            "linear for deviations within L and within all limits; with a larger "
+            "deviation the robot turns on the spot, more slowly than the linear loop "
+            "would. Linear models do not cover steps, phases and finds: "
+            "docs/searches.md states how often each occurs."
         ),
         table(
             ["crossover (rad/s)", "phase margin (deg)", "delay margin (s)",
              "delay margin (ticks)", "gain margin (dB)", "lost by sampling (deg)"],
             [[data.crossover_rad_s, data.phase_margin_deg, data.delay_margin_s,
               data.delay_margin_ticks, data.gain_margin_db, data.phase_lost_deg]],
-            caption=f"At a tick of {number(1e3 * data.tick_s)} ms",
+            caption=f"With a tick of {number(1e3 * data.tick_s)} ms",
         ),
     ]  # fmt: skip
 
@@ -65,8 +65,9 @@ def _render(data: HeadingLoopMargins, name: str) -> list[str]:
 def _render_left(data: Sequence[str], name: str) -> list[str]:
     return [
         paragraph(
-            "A search has no virtual mass, no springs and no equilibrium: the parts of "
-            "robots that follow a sound do not apply."
+            "A search has no virtual mass, no springs and no equilibrium: the "
+            "following parts, which are about robots that follow a sound, do not "
+            "apply."
         ),
         bullets(list(data)),
     ]
@@ -75,7 +76,11 @@ def _render_left(data: Sequence[str], name: str) -> list[str]:
 def _of(name: str) -> Callable[[Study], Reading]:
     def read(study: Study) -> Reading:
         data = study.found.get("heading_loop")
-        return float(getattr(data, name)) if data else "it was not computed"
+        return (
+            float(getattr(data, name))
+            if data
+            else ("the heading loop was not computed")
+        )
 
     return read
 
@@ -90,14 +95,14 @@ SEARCH_CRITERIA: Mapping[Criterion, Callable[[Study], Reading]] = {
     ): _of("phase_margin_deg"),
     Criterion(
         "gain margin of the heading", "dB", "at least", 6.0,
-        "motors may be twice as strong",
-        "motors of less than twice the strength make it unstable",
+        "the motors may be twice as strong",
+        "motors of less than twice the nominal strength make it unstable",
         _MARGINS,
     ): _of("gain_margin_db"),
     Criterion(
         "delay margin of the heading", "ticks", "at least", 4.0,
         "four more ticks of delay do no harm",
-        "less than four more ticks of delay make it oscillate",
-        "ours: four ticks",
+        "fewer than four more ticks of delay make it oscillate",
+        "set by this project: four ticks",
     ): _of("delay_margin_ticks"),
 }  # fmt: skip

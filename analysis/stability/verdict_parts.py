@@ -10,8 +10,6 @@ from analysis.stability.law_analysis import Part, Study
 from analysis.stability.verdict_readings import CRITERIA, Reading
 from analysis.stability.verdicts import Criterion, Verdict, judge, shown_value
 
-__all__ = ["verdict_parts"]
-
 
 def verdict_parts(
     criteria: Mapping[Criterion, Callable[[Study], Reading]] = CRITERIA,

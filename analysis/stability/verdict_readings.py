@@ -15,25 +15,6 @@ from analysis.stability.law_analysis import Study
 from analysis.stability.margin_parts import Margins, least_damped
 from analysis.stability.verdicts import YES_OR_NO, Criterion
 
-__all__ = [
-    "CRITERIA",
-    "Reading",
-    "read_contact",
-    "read_cycle",
-    "read_damping",
-    "read_decay",
-    "read_delay",
-    "read_jams",
-    "read_offset",
-    "read_passive",
-    "read_prediction",
-    "read_routes",
-    "read_start",
-    "read_trials",
-    "read_worst_case",
-    "read_worst_margin",
-]
-
 #: A number, or why there is none.
 Reading = float | str
 
@@ -105,11 +86,19 @@ read_cycle = _of(
 
 
 def read_jams(study: Study) -> Reading:
-    """Sinks outside the goal: a run that ends there is stuck or out of time."""
-    points = study.need("equilibria").search.points
-    scenario = study.scenario
+    """Sinks and attractive switching points outside the goal.
+
+    A run that ends there is stuck or out of time.
+    """
+    search, scenario = study.need("equilibria").search, study.scenario
     margin = scenario.goal_radius_m - scenario.attraction.follow_distance_m
-    return float(sum(p.stable and p.offset_m > margin for p in points))
+    p_WS = scenario.source.path().pose(0.0)[:2]
+    jams = sum(p.stable and p.offset_m > margin for p in search.points)
+    jams += sum(
+        p.attractive and math.dist(p.p_WP, p_WS) > scenario.goal_radius_m
+        for p in search.switching
+    )
+    return float(jams)
 
 
 def read_offset(study: Study) -> Reading:
@@ -160,12 +149,17 @@ def read_passive(study: Study) -> Reading:
     return float(share)
 
 
-#: 1 where no path that the energy allows leads from the start to contact.
-read_start = _of(
-    "certificates",
-    "there is no energy certificate",
-    lambda data: data[0].certificate.start_certified,
-)
+def read_start(study: Study) -> Reading:
+    """1 where no path that the energy allows leads from the start to contact."""
+    data = study.found.get("certificates")
+    if not data:
+        return "there is no energy certificate"
+    certified = data[0].certificate.start_certified
+    if certified is None:
+        return "bodies move, and the certificate is about bodies at rest"
+    return float(certified)
+
+
 #: Collisions of simulated certified starts.
 read_trials = _of(
     "certificates",
@@ -185,7 +179,7 @@ read_prediction = _of(
 
 _MARGINS = "usual: 6 dB and 45 deg (Seiler, Packard and Gahinet 2020)"
 _SENSITIVITY = "usual: M_s of 1.2 to 2.0 (Astrom and Murray)"
-_OURS = "ours"
+_OURS = "set by this project"
 
 #: What is asked, and what is read for it.
 CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
@@ -203,8 +197,8 @@ CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
     ): read_damping,
     Criterion(
         "least phase margin", "deg", "at least", 45.0,
-        "every cut loop stands the usual extra phase, lag or lead",
-        "a small extra phase makes it oscillate",
+        "every cut loop tolerates the usual extra phase lag or lead",
+        "a small extra phase makes the loop oscillate",
         _MARGINS,
     ): read_worst_margin("phase_margin_deg", largest=False),
     Criterion(
@@ -222,66 +216,66 @@ CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
     ): read_worst_margin("sensitivity_peak", largest=True),
     Criterion(
         "least disk margin", "", "at least", 2.0 / 3.0,
-        "gain and phase may be off at once, by 6 dB and 37 deg",
-        "gain and phase that are off at once make it oscillate early",
-        "alpha = 2/3: 6 dB either way (Seiler, Packard and Gahinet 2020)",
+        "gain and phase may change at once, by 6 dB and 37 deg",
+        "a change of gain and phase at once makes the loop oscillate early",
+        "alpha = 2/3: 6 dB in each direction (Seiler, Packard and Gahinet 2020)",
     ): read_worst_margin("disk", largest=False),
     Criterion(
         "least delay margin", "s", "at least", 0.1,
-        "four more ticks of delay do no harm",
-        "less than four more ticks of delay make it oscillate",
-        "ours: four ticks",
+        "0.1 s more delay does no harm",
+        "less than 0.1 s more delay makes it oscillate",
+        "set by this project: four ticks of 25 ms; exact margin of the sampled loop",
     ): read_delay,
     Criterion(
-        "left after a burst cycle", "", "below", 1.0,
+        "deviation remaining after a burst cycle", "", "below", 1.0,
         "it settles although the source is silent most of the time",
         "it swings ever farther because the source is silent most of the time",
         "stability over a cycle of the sound",
     ): read_cycle,
     Criterion(
         "growth where the law is stiffest", "1/s", "below", 0.0,
-        "it comes to rest however hard it is pressed against an obstacle",
-        "pressed to where the law is stiffest, it swings",
+        "it comes to rest however hard it presses against an obstacle",
+        "it swings where it presses to the law's stiffest point",
         "stability of the contact mode at the law's largest slope",
     ): lambda study: read_contact(study, 0),
     Criterion(
-        "the same with echoes a tick late", "1/s", "below", 0.0,
-        "a processor may need one tick more",
+        "growth where the law is stiffest, echoes one tick late", "1/s", "below", 0.0,
+        "the loop tolerates a processor that needs one more tick",
         "with one more tick of latency it swings where the law is stiffest",
         _OURS,
     ): lambda study: read_contact(study, 1),
     Criterion(
-        "worst case at rest", "1/s", "below", 0.0,
-        "it stays stable with all parameters off",
-        "parameters that are off make it unstable",
-        "stability over the box of parameters",
+        "growth at rest, worst parameters", "1/s", "below", 0.0,
+        "it stays stable for all parameters in their ranges",
+        "some parameters in their ranges make it unstable",
+        "stability over the ranges of all parameters",
     ): read_worst_case("robustness"),
     Criterion(
-        "worst case before an obstacle", "1/s", "below", 0.0,
-        "it comes to rest before an obstacle with all parameters off",
-        "parameters that are off make it swing where the law is stiffest",
-        "stability over the box of parameters",
+        "growth before an obstacle, worst parameters", "1/s", "below", 0.0,
+        "it comes to rest before an obstacle for all parameters in their ranges",
+        "some parameters in their ranges make it swing where the law is stiffest",
+        "stability over the ranges of all parameters",
     ): read_worst_case("contact_robustness"),
     Criterion(
-        "places to jam", "", "at most", 0.0,
+        "places where the robot can jam", "", "at most", 0.0,
         "it rests near the follow distance only",
         "it can come to rest away from the source",
-        "none is wanted; away: outside the goal of a run",
+        "no such place is wanted; away means outside the goal of a run",
     ): read_jams,
     Criterion(
-        "offset at rest", "m", "at most", 0.1,
+        "offset from the follow point at rest", "m", "at most", 0.1,
         "it rests at the follow distance",
-        "what it avoids, the source's own body too, pushes it off that distance",
+        "obstacles, or the source's own body, push it off that distance",
         _OURS,
     ): read_offset,
     Criterion(
         "start certified", YES_OR_NO, "at least", 1.0,
-        "from this scenario's start P touches nothing, in the certificate's model",
+        "in the certificate's model, P touches nothing from this scenario's start",
         "energy alone does not exclude a contact from this start",
         "energy certificate",
     ): read_start,
     Criterion(
-        "power that the velocity term gives", "of D_r", "at most", 1.0,
+        "largest power of the velocity term", "of D_r", "at most", 1.0,
         "the velocity term never gives more energy than D_r takes",
         "the velocity term can drive the motion",
         "passivity",
@@ -293,13 +287,14 @@ CRITERIA: dict[Criterion, Callable[[Study], Reading]] = {
         "a proof has no exceptions",
     ): read_trials,
     Criterion(
-        "linear prediction of a small step", "% off", "at most", 2.0,
-        "frequency and damping are those of the nonlinear simulation",
-        "the velocity term's corner at rest, which no linear model has, shows",
-        "2 % in frequency and damping, exact sensors",
+        "error of the linear prediction of a small step", "% off", "at most", 2.0,
+        "frequency and damping agree with the nonlinear simulation",
+        "the corner of the velocity term at rest, which no linear model has, has an "
+        "effect",
+        "2 % in frequency and damping, with exact sensors",
     ): read_prediction,
     Criterion(
-        "difference of two routes to the model", "", "at most", 1e-8,
+        "difference between two computations of the model", "", "at most", 1e-8,
         "two independent computations of the linear model agree",
         "two computations of the linear model differ",
         "rounding",

@@ -6,16 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-__all__ = [
-    "YES_OR_NO",
-    "Criterion",
-    "Verdict",
-    "VerdictRow",
-    "compare_verdicts",
-    "judge",
-    "shown_value",
-]
-
 #: Unit of what is true or not: 1 or 0.
 YES_OR_NO = "yes or no"
 

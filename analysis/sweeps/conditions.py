@@ -14,8 +14,6 @@ from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
 from systems.world.plane import beyond_rectangle
 
-__all__ = ["Conditions"]
-
 #: Distances of what moves are looked at so often, s.
 STEP_S = 0.1
 
@@ -84,7 +82,7 @@ class Conditions(Parameters):
                     "require.source_distance_m",
                     f"{scenario.obstacles[nearest].name!r} comes within "
                     f"{max(least[nearest], 0.0):.3g} m of {name!r}, less than "
-                    f"{self.source_distance_m:g} m; move one",
+                    f"{self.source_distance_m:g} m; move one of them",
                 )
 
     def _check_way(self, scenario: Scenario, robot: str, around: Surroundings) -> None:
@@ -101,9 +99,9 @@ class Conditions(Parameters):
         if not _has_way(start, goal, reach, boxes, self.way_radius_m):
             raise InputError(
                 "require.way_radius_m",
-                f"what rests leaves a disc of {self.way_radius_m:g} m no way from the "
-                f"start of {robot!r} to {around.target!r}; move some of it, or lower "
-                "the radius",
+                f"obstacles at rest leave no path for a disc of {self.way_radius_m:g} "
+                f"m from the start of {robot!r} to {around.target!r}; move some of "
+                "them, or lower the radius",
             )
 
 

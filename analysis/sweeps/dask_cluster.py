@@ -6,12 +6,14 @@ blocks written in Python are never freed, and a Dask worker lives long.
 
 from __future__ import annotations
 
+import logging
 import socket
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import CancelledError
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from itertools import islice
 from queue import Empty, SimpleQueue
+from time import monotonic
 from typing import Any
 from urllib.parse import urlsplit
 from uuid import uuid4
@@ -21,11 +23,15 @@ from analysis.sweeps.one_run import Outcome, Task, lost_outcome
 from analysis.sweeps.processes import ATTEMPTS, PULSE_S, WorkerError, WorkerProcess
 from systems.framework.input_error import InputError
 
-__all__ = ["connect", "run_on_cluster"]
-
 #: Tasks that the cluster holds for each of its threads: one runs, one waits.
 TASKS_A_THREAD = 2
+#: While a cluster has no workers, a warning comes after so long, s.
+WARN_S = 5.0
+#: A sweep on a cluster that has had no workers for so long ends, s.
+PATIENCE_S = 600.0
 _CONNECT_S = 10.0
+
+_LOGGER = logging.getLogger("phonotaxis")
 
 _idle: SimpleQueue[WorkerProcess] = SimpleQueue()
 
@@ -55,8 +61,8 @@ def connect(scheduler: str) -> Any:
     except (OSError, ValueError, TypeError) as error:
         raise InputError(
             "scheduler",
-            f"{scheduler} cannot be reached ({error}); give the address "
-            "that `dask scheduler` prints, as tcp://host:8786",
+            f"{scheduler} cannot be reached ({error}); give the address that `dask "
+            "scheduler` prints, for example tcp://host:8786",
         ) from None
     if trouble:
         client.close()
@@ -75,8 +81,8 @@ def _trouble(client: Any) -> str:
         for name, version in versions().items():
             if theirs.get(name) != version:
                 return (
-                    f"has a worker {worker} with {name} {theirs.get(name)}, where we "
-                    f"have {version}; install the same"
+                    f"has a worker {worker} with {name} {theirs.get(name)}, but this "
+                    f"process has {version}; install the same version"
                 )
     return ""
 
@@ -96,16 +102,72 @@ def run_on_cluster(
         others; one that takes several workers with it is given up.
 
     Raises:
-        WorkerError: The cluster is gone.
+        WorkerError: The cluster is gone, or has had no workers for ``PATIENCE_S``.
     """
+    with _silent_dask():
+        yield from _outcomes(tasks, pulse, client)
+
+
+@contextmanager
+def _silent_dask() -> Iterator[None]:
+    """Within it Dask logs nothing: we say in a line what is wrong with a cluster."""
+    names = [*logging.root.manager.loggerDict, "asyncio"]
+    loggers = [
+        logging.getLogger(name)
+        for name in names
+        if name.partition(".")[0] in ("asyncio", "distributed", "tornado")
+    ]
+    before = [logger.disabled for logger in loggers]
+    for logger in loggers:
+        logger.disabled = True
+    try:
+        yield
+    finally:
+        for logger, disabled in zip(loggers, before, strict=True):
+            logger.disabled = disabled
+
+
+class _Patience:
+    """Watches whether a cluster has workers."""
+
+    def __init__(self) -> None:
+        self._seen, self._warned = monotonic(), False
+
+    def watch(self, threads: int) -> None:
+        """Says so if there have been no threads for a while.
+
+        Raises:
+            WorkerError: There have been none for ``PATIENCE_S``.
+        """
+        if threads:
+            self._seen, self._warned = monotonic(), False
+        alone_s = monotonic() - self._seen
+        if alone_s > PATIENCE_S:
+            raise WorkerError(
+                f"the Dask cluster has had no workers for {PATIENCE_S:g} s"
+            )
+        if alone_s > WARN_S and not self._warned:
+            self._warned = True
+            _LOGGER.warning(
+                "the Dask cluster has no workers; the sweep waits for new ones, and "
+                "ends after %g s without any",
+                PATIENCE_S,
+            )
+
+
+def _outcomes(
+    tasks: Iterator[Task], pulse: Callable[[], None], client: Any
+) -> Generator[Outcome]:
     from distributed import wait
 
     sweep = uuid4().hex
     futures: dict[Any, Task] = {}
+    patience = _Patience()
     try:
         while True:
-            threads = max(1, sum(client.nthreads().values()))
-            room = TASKS_A_THREAD * threads - len(futures)
+            threads = sum(client.nthreads().values())
+            patience.watch(threads)
+            room = TASKS_A_THREAD * max(1, threads) - len(futures)
             for task in islice(tasks, max(0, room)):
                 key = f"phonotaxis-{sweep}-{task.point.index}"
                 futures[client.submit(_run_remotely, task, key=key)] = task

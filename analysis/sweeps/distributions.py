@@ -17,8 +17,6 @@ from systems.framework.parameters import (
     Point,
 )
 
-__all__ = ["Boxes", "Distribution", "Sector"]
-
 #: Differences of such numbers are finite, and such integers are exact as floats.
 Number = Annotated[float, Field(ge=-1e300, le=1e300)]
 Integer = Annotated[int, Field(ge=-(2**53), le=2**53)]
@@ -172,7 +170,8 @@ class Distribution(Parameters):
         for change in _CHANGES:
             if getattr(self, change) is not None and not self.numeric:
                 raise InputError(
-                    change, f"changes numbers, which {name} does not draw; remove it"
+                    change,
+                    f"applies to numbers, and {name} does not draw numbers; remove it",
                 )
         return self
 

@@ -16,20 +16,6 @@ from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
 from diagrams.stop_rules import SUCCESSFUL
 
-__all__ = [
-    "QUANTITIES",
-    "Marginal",
-    "Quantity",
-    "by_cell",
-    "cell_label",
-    "ended",
-    "figure_table",
-    "marginal",
-    "quantities",
-    "short",
-    "shown",
-]
-
 #: A drawn number is cut into at most so many bins, of so many runs or more.
 MOST_BINS, LEAST_RUNS = 8, 20
 

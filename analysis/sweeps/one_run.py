@@ -5,8 +5,8 @@ from __future__ import annotations
 import io
 import json
 import math
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -17,24 +17,24 @@ from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
+from diagrams.own_code import code_of_sweep, is_interrupt
 from diagrams.run_parameters import Engine
+from diagrams.scenario_warnings.warnings_of import warnings_of
 from diagrams.stop_rules import Collision
 from systems.framework.input_error import shortened
-
-__all__ = [
-    "Outcome",
-    "Task",
-    "lost_outcome",
-    "parquet_bytes",
-    "require_runs",
-    "results_table",
-    "run_task",
-]
 
 #: Cause in the row of a run that raised an error.
 FAILED = "failed"
 _FIRST = ("index", "cell", "run", "seed", "redraws")
 _TEXTS = ("cause", "collision_object", "collision_fault")
+#: Kinds of the values of a row as they come back from JSON.
+_NUMBER, _TEXT = (float, int, type(None)), (str, type(None))
+_KINDS: dict[str, Any] = {
+    **dict.fromkeys(_FIRST, int),
+    **dict.fromkeys((*_TEXTS, "engine", "error"), _TEXT),
+    **dict.fromkeys(("collision_time_s", "simulated_s", "wall_s"), _NUMBER),
+    **dict.fromkeys(("fields", "robots", "metrics"), dict),
+}
 
 
 @dataclass(frozen=True)
@@ -47,6 +47,8 @@ class Task:
     """What runs it."""
     trajectory: bool
     """Whether the trajectory is wanted."""
+    files: Mapping[str, str] = field(default_factory=dict)
+    """SHA-256 of the files that the sweep began with, by their absolute paths."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +59,8 @@ class Outcome:
     """Plain values: the point's own (``fields`` a mapping), ``cause``,
     ``collision_object``, ``collision_fault``, ``collision_time_s``, ``robots`` (the
     same of each of several, ``<name>.cause`` ...), ``metrics``
-    (a mapping), ``simulated_s``, ``wall_s``, ``engine`` and ``error``."""
+    (a mapping), ``simulated_s``, ``wall_s``, ``engine``, ``error`` and ``warnings`` (a
+    list of mappings with ``field`` and ``message``)."""
     trajectory: bytes | None = None
     """A Parquet file."""
 
@@ -66,10 +69,13 @@ def run_task(task: Task) -> Outcome:
     """Runs a point. Whatever the run raises becomes its row."""
     start = perf_counter()
     try:
-        result = simulate(task.scenario, engine=task.engine)
+        with code_of_sweep(task.scenario, task.files):
+            result = simulate(task.scenario, engine=task.engine)
         row = _row(task, result.cause, start, result)
         trajectory = parquet_bytes(result.trajectory) if task.trajectory else None
-    except (Exception, SystemExit) as error:  # noqa: BLE001  # the rest must go on
+    except BaseException as error:  # the other runs must go on
+        if is_interrupt(error):
+            raise
         text = " ".join(f"{type(error).__name__}: {error}".split())
         return Outcome(_row(task, FAILED, start, error=text))
     return Outcome(row, trajectory)
@@ -131,6 +137,7 @@ def _row(
         "simulated_s": result.simulated_s if result else None,
         "engine": task.engine,
         "error": error,
+        "warnings": [asdict(each) for each in warnings_of(task.scenario)],
         "wall_s": perf_counter() - start,
     }
 
@@ -143,13 +150,23 @@ def _ending(cause: str, hit: Collision | None) -> dict[str, Any]:
     }
 
 
+def is_row(value: Any) -> bool:
+    """Whether a value from a JSON file can be a row of ``Outcome``."""
+    return (
+        isinstance(value, dict)
+        and all(isinstance(value.get(name, ...), kind) for name, kind in _KINDS.items())
+        and all(isinstance(number, _NUMBER) for number in value["metrics"].values())
+        and all(isinstance(text, _TEXT) for text in value["robots"].values())
+    )
+
+
 def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
     """The rows of ``Outcome`` by index, the same in whatever order they came.
 
     Returns:
         A column for each of the row's own values, for each field by its dotted
         path, and for each metric; numbers are float64 but for indices and
-        seeds, missing ones NaN. Fields that are lists or mappings, or of
+        seeds, missing ones NaN. Warnings, and fields that are lists or mappings, or of
         several kinds, are JSON text.
     """
     ordered = sorted(rows, key=lambda row: int(row["index"]))
@@ -170,6 +187,8 @@ def results_table(rows: Iterable[dict[str, Any]]) -> pd.DataFrame:
         columns[name] = _numbers(row[name] for row in ordered)
     for name in ("engine", "error"):
         columns[name] = pd.array([row[name] for row in ordered], dtype="str")
+    warnings = [json.dumps(row["warnings"]) for row in ordered]
+    columns["warnings"] = pd.array(warnings, dtype="str")
     return pd.DataFrame(columns)
 
 

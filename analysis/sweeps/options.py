@@ -7,8 +7,6 @@ from pathlib import Path
 from analysis.reporting.result_directory import check_directory
 from systems.framework.input_error import InputError
 
-__all__ = ["MOST_WORKERS", "check_options"]
-
 #: Processes, each of some 300 MB.
 MOST_WORKERS = 256
 
@@ -34,7 +32,9 @@ def check_options(
     if workers is not None and not 1 <= workers <= MOST_WORKERS:
         raise InputError("workers", f"{workers} must lie between 1 and {MOST_WORKERS}")
     if scheduler is not None and workers is not None:
-        raise InputError("workers", "a cluster has its own; leave out --workers")
+        raise InputError(
+            "workers", "a cluster has its own workers; leave out --workers"
+        )
     if resume and out is None:
         raise InputError("out", "--resume needs the directory to go on with; name it")
     if out is None:

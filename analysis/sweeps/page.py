@@ -14,20 +14,20 @@ from analysis.reporting.html_page import (
     definitions,
     figure_html,
     heading,
+    note,
     page,
     paragraph,
     section,
     table,
 )
 from analysis.reporting.plain_values import write_json
+from analysis.runs.run_table import warning_counts
 from analysis.sweeps.estimates import by_cell, cell_label, ended, figure_table
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.plots import grid_axes, plot_heat_maps, plot_line, plot_marginal
 from analysis.sweeps.sweep import reproducing_command
 from diagrams.stop_rules import SUCCESSFUL
-
-__all__ = ["sweep_page", "write_sweep"]
 
 #: Pages stay readable: so many maps, and so many commands for errors and others.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10
@@ -80,7 +80,7 @@ def sweep_page(
         **(cells if few else {}),
         "Over the grid": _maps(plan, results),
         "Over the draws": _marginals(plan, results),
-        "Runs to look at": _commands(points, results, Path(summary["out"])),
+        "Example runs": _commands(points, results, Path(summary["out"])),
         **({} if few else cells),
     }
     shown = {title: inner for title, inner in parts.items() if inner}
@@ -100,7 +100,7 @@ def _about(
     plan: SweepPlan, results: pd.DataFrame, summary: dict[str, Any]
 ) -> list[str]:
     causes = results["cause"].value_counts()
-    draws = "all cells have the same" if plan.pair else "each cell has its own"
+    draws = "all cells have equal" if plan.pair else "each cell has its own"
     rows = [
         ("Scenario", plan.scenario),
         ("Runs", f"{len(results)}: {plan.runs} in each of {len(plan.cells())} cells"),
@@ -116,12 +116,20 @@ def _about(
         ("Simulated", f"{summary['timing']['simulated_s'] / 3600.0:.2f} h"),
         ("Versions", ", ".join(f"{k} {v}" for k, v in summary["versions"].items())),
     ]
+    warnings = [
+        note(
+            f"Warning in {each.runs} of {len(results)} runs: `{each.field}`: "
+            f"{each.message}"
+        )
+        for each in warning_counts(results)
+    ]
     return [
+        *warnings,
         definitions(rows),
         paragraph(
             "Brackets and bars are 95 % intervals: Wilson's for shares of runs, order "
-            "statistics for medians. Runs that raised an error are in no figure but "
-            "the count of them."
+            "statistics for medians. Runs that raised an error count as errors only; "
+            "no other number includes them."
         ),
     ]
 
@@ -135,16 +143,18 @@ def _causes(plan: SweepPlan, results: pd.DataFrame) -> str:
     order = results["cause"].value_counts().index
     good = [cause for cause in SUCCESSFUL if cause in order]
     causes = [*good, *(cause for cause in order if cause not in good)]
+    warned = ["with warnings"] if warning_counts(results) else []
     rows: list[list[Cell]] = []
     for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True):
         counts = [int((runs["cause"] == cause).sum()) for cause in causes]
+        counts += [int((runs["warnings"] != "[]").sum()) for _ in warned]
         rows.append([cell_label(fields), len(runs), *counts])
-    return table(["cell", "runs", *causes], rows, caption="Runs by cause")
+    return table(["cell", "runs", *causes, *warned], rows, caption="Runs by cause")
 
 
 def _figures(plan: SweepPlan, results: pd.DataFrame) -> str:
     titles, rows = figure_table(plan, results)
-    return table(["cell", *titles], rows, caption="Figures with 95 % intervals")
+    return table(["cell", *titles], rows, caption="Metrics with 95 % intervals")
 
 
 def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
@@ -152,7 +162,7 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
     if not axes:
         return []
     if len(axes) == 1 and len(plan.grid) == 1:
-        caption = f"Every figure over `{axes[0]}`."
+        caption = f"Every metric over `{axes[0]}`."
         return [figure_html(plot_line(plan, results, axes[0]), "line", caption)]
     (x, y), others = _map_axes(plan)
     cases = [
@@ -163,7 +173,8 @@ def _maps(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
         figure_html(
             plot_heat_maps(plan, results, x, y, rest),
             f"map{k}",
-            f"Every figure over `{x}` and `{y}`, lighter is more: {cell_label(rest)}.",
+            f"Every metric over `{x}` and `{y}`; lighter means more: "
+            f"{cell_label(rest)}.",
             scale=True,
         )
         for k, rest in enumerate(cases[:MOST_MAPS])
@@ -185,7 +196,7 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
         figure_html(
             plot_marginal(plan, results, key),
             f"marginal{k}",
-            f"Every figure over `{key}`, in bins of as many runs each.",
+            f"Every metric over `{key}`, in bins with equal numbers of runs.",
         )
         for k, (key, drawn) in enumerate(plan.draw.items())
         # No two lists of boxes are the same: there is nothing to plot over.
@@ -195,7 +206,7 @@ def _marginals(plan: SweepPlan, results: pd.DataFrame) -> list[str]:
 
 def _commands(points: list[SweepPoint], results: pd.DataFrame, out: Path) -> list[str]:
     """The first runs of each cause that is no success, with their commands."""
-    parts = [paragraph("Each command does one run again, with its replay.")]
+    parts = [paragraph("Each command repeats one run and makes its replay.")]
     causes = [c for c in results["cause"].value_counts().index if c not in SUCCESSFUL]
     for cause in sorted(causes, key=lambda cause: cause != FAILED):
         runs = results[results["cause"] == cause]
@@ -221,5 +232,5 @@ def _remark(row: dict[str, Any]) -> str:
     if row["cause"] == FAILED:
         return f"{row['error']}: "
     if row["cause"] == "collision":
-        return f"{row['collision_object']}, by the {row['collision_fault']}'s fault: "
+        return f"{row['collision_object']}, fault of the {row['collision_fault']}: "
     return ""

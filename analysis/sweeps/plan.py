@@ -21,7 +21,7 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from analysis.sweeps.sweep_file import read_sweep
-from diagrams.fields import explain
+from diagrams.fields.explain import explain
 from diagrams.loading import (
     load_scenario,
     resolve_sound,
@@ -33,8 +33,6 @@ from diagrams.scenario import Scenario
 from diagrams.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
-
-__all__ = ["SweepPlan", "SweepPoint", "dump_plan", "load_sweep"]
 
 GridValues = Annotated[tuple[Any, ...], Strict(False), Field(min_length=1)]
 #: All are drawn and checked before the first one runs, a millisecond each.
@@ -63,7 +61,7 @@ class SweepPoint:
 
 
 class SweepPlan(Parameters):
-    """What a sweep runs; see docs/sweeps.md.
+    """What a sweep runs; see docs/compare.md.
 
     Paths are those of ``--set``. A key of ``draw`` may list several paths,
     parted by commas, which all get the one value that is drawn.
@@ -110,21 +108,21 @@ class SweepPlan(Parameters):
             for text in texts:
                 if texts.count(text) > 1:
                     raise InputError(
-                        f"grid.{key}", f"{text} stands there twice; drop one"
+                        f"grid.{key}", f"{text} is listed twice; remove one"
                     )
         for key, distribution in self.draw.items():
             each, count = distribution.each, len(_paths(key))
             if each is not None and len(each) != count:
                 raise InputError(
                     f"draw.{key}.each",
-                    f"has {len(each)} pairs for {count} paths; give one each",
+                    f"has {len(each)} pairs for {count} paths; give one pair per path",
                 )
         total = self.runs * self.cell_count
         if total > MOST_RUNS:
             raise InputError(
                 "grid",
                 f"its cells with {self.runs} runs each make {total} runs; at most "
-                f"{MOST_RUNS} are possible, so narrow grid or lower runs",
+                f"{MOST_RUNS} are possible, narrow grid or lower runs",
             )
         for part in ("set", "grid"):
             _check_plain(part, getattr(self, part))
@@ -344,7 +342,9 @@ def _texts(key: str, value: Any) -> Iterator[tuple[str, str]]:
 
 def _check_path(field: str, path: str, earlier: list[str]) -> None:
     if not all(path.split(".")):
-        raise InputError(field, "is no dotted path, as source.speed_m_s; mend it")
+        raise InputError(
+            field, "is not a dotted path like source.speed_m_s; correct it"
+        )
     if path == "seed":
         raise InputError(
             field, "every run gets a seed of its own; set the sweep's own seed"
@@ -352,7 +352,7 @@ def _check_path(field: str, path: str, earlier: list[str]) -> None:
     for other in earlier:
         if path == other or other.startswith(f"{path}."):
             raise InputError(
-                field, f"would overwrite {other}, which comes before it; drop one"
+                field, f"would overwrite {other}, which precedes it; remove one of them"
             )
 
 
@@ -364,8 +364,8 @@ def _check_presets(part: str, keys: Iterable[str], fixed: list[str]) -> None:
             if f"{other}.".startswith(f"{group}."):
                 raise InputError(
                     f"{part}.{path}",
-                    f"begins {group} anew, without {other} of set; give that in grid, "
-                    "too",
+                    f"replaces all of {group}, without {other} from set; give this "
+                    "field in grid, too",
                 )
 
 
@@ -375,6 +375,6 @@ def _check_plain(part: str, value: Any) -> None:
     except (TypeError, ValueError):
         raise InputError(
             part,
-            "values must be finite numbers, texts, truth values, lists or "
-            "mappings; quote what is meant as text",
+            "values must be finite numbers, texts, truth values, lists or mappings; "
+            "put quotes around text",
         ) from None

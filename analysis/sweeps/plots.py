@@ -25,8 +25,6 @@ from analysis.sweeps.estimates import (
 )
 from analysis.sweeps.plan import SweepPlan
 
-__all__ = ["plot_heat_maps", "plot_line", "plot_marginal"]
-
 WIDTH_IN = 9.0
 #: Cells beside one another that have room for their numbers, and values for names.
 MOST_NUMBERS, MOST_TICKS = 8, 20

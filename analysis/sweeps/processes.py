@@ -16,8 +16,6 @@ from analysis.run_error import RunError
 from analysis.sweeps.one_run import Outcome, Task, lost_outcome
 from analysis.sweeps.worker import READY
 
-__all__ = ["WorkerError", "WorkerProcess", "run_locally"]
-
 #: How often a run is tried whose worker ends before it answers.
 ATTEMPTS = 2
 #: Tasks that a worker has at once, so that it never waits for the next one.
@@ -42,12 +40,14 @@ class WorkerProcess:
         self.ready = False
         # With several threads a worker would be slower, and its sums different.
         threads = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+        # Drake cannot be loaded where the locale's encoding is ASCII.
+        encoding = {"PYTHONUTF8": "1"}
         paths = os.pathsep.join(path or os.getcwd() for path in sys.path)  # noqa: PTH109
         with theirs:
             self._process = subprocess.Popen(
                 [sys.executable, "-P", "-c", _MAIN, str(theirs.fileno())],
                 pass_fds=[theirs.fileno()],
-                env={**os.environ, **threads, "PYTHONPATH": paths},
+                env={**os.environ, **threads, **encoding, "PYTHONPATH": paths},
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 start_new_session=True,
@@ -77,7 +77,7 @@ class WorkerProcess:
             if self.ready:
                 raise EOFError from None
             raise WorkerError(
-                "a worker process could not start; what it printed says why"
+                "a worker process could not start; see its output for the reason"
             ) from None
         if message == READY:
             self.ready = True

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import fcntl
 import json
+import logging
 import os
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -20,13 +22,13 @@ from ruamel.yaml.error import YAMLError
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
 from analysis.reporting.result_directory import whole_directory
 from analysis.run_error import RunError
-from analysis.sweeps.one_run import Outcome, parquet_bytes, results_table
-from analysis.sweeps.plan import SweepPlan, dump_plan
+from analysis.sweeps.one_run import Outcome, is_row, parquet_bytes, results_table
+from analysis.sweeps.plan import SweepPlan, SweepPoint, dump_plan
 from diagrams import write_scenario
 from diagrams.loading import scenario_from_mapping
-from systems.framework.input_error import InputError
+from systems.framework.input_error import InputError, shortened
 
-__all__ = ["StoreError", "SweepStore", "load_results", "trajectory_path"]
+_LOGGER = logging.getLogger("phonotaxis")
 
 JOURNAL, TABLE = "runs.jsonl", "runs.parquet"
 MANIFEST, PLAN = "sweep.json", "sweep.yaml"
@@ -39,12 +41,15 @@ class StoreError(RunError):
 class SweepStore:
     """An open directory of a sweep, which no other process can open."""
 
-    def __init__(self, out: Path | None, plan: SweepPlan) -> None:
+    def __init__(
+        self, out: Path | None, plan: SweepPlan, points: Sequence[SweepPoint]
+    ) -> None:
         """Opens the directory of this plan, or makes it where there is none.
 
         Args:
             out: The directory; none: the next number under results/.
             plan: What to run.
+            points: All runs of the plan, by index.
 
         Raises:
             InputError: It holds something else, cannot be written, or is in
@@ -61,25 +66,38 @@ class SweepStore:
                     _make(directory, plan)
             self._lock = _locked(self.out / MANIFEST)
         except BlockingIOError:
-            raise InputError("out", f"another process works in {out}; wait") from None
+            raise InputError(
+                "out", f"another process uses {out}; wait until it ends"
+            ) from None
         except OSError as error:
             raise _unwritable(out, error) from None
         try:
-            self._open()
+            self._open(points)
+        except InputError:
+            self.close()
+            raise
         except OSError as error:
             self.close()
             raise _unwritable(self.out, error) from None
 
-    def _open(self) -> None:
-        """Finds what is done, and cuts off a line that a crash left unfinished."""
+    def _open(self, points: Sequence[SweepPoint]) -> None:
+        """Finds what is done, and drops lines that are no runs of the plan."""
         path = self.out / JOURNAL
         if (self.out / TABLE).exists() and not path.exists():
-            self.done = set(load_results(self.out)["index"])
+            _check_table(self.out, points)
+            self.done = set(range(len(points)))
             return
         lines = path.read_bytes().splitlines(keepends=True) if path.exists() else []
-        rows = [row for line in lines if (row := _parse(line)) is not None]
-        self.done = {row["index"] for row in rows}
-        whole = b"".join(line for line in lines if _parse(line) is not None)
+        kept, dropped = _runs_of(points, lines)
+        if dropped:
+            numbers = shortened(", ".join(map(str, dropped)), 60)
+            _LOGGER.warning(
+                "%s: %d lines do not belong to this sweep, or contradict other lines "
+                "(line %s); they are dropped, and missing runs are repeated",
+                *(path, len(dropped), numbers),
+            )
+        self.done = set(kept)
+        whole = b"".join(kept.values())
         if whole != b"".join(lines):
             _write_whole(path, whole)
         self._journal = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
@@ -125,7 +143,7 @@ class SweepStore:
     def _stopped(self, error: OSError) -> StoreError:
         return StoreError(
             f"{self.out} cannot be written ({error.strerror}); the {len(self.done)} "
-            "runs that are done are kept: make room and go on with --resume"
+            "finished runs are kept: free space on the disk and continue with --resume"
         )
 
     def close(self) -> None:
@@ -171,8 +189,8 @@ def trajectory_path(out: Path, index: int) -> Path:
 
 def _unwritable(out: Path | None, error: OSError) -> StoreError:
     return StoreError(
-        f"{out or 'results'} cannot be written ({error.strerror}); make room, or name "
-        "another directory with --out"
+        f"{out or 'results'} cannot be written ({error.strerror}); free space on the "
+        "disk, or name another directory with --out"
     )
 
 
@@ -232,18 +250,61 @@ def _check_same(out: Path, plan: SweepPlan) -> None:
     if parts:
         raise InputError(
             "out",
-            f"the runs in {out} were made with {', '.join(parts)}; install that, "
-            "or name another directory",
+            f"the runs in {out} were made with {', '.join(parts)}; install these "
+            "versions, or name another directory",
+        )
+
+
+def _runs_of(
+    points: Sequence[SweepPoint], lines: Sequence[bytes]
+) -> tuple[dict[int, bytes], list[int]]:
+    """The lines of runs of a plan by index, and the numbers of other lines, from 1.
+
+    Of an index with different lines nobody knows which is right: none is taken. A last
+    line that a crash left unfinished is among neither.
+    """
+    found: dict[int, dict[bytes, int]] = {}
+    others = []
+    for number, line in enumerate(lines, 1):
+        row = _parse(line)
+        if row is not None and _is_run_of(points, row):
+            found.setdefault(row["index"], {}).setdefault(line, number)
+        elif line.endswith(b"\n"):
+            others.append(number)
+    kept = {index: next(iter(own)) for index, own in found.items() if len(own) == 1}
+    doubtful = (own.values() for own in found.values() if len(own) > 1)
+    return kept, sorted([*others, *(number for own in doubtful for number in own)])
+
+
+def _is_run_of(points: Sequence[SweepPoint], row: dict[str, Any]) -> bool:
+    """Whether a row has the index, seed and fields of one of the points."""
+    if not 0 <= row["index"] < len(points):
+        return False
+    point = vars(points[row["index"]])
+    return json.dumps({name: row[name] for name in point}) == json.dumps(point)
+
+
+def _check_table(out: Path, points: Sequence[SweepPoint]) -> None:
+    """Refuses a table of all runs that are not those of the plan."""
+    table = load_results(out)
+    own = [(point.index, point.seed) for point in points]
+    if not {"index", "seed"} <= {*table} or own != [
+        *zip(table["index"], table["seed"], strict=True)
+    ]:
+        raise InputError(
+            "out",
+            f"{out / TABLE} does not hold the runs of this sweep; remove it to repeat "
+            "them, or name another directory",
         )
 
 
 def _parse(line: bytes) -> dict[str, Any] | None:
-    """A row; none where a crash left half a line."""
+    """A row; none where a crash left half a line, or where there is something else."""
     if not line.endswith(b"\n"):
         return None
-    with suppress(ValueError):
-        row = json.loads(line)
-        if isinstance(row, dict) and isinstance(row.get("index"), int):
+    with suppress(ValueError, RecursionError):
+        row: dict[str, Any] = json.loads(line)
+        if is_row(row):
             return row
     return None
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +11,11 @@ import pandas as pd
 
 from analysis.reporting.intervals import Estimate
 from analysis.reporting.provenance import SCHEMA_VERSION, versions
+from analysis.runs.run_table import warning_counts
 from analysis.sweeps.estimates import QUANTITIES, Quantity, by_cell, ended, figure_table
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.sweep import reproducing_command
-
-__all__ = ["sweep_summary", "sweep_text"]
 
 #: Columns that are no metrics.
 _NO_METRICS = ("index", "cell", "run", "seed", "redraws", "wall_s")
@@ -43,6 +43,7 @@ def sweep_summary(
         "seed": plan.seed,
         "runs": len(results),
         "failed": len(failed),
+        "warnings": [asdict(each) for each in warning_counts(results)],
         "cells": [
             _cell(plan, fields, runs)
             for fields, runs in zip(plan.cells(), by_cell(plan, results), strict=True)
@@ -79,6 +80,7 @@ def _cell(
         "fields": fields,
         "runs": len(runs),
         "causes": {str(cause): int(count) for cause, count in causes.items()},
+        "warnings": [asdict(each) for each in warning_counts(runs)],
         **{q.name: _plain(q.estimate(whole), "estimate") for q in QUANTITIES if q.rate},
         "metrics": {q.name: _plain(q.estimate(whole), "median") for q in metrics},
     }
@@ -90,7 +92,7 @@ def _plain(estimate: Estimate, name: str) -> dict[str, float | None]:
 
 
 def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
-    """A line a cell, with 95 % intervals.
+    """A line a cell, with 95 % intervals, and a line for each field with warnings.
 
     Args:
         plan: What was run.
@@ -111,4 +113,8 @@ def sweep_text(plan: SweepPlan, results: pd.DataFrame) -> str:
     failed = int((results["cause"] == FAILED).sum())
     if failed:
         lines.append(f"{failed} of {len(results)} runs failed with an error")
+    lines += (
+        f"Warning in {each.runs} of {len(results)} runs: {each.field}: {each.message}"
+        for each in warning_counts(results)
+    )
     return "\n".join(lines)

@@ -17,13 +17,11 @@ import pandas as pd
 from analysis.sweeps.one_run import Outcome, Task
 from analysis.sweeps.options import check_options
 from analysis.sweeps.plan import SweepPlan, SweepPoint
-from analysis.sweeps.processes import run_locally
+from analysis.sweeps.processes import WorkerError, run_locally
 from analysis.sweeps.store import StoreError, SweepStore, load_results
 from diagrams import Scenario, build_sound_follower, prepared_loop
 from diagrams.run_parameters import MANY_RUNS, Engine
 from systems.framework.input_error import InputError
-
-__all__ = ["PreparedSweep", "prepare_sweep", "reproducing_command", "run_sweep"]
 
 _LOGGER = logging.getLogger("phonotaxis")
 
@@ -70,19 +68,24 @@ class PreparedSweep:
                     for outcome in outcomes:
                         self.store.add(outcome)
                 self.store.write_table(complete=True)
-            except BaseException:
+            except BaseException as error:
                 with suppress(StoreError):
                     self.store.write_table(complete=False)
+                if isinstance(error, WorkerError) and self.store.done:
+                    raise WorkerError(
+                        f"{error}; {len(self.store.done)} of {len(self.points)} runs "
+                        f"are kept in {self.store.out}: continue with --resume"
+                    ) from error
                 raise
         return load_results(self.store.out)
 
     def _tasks(self) -> Iterator[Task]:
-        done = frozenset(self.store.done)
+        done, files = frozenset(self.store.done), self.plan.file_digests
         for point in self.points:
             if point.index not in done:
                 scenario = self.plan.scenario_of(point)
                 engine = self.engine(scenario)
-                yield Task(point, scenario, engine, self.plan.trajectories)
+                yield Task(point, scenario, engine, self.plan.trajectories, files)
 
     def engine(self, scenario: Scenario) -> Engine:
         """What runs a scenario of the sweep."""
@@ -125,7 +128,7 @@ def prepare_sweep(
         from analysis.sweeps.dask_cluster import connect, run_on_cluster
 
         runner = partial(run_on_cluster, client=connect(scheduler))
-    store = SweepStore(directory, plan)
+    store = SweepStore(directory, plan, points)
     return PreparedSweep(plan, points, store, runner, compiled)
 
 

@@ -8,8 +8,6 @@ from typing import Any
 from diagrams.loading import read_mapping
 from systems.framework.input_files import require_file
 
-__all__ = ["SWEEP_SCHEMA_FILE", "read_sweep"]
-
 SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")
 
 

@@ -18,8 +18,6 @@ from multiprocessing.connection import Connection
 from analysis.sweeps.one_run import Task, run_task
 from diagrams import build_sound_follower, load_compiled_code, prepared_loop
 
-__all__ = ["READY", "main"]
-
 READY = "ready"
 RUNS_PER_CHILD = {"drake": 50, "compiled": 1000}
 
@@ -62,7 +60,7 @@ def _survives(work: Callable[[], None]) -> bool:
 
 def _warm(task: Task) -> None:
     """Loads compiled functions. An error here comes again with the run itself."""
-    with contextlib.suppress(Exception, SystemExit):
+    with contextlib.suppress(BaseException):
         if task.engine == "compiled":
             prepared_loop(task.scenario)
         else:

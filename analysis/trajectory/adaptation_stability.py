@@ -22,19 +22,6 @@ from systems.laws.trajectory.reference_model import held_matrices
 from systems.laws.trajectory.sampled_bounds import pull_through_m
 from systems.laws.trajectory.trajectory_impedance import target_force
 
-__all__ = [
-    "AdaptationStability",
-    "CriticalRate",
-    "Cure",
-    "Drift",
-    "Jam",
-    "LyapunovRun",
-    "adaptation_stability",
-    "critical_rate",
-    "drift_stiffness",
-    "swinging_target",
-]
-
 #: Length of a run that learns, and of one that looks for a critical rate, s.
 _LEARN_S, _CRITICAL_S = 60.0, 60.0
 #: Gains that the learning starts from, of the wanted ones.
@@ -198,7 +185,7 @@ def adaptation_stability(scenario: Scenario) -> AdaptationStability:
     ):
         raise InputError(
             "law",
-            f"nothing of {scenario.law!r} adapts; use trajectory_adaptive with a rule",
+            f"{scenario.law!r} has no adaptation; use trajectory_adaptive with a rule",
         )
     mass, rule = scenario.robot.mass_kg, own.adaptation
     frequency, ratio = own.reference.poles(mass, own.stiffness_n_m, own.damping_n_s_m)
@@ -428,24 +415,24 @@ def _cures(own: AdaptationParameters) -> tuple[Cure, ...]:
             "box",
             "projected",
             own.projected,
-            "holds K and D within bounds, and leaves them there",
+            "keeps K and D within bounds, and does not bring them back",
         ),
         Cure(
             "leak",
             "leakage",
             own.leakage > 0.0,
-            "brings K and D back, and bounds a drift by its rate",
+            "brings K and D back, and bounds a drift through the leakage rate",
         ),
         Cure(
-            "normalisation",
+            "normalization",
             "normalisation",
             own.normalisation is not None,
-            "bounds the rate whatever the amplitude, and not the drift",
+            "bounds the rate for all amplitudes, and does not bound the drift",
         ),
         Cure(
             "freeze",
             "freezes",
             own.freezes,
-            "learns nothing from a contact, and all from what comes after it",
+            "does not learn during a contact, and learns from all motion after it",
         ),
     )

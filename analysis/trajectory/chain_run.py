@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from analysis.trajectory.robot_chain import (
@@ -21,6 +20,7 @@ from analysis.trajectory.robot_chain import (
 from analysis.trajectory.route_loop import route_law
 from diagrams.scenario import Scenario
 from systems.base.wheel_speed_command import clamped_velocity, integrate_velocity
+from systems.framework.compiling import njit
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
     contact_force,
@@ -30,8 +30,6 @@ from systems.laws.trajectory.trajectory_impedance import (
 )
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-
-__all__ = ["BrakedChain", "ChainRun", "brake_chain", "run_chain", "shake_chain"]
 
 #: Robots of a simulated chain, the first one among them.
 _ROBOTS = ROBOTS[-1]

@@ -31,16 +31,6 @@ from systems.laws.trajectory.sampled_bounds import (
 )
 from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
-__all__ = [
-    "WELL_DAMPED",
-    "FrozenPoint",
-    "GainBounds",
-    "axis_damping_ratio",
-    "damped_stiffness",
-    "frozen_gains",
-    "gain_bounds",
-]
-
 #: The damping ratio that is asked for.
 WELL_DAMPED = 0.7
 #: Ages of the place that the bounds are for, ticks: as built, and a processor's more.

@@ -6,10 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.trajectory.impedance_adaptation import (
     AdaptationNumbers,
@@ -32,8 +32,6 @@ from systems.laws.trajectory.trajectory_impedance import (
 )
 from systems.ranging.objects import KNOWN, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-
-__all__ = ["PointLoop", "PointRun", "run_point"]
 
 #: Farther objects are not there, m.
 _FAR_M = 1e6

@@ -12,31 +12,15 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
 
 from analysis.linear.contact_mode import motion_chain
+from analysis.linear.frequency_levels import frequency_grid
 from analysis.trajectory.route_loop import contact_gains, route_law
 from diagrams.scenario import Scenario
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 from systems.laws.trajectory.trajectory_impedance import contact_numbers
 
-__all__ = [
-    "ROBOTS",
-    "ChainLinks",
-    "ChainPeak",
-    "RobotChain",
-    "chain_matrix",
-    "chain_peak",
-    "chain_response",
-    "chain_spacings",
-    "disc_offsets",
-    "least_damping",
-    "links_of",
-    "most_feed_forward",
-    "resting_gaps",
-    "robot_chain",
-]
-
 #: Numbers of robots in the chains that are looked at, the first one among them.
 ROBOTS = tuple(range(2, 9))
-#: Frequencies that are looked at, from here to Nyquist's, rad/s.
+#: Frequencies that are looked at besides the modes, from here to Nyquist's, rad/s.
 _LOWEST, _POINTS = 1e-2, 600
 #: A peak that is no more than this above 1 is none: at rest the response is 1.
 _ROUNDING = 1e-6
@@ -142,7 +126,7 @@ def robot_chain(scenario: Scenario) -> RobotChain:
         "with feed-forward": (1.0, apart),
         "without feed-forward": (0.0, apart),
         "in contact, with feed-forward": (1.0, near),
-        "in contact, without": (0.0, near),
+        "in contact, without feed-forward": (0.0, near),
     }
     if own.contact_stiffness_n_m == 0.0 and own.contact_damping_n_s_m == 0.0:
         kinds = dict(list(kinds.items())[:2])
@@ -327,7 +311,7 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
     """
     most = ROBOTS[-1]
     links = {n: links_of(scenario, feed_forward, spacing_m, n) for n in ROBOTS}
-    omega = _grid(scenario)
+    omega = _grid(scenario, links[most])
     tail = {n: _stable_peak(scenario, each) for n, each in links.items()}
     return ChainPeak(
         feed_forward=feed_forward,
@@ -341,15 +325,17 @@ def chain_peak(scenario: Scenario, feed_forward: float, spacing_m: float) -> Cha
     )
 
 
-def _grid(scenario: Scenario) -> NDArray[np.float64]:
-    return np.geomspace(_LOWEST, math.pi / scenario.tick_s, _POINTS)
+def _grid(scenario: Scenario, links: Sequence[ChainLinks]) -> NDArray[np.float64]:
+    """Frequencies that show every mode of the chain, however lightly damped."""
+    poles = np.linalg.eigvals(chain_matrix(scenario, links)).astype(np.complex128)
+    return frequency_grid(poles, scenario.tick_s, lowest=_LOWEST, points=_POINTS)
 
 
 def _peak(
     scenario: Scenario, links: Sequence[ChainLinks], robot: int = -1
 ) -> tuple[float, float]:
     """Largest amplification of one of them, and its frequency, rad/s."""
-    omega = _grid(scenario)
+    omega = _grid(scenario, links)
 
     def size(at: ArrayLike) -> NDArray[np.float64]:
         return np.asarray(np.abs(chain_response(scenario, links, at)[:, robot]))

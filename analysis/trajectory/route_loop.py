@@ -30,17 +30,6 @@ from systems.laws.trajectory.trajectory_impedance_controller import (
 from systems.ranging.objects import KNOWN, THERE, X
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-__all__ = [
-    "AXES",
-    "RoutePoint",
-    "acceleration_loop",
-    "contact_gains",
-    "frozen_model",
-    "route_law",
-    "route_points",
-    "whole_route_model",
-]
-
 #: Along the route, and across it.
 AXES = ("along", "across")
 #: What the law commands, and the same before it is joined to the wheels.
@@ -71,8 +60,8 @@ def route_law(scenario: Scenario) -> TrajectoryImpedanceParameters:
         names = ", ".join(name for name, each in LAWS.items() if each.on_route)
         raise InputError(
             "law",
-            f"is {scenario.law!r}, but frozen gains are of a robot that has a route "
-            f"and one of {names}; use one of these",
+            f"is {scenario.law!r}, but frozen gains need a robot with a route and one "
+            f"of the laws {names}; use one of these",
         )
     own: TrajectoryImpedanceParameters = getattr(scenario.repulsion, scenario.law)
     return own
@@ -234,11 +223,13 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     config = simulator_config(scenario)
     unrounded = OdometryParameters(rounding=False)
     odometry = WheelOdometry_[AutoDiffXd](
-        robot=robot, odometry=unrounded, tick_s=tick_s
+        robot=robot, odometry=unrounded, plant=scenario.plant, tick_s=tick_s
     )
     command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
+    # Eq. 6, which stops P, has no linear model.
+    unblocked = own.model_copy(update={"block_distance_m": None})
     law = TrajectoryImpedanceController_[AutoDiffXd](
-        parameters=own, robot=robot, tick_s=tick_s
+        parameters=unblocked, robot=robot, tick_s=tick_s
     )
     driven = block_model(
         DiscreteTimeApproximation(plant, tick_s, config).ToAutoDiffXd(),
@@ -253,7 +244,9 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
         (plant, driven),
         (
             odometry,
-            block_model(odometry, np.array(before), [np.zeros(2)], period_s=tick_s),
+            block_model(
+                odometry, np.array(before), [np.zeros(2), wheels], period_s=tick_s
+            ),
         ),
         (
             law,

@@ -15,14 +15,6 @@ from analysis.trajectory.chain_run import BrakedChain, ChainRun
 from analysis.trajectory.frozen_gains import WELL_DAMPED, FrozenPoint, GainBounds
 from analysis.trajectory.robot_chain import RobotChain
 
-__all__ = [
-    "plot_adaptation",
-    "plot_braked_chains",
-    "plot_chain",
-    "plot_frozen_poles",
-    "plot_gain_bounds",
-]
-
 _LINES = SERIES_COLOURS[1:]
 _MARKS = "osD^v"
 #: Amplifications beyond it are cut off.
@@ -107,11 +99,11 @@ def plot_gain_bounds(bounds: GainBounds) -> Figure:
                 high_k - low_k,
                 facecolor=COLOURS["left"],
                 alpha=0.35,
-                label="box of the adaptation",
+                label="bounds of the adaptation",
             )
         )
-    axes.set_xlabel("all dampers together (N s/m)")
-    axes.set_ylabel("all springs together (N/m)")
+    axes.set_xlabel("sum of all dampers (N s/m)")
+    axes.set_ylabel("sum of all springs (N/m)")
     axes.grid(visible=True, which="both", linewidth=0.3)
     axes.legend(fontsize=8)
     return figure
@@ -140,7 +132,7 @@ def plot_adaptation(found: AdaptationStability) -> Figure:
         color="black",
         label="closed form of the gradient",
     )
-    for k, name in enumerate(("without a cure", "as it is")):
+    for k, name in enumerate(("no remedy", "with the remedies")):
         axes.semilogx(
             drift.curve_s,
             drift.curves_n_m[:, k],
@@ -171,14 +163,14 @@ def plot_chain(chain: RobotChain, runs: Sequence[ChainRun]) -> Figure:
         gain = np.clip(peak.gain[:, 0], 0.0, _HIGHEST)
         left.semilogx(peak.omega, gain, color=_LINES[k], label=name)
     left.set_xlabel("frequency (rad/s)")
-    left.set_ylabel("amplitude of the second, of the first")
+    left.set_ylabel("amplitude of the second robot over the first")
     for k, run in enumerate(runs):
         robots = np.arange(1, len(run.simulated) + 1)
         middle.semilogy(robots, run.predicted, color=_LINES[k], label=run.name)
         middle.semilogy(robots, run.simulated, "o", color=_LINES[k], markersize=4)
     middle.set_xlabel("robot (line: response, dots: simulated)")
-    middle.set_ylabel("amplitude, of the first")
-    for k, name in enumerate(("with feed-forward", "without")):
+    middle.set_ylabel("amplitude over the first robot")
+    for k, name in enumerate(("with feed-forward", "without feed-forward")):
         right.semilogx(
             chain.dampings, chain.peaks_by_damping[:, k], color=_LINES[k], label=name
         )

@@ -18,8 +18,6 @@ from pydrake.systems.framework import Diagram
 from analysis.wiring.wires import Wire, blocks, wires
 from systems.framework.block_facts import STAGES, Stage, block_facts
 
-__all__ = ["block_svg", "write_block_diagram"]
-
 #: Fill of the stages' blocks.
 FILLS: dict[Stage, str] = {
     "world": "#E8EEF4",

@@ -9,8 +9,6 @@ from typing import Any
 from pydrake.systems.framework import Diagram
 from pydrake.systems.primitives import VectorLogSink
 
-__all__ = ["Wire", "blocks", "wires"]
-
 
 @dataclass(frozen=True)
 class Wire:

@@ -1,3 +1,1 @@
 """Saving what is heard and played in a run, as files of sound."""
-
-__all__: list[str] = []

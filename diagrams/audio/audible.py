@@ -7,10 +7,6 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.wav_writer import LARGEST_WAV_BYTES
 
-__all__ = [
-    "check_audible",
-]
-
 #: Of a sample in a file.
 HEARD_BYTES, PLAYED_BYTES = 2, 4
 
@@ -30,7 +26,11 @@ def check_audible(scenario: Scenario) -> None:
     if not listening:
         ideal = any(not own.has_goal for own in robots.values())
         why = " (hearing is 'ideal')" if ideal else ""
-        remedy = "set hearing=audio" if ideal else "run one that follows a sound"
+        remedy = (
+            "set hearing=audio"
+            if ideal
+            else ("use a scenario with a robot that follows a sound")
+        )
         raise InputError(
             "save_audio",
             f"no robot hears sound waves{why}; {remedy}, or leave --save-audio out",
@@ -43,7 +43,7 @@ def check_audible(scenario: Scenario) -> None:
             field = f"robots.{name}." if scenario.robots else ""
             raise InputError(
                 f"{field}microphones.sample_rate_hz",
-                f"{rate} Hz is no whole number, which sound files need; use "
+                f"{rate} Hz is not a whole number, which sound files need; use "
                 f"{round(rate)}, or leave --save-audio out",
             )
         a_second = len(own.robot.microphones_m) * rate * HEARD_BYTES
@@ -55,6 +55,7 @@ def _check_size(whose: str, bytes_a_second: float, duration_s: float) -> None:
     if duration_s > longest:
         raise InputError(
             "duration_s",
-            f"{duration_s:g} s of the sound {whose} are more than the 4 GB that a WAV "
-            f"file can hold; set {int(longest)} or less, or leave --save-audio out",
+            f"{duration_s:g} s of the sound {whose} exceed the 4 GB that a WAV "
+            f"file can hold; set {int(longest)} or less, or leave --save-audio "
+            "out",
         )

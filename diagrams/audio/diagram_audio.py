@@ -11,8 +11,6 @@ from diagrams.stop_rules import ROUNDING_S
 from systems.framework.input_error import InputError
 from systems.hearing.audio_port import read_audio
 
-__all__ = ["DiagramAudio"]
-
 
 class DiagramAudio:
     """Reads what a diagram's microphones hear and loudspeakers play, at every tick.
@@ -71,7 +69,7 @@ class _Ears:
         if not readers:
             raise InputError(
                 "save_audio",
-                f"no block of {name} hears frames on a port 'audio'; leave "
+                f"no block of {name} has an input port 'audio' for frames; leave "
                 "--save-audio out",
             )
         self._reader, self._port = readers[0], readers[0].GetInputPort("audio")

@@ -10,8 +10,6 @@ from systems.base.robot import microphones_B
 from systems.framework.input_error import shortened
 from systems.sound.parameters import MicArrayParameters
 
-__all__ = ["geometry_text"]
-
 #: Places are written to a nanometre: sums of floats have longer tails.
 _LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
 _DECIMALS = 9
@@ -34,9 +32,9 @@ def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
     name = shortened(scenario.name, 60)
     comments = [
         f"Microphones of {robot} in scenario {name}, seed {scenario.seed}.",
-        f"What they heard is in {file}, a channel each, in this order;",
+        f"Their sound is in {file}, one channel per microphone, in this order;",
         f"its full scale is {own.microphones.full_scale} counts of the converter.",
-        "Places in the robot's frame B, m: origin midway between the wheels,",
+        "Positions in the robot's frame B, m: origin midway between the wheels,",
         "x ahead, y to the left.",
         *_faults(own.microphones),
     ]

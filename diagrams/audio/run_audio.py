@@ -25,12 +25,6 @@ from systems.sound.wav_writer import (
     pcm_of_pressure,
 )
 
-__all__ = [
-    "LISTENING",
-    "RunAudio",
-    "played_in_a_tick",
-]
-
 #: Port by which a block says whether it listens; without one, robots always do.
 LISTENING = "listening"
 
@@ -175,7 +169,8 @@ class RunAudio:
         if scenario != self.scenario or self.until_s > 0.0:
             raise InputError(
                 "audio",
-                "was opened for another run; open one for each, from its scenario",
+                "was opened for another run; open a new one for each run, from "
+                "its scenario",
             )
 
     @property

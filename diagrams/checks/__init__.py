@@ -1,3 +1,1 @@
 """What a scenario must have, asked before anything runs."""
-
-__all__: list[str] = []

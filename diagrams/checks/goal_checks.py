@@ -6,15 +6,10 @@ import math
 from collections.abc import Mapping
 from itertools import combinations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from diagrams.participants import FollowerParameters
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
-from systems.world.plane import beyond_rectangle, control_point
-
-__all__ = ["check_goals", "start_note"]
+from systems.world.plane import control_point
 
 
 def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> None:
@@ -35,15 +30,15 @@ def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> 
         if away > farthest_m:
             raise InputError(
                 f"{prefix}route.goal_m",
-                f"({goal[0]:g}, {goal[1]:g}) is {away:.3g} m from the start: beyond "
-                f"stop.diverged_range_m, {farthest_m:g} m, a run counts as diverged; "
-                "raise that, or move the goal",
+                f"({goal[0]:g}, {goal[1]:g}) is {away:.3g} m from the start: "
+                f"beyond stop.diverged_range_m, {farthest_m:g} m, a run counts "
+                "as diverged; raise that range, or move the goal",
             )
         if robot.guard is not None:
             raise InputError(
                 f"{prefix}guard",
-                "is set, but a robot on a route is kept off obstacles by the "
-                "safety_filter of its law alone; leave guard out",
+                "is set, but only the safety_filter of its law keeps a robot on "
+                "a route off obstacles; leave guard out",
             )
     for (_, first), (prefix, second) in combinations(routed.items(), 2):
         apart = math.dist(_goal(first), _goal(second))
@@ -52,34 +47,10 @@ def check_goals(robots: Mapping[str, FollowerParameters], farthest_m: float) -> 
             goal = _goal(second)
             raise InputError(
                 f"{prefix}route.goal_m",
-                f"({goal[0]:g}, {goal[1]:g}) is {apart:.3g} m from another robot's "
-                f"goal, too near for both bodies; move one by {least:.3g} m or more",
+                f"({goal[0]:g}, {goal[1]:g}) is {apart:.3g} m from another "
+                "robot's goal, too near for both bodies; move one of them by "
+                f"{least:.3g} m or more",
             )
-
-
-def start_note(
-    prefix: str, robot: FollowerParameters, known: NDArray[np.float64]
-) -> str:
-    """What a user should know of a start that is nearer to obstacles than the way is.
-
-    Args:
-        prefix: What the robot's fields begin with in a message.
-        robot: The robot.
-        known: (k, 5) obstacles that its map has, in W.
-
-    Returns:
-        A line where P starts within the clearance of one; else empty.
-    """
-    if robot.route is None:
-        return ""
-    off = [math.hypot(*beyond_rectangle(_start(robot), each)) for each in known]
-    nearest, clearance = min(off, default=math.inf), robot.route.clearance_m
-    if not 0.0 < nearest < clearance:
-        return ""
-    return (
-        f"{prefix}start.position_m: P starts {nearest:.3g} m from a known obstacle, "
-        f"within {prefix}route.clearance_m, {clearance:g} m: the way leads off it first"
-    )
 
 
 def _goal(robot: FollowerParameters) -> tuple[float, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -12,13 +12,13 @@ from diagrams.participants import FollowerParameters
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
 from systems.safety.parameters import GuardParameters
-from systems.safety.views import lasting, sensor_sectors, stopping_way
+from systems.safety.views import (
+    PlaceError,
+    place_error,
+    sensor_sectors,
+    stopping_way,
+)
 from systems.world.plane import beyond_rectangle
-
-__all__ = ["check_guard", "guard_note", "top_speed"]
-
-#: Instants at which paths are looked at for the speeds along them, s apart.
-_STEP_S = 0.05
 
 
 def check_guard(
@@ -58,8 +58,9 @@ def check_guard(
             raise InputError(
                 f"{prefix}start.position_m",
                 f"{name!r} is {distance:.3g} m from the axle, within "
-                f"{prefix}free_space.start_bubble_m, {bubble:g} m, which the guard "
-                "takes to be free; move one, or lower that",
+                f"{prefix}free_space.start_bubble_m, {bubble:g} m, which the "
+                "guard assumes to be free; move one of them, or lower "
+                "start_bubble_m",
             )
 
 
@@ -81,59 +82,15 @@ def _check_memory(
     """What is a braking ahead has to stay known until the robot has stopped."""
     known, body = robot.free_space, robot.robot
     stopping = stopping_way(guard, body, robot.plant, tick_s)
-    drift = known.wheel_error, known.place_error_m, body.wheel_separation_m
+    error = PlaceError.of(known, body, robot.odometry)
     distance = body_radius(body) + stopping
-    lasts = lasting(distance, drift)
-    if lasts < stopping:
+    needed = place_error(distance, stopping, error)
+    if needed > known.place_error_m:
         raise InputError(
             f"{prefix}free_space.place_error_m",
-            f"{known.place_error_m:g} m: with wheel_error {known.wheel_error:g} what "
-            f"is {distance:.3g} m away stays known for {lasts:.2g} m, less than the "
-            f"{stopping:.2g} m in which the robot stops; raise it",
+            f"is {known.place_error_m:g} m, but by the time the robot stops, "
+            f"{stopping:.2g} m on, what was {distance:.3g} m away may be off by "
+            f"{needed:.2g} m, by encoder pulses of {error.pulse_m * 1e3:.2g} mm "
+            f"and a wheel_error of {known.wheel_error:g}; raise it, or use an "
+            "encoder with more pulses or a smaller wheel_error",
         )
-
-
-def guard_note(
-    name: str, robot: FollowerParameters, bodies: Mapping[str, Body], duration_s: float
-) -> str:
-    """What a user should know of what a guard does not promise.
-
-    Args:
-        name: Of the robot.
-        robot: The robot.
-        bodies: All that it could touch, by name.
-        duration_s: Of the run, s.
-
-    Returns:
-        A line where one of them moves faster than the guard reckons with; else empty.
-    """
-    guard = robot.own_guard
-    if guard is None or not bodies:
-        return ""
-    speeds = {each: top_speed(body, duration_s) for each, body in bodies.items()}
-    bound, fastest = guard.obstacle_speed_m_s, max(speeds, key=speeds.__getitem__)
-    if speeds[fastest] <= bound:
-        return ""
-    return (
-        f"guard: {fastest!r} moves at up to {speeds[fastest]:.3g} m/s, but "
-        f"guard.obstacle_speed_m_s is {bound:g}: against what moves faster {name!r} "
-        "is not guarded"
-    )
-
-
-def top_speed(body: Body, duration_s: float) -> float:
-    """Of a body along its path.
-
-    Args:
-        body: Any.
-        duration_s: Of the run, s.
-
-    Returns:
-        m/s, over steps of 50 ms.
-    """
-    if not body.path.moves:
-        return 0.0
-    times = np.arange(0.0, duration_s + _STEP_S, _STEP_S)
-    places = body.path.poses(times)[:, :2]
-    steps: Iterable[float] = np.hypot(*np.diff(places, axis=0).T)
-    return float(max(steps)) / _STEP_S

@@ -8,8 +8,6 @@ from diagrams.participants import FollowerParameters
 from diagrams.run_parameters import RunParameters
 from systems.framework.input_error import InputError
 
-__all__ = ["address_of_robot", "check_searches"]
-
 
 def address_of_robot(robot: FollowerParameters) -> int:
     """Address of a searching robot in its radio frames.
@@ -54,8 +52,8 @@ def check_searches(
         if address in taken:
             raise InputError(
                 f"{prefix}{group}.address",
-                f"{address} is that of robot {taken[address]!r}; give each its own, 1 "
-                "to 3",
+                f"{address} is that of robot {taken[address]!r}; give each robot "
+                "its own address, 1 to 3",
             )
         taken[address] = name
 
@@ -85,14 +83,15 @@ def _check_sound(
     if robot.hearing != "audio":
         raise InputError(
             f"{prefix}hearing",
-            f"is {robot.hearing!r}, but law 'sound_search' hears by cross-power "
-            "spectra; set it to audio",
+            f"is {robot.hearing!r}, but law 'sound_search' needs the sound waves "
+            "for cross-power spectra; set it to audio",
         )
     if len(robot.robot.microphones_m) < 4:
         raise InputError(
             f"{prefix}robot.microphones_m",
-            f"has {len(robot.robot.microphones_m)} microphones, but law 'sound_search' "
-            "hears by four, the first in the middle; use robot.preset song2011_hearing",
+            f"has {len(robot.robot.microphones_m)} microphones, but law "
+            "'sound_search' needs four, with the first in the middle; use "
+            "robot.preset song2011_hearing",
         )
     if robot.sound_search.await_call:
         callers = [
@@ -104,7 +103,7 @@ def _check_sound(
         if not callers:
             raise InputError(
                 f"{prefix}sound_search.caller",
-                f"{robot.sound_search.caller} is the address of no robot that smells, "
-                "so that nobody calls; set sound_search.await_call to false, or law "
-                "plume_search and that search.address for one",
+                f"{robot.sound_search.caller} is not the address of a robot that "
+                "smells, so that no robot calls; set sound_search.await_call to "
+                "false, or give a robot law plume_search and this search.address",
             )

@@ -7,21 +7,18 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.stop_rules import (
-    BETWEEN_TICKS,
     DIVERGED,
     RobotRules,
     RuleNumbers,
+    instants_of,
     judge_search,
     judge_tick,
 )
-from systems.world.geometry import rectangle_clearance
-
-__all__ = ["Contacts", "contacts_of", "judge_all"]
-
+from systems.framework.compiling import njit
+from systems.world.geometry import first_overlap
 
 #: Place of the pose at the tick before among what is watched.
 BEFORE = 8
@@ -36,11 +33,15 @@ class Contacts(NamedTuple):
     sizes: NDArray[np.float64]
     """(n, 2) of the bodies, m."""
     reach: NDArray[np.float64]
-    """(n,) m: farther away, a body does not touch the robot."""
+    """(n,) m: with centres farther apart a body does not touch the robot."""
+    steps: NDArray[np.float64]
+    """(n,) the most that each moves in a tick on a path of its own, m."""
     robots: NDArray[np.int64]
     """(n,) numbers of those bodies that are robots, else -1."""
+    parts: int
+    """Into which ticks are cut."""
     poses: NDArray[np.float64]
-    """(n, 5 ticks + 1, 3) of the other bodies, at ticks and in between."""
+    """(n, parts ticks + 1, 3) of the other bodies, at ticks and in between."""
 
 
 def contacts_of(
@@ -56,20 +57,21 @@ def contacts_of(
     Returns:
         All that a compiled loop needs of it.
     """
-    parts = np.arange(1, BETWEEN_TICKS + 1) / BETWEEN_TICKS
-    between = times[:-1, None] + parts * (times[1:] - times[:-1])[:, None]
-    instants = np.concatenate([times[:1], between.ravel()])
-    numbers = [robots.index(n) if n in robots else -1 for n, _, _ in rules.reach]
-    poses = np.empty((len(rules.reach), len(instants), 3))
-    for row, number, (_, body, _) in zip(poses, numbers, rules.reach, strict=True):
+    instants = instants_of(times, rules.parts)
+    numbers = [robots.index(b.name) if b.name in robots else -1 for b in rules.near]
+    poses = np.empty((len(rules.near), len(instants), 3))
+    for row, number, near in zip(poses, numbers, rules.near, strict=True):
         if number < 0:
-            row[:] = body.path.poses(instants if body.path.moves else instants[:1])
+            path = near.body.path
+            row[:] = path.poses(instants if path.moves else instants[:1])
     return Contacts(
         rules.numbers,
         rules.scenario.size,
-        np.reshape([body.size for _, body, _ in rules.reach], (-1, 2)).astype(float),
-        np.array([reach for _, _, reach in rules.reach]),
+        np.reshape([b.body.size for b in rules.near], (-1, 2)).astype(float),
+        np.array([b.reach_m for b in rules.near]),
+        np.array([b.step_m for b in rules.near]),
         np.array(numbers, dtype=np.int64),
+        rules.parts,
         poses,
     )
 
@@ -80,7 +82,13 @@ _judge_search = njit(judge_search)
 
 @njit
 def judge_all(
-    tick: int, tick_s: float, watched: Any, contacts: Any, judged: Any, ended: Any
+    tick: int,
+    tick_s: float,
+    watched: Any,
+    contacts: Any,
+    judged: Any,
+    ended: Any,
+    parts: Any,
 ) -> bool:  # pragma: no cover  (compiled)
     """Judges all robots at a tick, as ``RunRules`` does.
 
@@ -92,8 +100,9 @@ def judge_all(
             feel and which body that is, and its pose at the tick before.
         contacts: ``Contacts`` of each.
         judged: (robots, 8) states of ``judge_tick``, changed.
-        ended: (robots, 2) what that has returned, and whether a body is touched;
-            changed.
+        ended: (robots, 2) what that has returned, and 1 more than the number of the
+            first body that is touched, 0 for none; changed.
+        parts: (robots,) part of the tick that had passed by then; changed.
 
     Returns:
         Whether the run is over.
@@ -102,8 +111,11 @@ def judge_all(
     for k in range(len(contacts)):
         pose, velocity, pose_WS, valid, gives_up, report, feels, body, _ = watched[k]
         felt = (feels[0] > 0.5 or feels[1] > 0.5) and body[0] >= 0.0
-        if not felt and _touches(tick, k, watched, contacts[k]):
-            ended[k, 1] = 1
+        touched, part = -1, 0.0
+        if not felt:
+            touched, part = _first_touched(tick, k, watched, contacts[k])
+        if touched >= 0:
+            ended[k, 1], parts[k] = 1 + touched, part
         elif ended[k, 0] == 0 and contacts[k].rules.searches > 0:
             rules = contacts[k].rules
             ended[k, 0] = _judge_search(report[0], pose, pose_WS, rules)
@@ -129,34 +141,38 @@ def judge_all(
 
 
 @njit
-def _touches(
+def _first_touched(
     tick: int, number: int, watched: Any, contacts: Contacts
-) -> bool:  # pragma: no cover  (compiled)
-    """Whether a robot has touched a body since the last tick."""
+) -> tuple[int, float]:  # pragma: no cover  (compiled)
+    """The first body that a robot has touched since the last tick.
+
+    Returns:
+        Its number, -1 for none, and the part of the tick that had passed.
+    """
     pose, before = watched[number][0], watched[number][BEFORE]
-    at = BETWEEN_TICKS * tick
-    mine, other = np.empty(5), np.empty(5)
-    mine[3], mine[4] = contacts.size
+    gone = math.hypot(pose[0] - before[0], pose[1] - before[1])
+    parts, at = contacts.parts, contacts.parts * tick
+    touched, first = -1, np.inf
     for body in range(len(contacts.reach)):
-        robot = contacts.robots[body]
+        robot, step = contacts.robots[body], contacts.steps[body]
         if robot >= 0:
-            x, y = watched[robot][0][0], watched[robot][0][1]
+            now, then = watched[robot][0], watched[robot][BEFORE]
+            x, y = now[0], now[1]
+            step = math.hypot(x - then[0], y - then[1])
         else:
             x, y = contacts.poses[body, at, 0], contacts.poses[body, at, 1]
-        if math.hypot(x - pose[0], y - pose[1]) > contacts.reach[body]:
+        near = contacts.reach[body] + gone + step
+        if math.hypot(x - pose[0], y - pose[1]) > near:
             continue
-        other[3], other[4] = contacts.sizes[body, 0], contacts.sizes[body, 1]
-        for fifth in range(1, BETWEEN_TICKS + 1):
-            part = fifth / BETWEEN_TICKS if tick > 0 else 1.0
-            for k in range(3):
-                mine[k] = before[k] + part * (pose[k] - before[k])
-                if robot >= 0:
-                    then, now = watched[robot][BEFORE][k], watched[robot][0][k]
-                    other[k] = then + part * (now - then)
-                elif tick > 0:
-                    other[k] = contacts.poses[body, at - BETWEEN_TICKS + fifth, k]
-                else:
-                    other[k] = contacts.poses[body, 0, k]
-            if rectangle_clearance(mine, other) < 0.0:
-                return True
-    return False
+        if robot >= 0:
+            poses = np.empty((parts + 1, 3))
+            for k in range(parts + 1):
+                for j in range(3):
+                    poses[k, j] = then[j] + k / parts * (now[j] - then[j])
+        else:
+            poses = contacts.poses[body, max(at - parts, 0) : at + 1]
+        size = contacts.sizes[body]
+        part = first_overlap(before, pose, contacts.size, poses, size)
+        if part < first:
+            touched, first = body, part
+    return touched, first

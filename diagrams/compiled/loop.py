@@ -5,8 +5,9 @@ block, in the order that the names of their ports give, with the same integrator
 same random numbers; what it logs is what the diagram logs.
 
 In a tick, as Drake has it: blocks whose outputs are state have published them; all
-others do their steps, each after those whose outputs it reads; the row is logged; then
-the blocks with state outputs do theirs, and the plants move on by a tick.
+others do their steps, each after those whose outputs it reads; the stop rules judge;
+then the blocks with state outputs do theirs and publish them; the row is logged, in
+which all that was done at the tick is; and the plants move on by a tick.
 """
 
 from __future__ import annotations
@@ -28,8 +29,6 @@ from diagrams.scenario import WORLD, Scenario
 from diagrams.stop_rules import JudgedTick, RunRules
 from systems.framework.host_step import HostError
 from systems.framework.input_error import InputError, shortened
-
-__all__ = ["CompiledLoop", "compile_loop"]
 
 
 @dataclass
@@ -130,16 +129,18 @@ class CompiledLoop:
             before * self.tick_s,
             self.log[last, pose].tolist(),
             self.log[before, pose].tolist(),
-            bool(self._value(columns, "target_valid") > 0.5),
+            self._value(columns, "target_valid", last) > 0.5,
             self.plan.judged[number].tolist(),
             found,
-            bool(touched),
-            self._value(columns, "search_ended"),
+            (touched - 1, float(self.plan.touched_at[number])) if touched else None,
+            # The judge has seen what the search had published the tick before.
+            self._value(columns, "search_ended", last - 1),
         )
 
-    def _value(self, columns: Mapping[str, int], name: str) -> float:
-        """Of a column in the last row; 0 where it is none."""
-        return float(self.log[self.done - 1, columns[name]]) if name in columns else 0.0
+    def _value(self, columns: Mapping[str, int], name: str, row: int) -> float:
+        """Of a column in a row; 0 where it is none."""
+        known = name in columns and row >= 0
+        return float(self.log[row, columns[name]]) if known else 0.0
 
 
 def _complaint(error: Exception) -> str:

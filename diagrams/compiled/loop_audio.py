@@ -14,8 +14,6 @@ from diagrams.compiled.sounds import Sounds
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame, Emission
 
-__all__ = ["save_sounds"]
-
 
 def save_sounds(
     plan: LoopPlan, robots: Mapping[str, LoopRobot], sounds: Sounds, audio: RunAudio

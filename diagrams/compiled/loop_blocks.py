@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from typing import Any
 
+from diagrams.own_code import loaded_digests
 from diagrams.robot import (
     OUTSIDE,
     columns_of,
@@ -17,8 +18,6 @@ from diagrams.scenario import Scenario
 from diagrams.world_blocks import radio_nodes, world_blocks
 from systems.framework.input_error import InputError
 from systems.framework.step_block import RunFacts, Step
-
-__all__ = ["LoopBlocks", "shared_blocks", "shared_world"]
 
 #: What blocks take from elsewhere: robots from the world, and it from them.
 _WORLD = *OUTSIDE, "frames"
@@ -100,8 +99,8 @@ def _step_for(block: Any, run: RunFacts) -> Step:
     if not hasattr(block, "step_for"):
         raise InputError(
             "engine",
-            f"{block.get_name()} has no method step_for, by which it would join a "
-            "compiled loop; give it one, or run with engine drake",
+            f"{block.get_name()} has no method step_for, which a compiled loop "
+            "needs; add this method, or run with engine drake",
         )
     step: Step = block.step_for(run)
     return step
@@ -137,7 +136,8 @@ def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
             continue
         made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
         sizes = own.source_size, own.odor and own.odor.container_m
-        key = f"{name} {bodies} {robots} {others} {sizes} {made_from}"
+        code = loaded_digests(own)
+        key = f"{name} {bodies} {robots} {others} {sizes} {code} {made_from}"
         blocks[name] = _shared(key, made)
     return blocks
 

@@ -13,14 +13,14 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, register_jitable
 
+from systems.framework.compiling import njit
+
 # numba's stubs leave it out.
 carray: Any = numba.carray  # type: ignore[attr-defined]
-
-__all__ = ["ARRAYS", "PUBLISH", "run_parts"]
 
 #: A part that is called with this for the tick publishes what its state says.
 PUBLISH = -1
@@ -128,26 +128,31 @@ def run_parts(
         logged: (n, 2) addresses of what is logged, and how many numbers each is.
         parts: (m, 2) addresses of functions and of their words.
         plan: Numbers of the parts that are called at the begin of the run, to publish;
-            in a tick before the log; the one that judges whether the run is over; and
-            (k, 2) those after it, and whether each is to publish.
+            first in a tick; the one that judges whether the run is over; and (k, 2)
+            those before the log and (m, 2) those after it, and whether each is to
+            publish.
 
     Returns:
         The tick after the last one that was logged, and whether the run is over.
     """
-    first, before, judge, after = plan
+    begins, first, judge, before, after = plan
     if begin == 0:
-        for part in first:
+        for part in begins:
             _called(parts[part, 0], PUBLISH, parts[part, 1])
     for tick in range(begin, end):
-        for part in before:
+        for part in first:
             _called(parts[part, 0], tick, parts[part, 1])
+        over = _called(parts[judge, 0], tick, parts[judge, 1]) != 0
+        for k in range(len(before)):
+            part, at = before[k, 0], PUBLISH if before[k, 1] else tick
+            _called(parts[part, 0], at, parts[part, 1])
         column = 0
         for k in range(len(logged)):
             values = _float_array(logged[k, 0], (logged[k, 1],))
             for j in range(len(values)):
                 log[tick, column] = values[j]
                 column += 1
-        if _called(parts[judge, 0], tick, parts[judge, 1]) != 0:
+        if over:
             return tick + 1, True
         for k in range(len(after)):
             part, at = after[k, 0], PUBLISH if after[k, 1] else tick

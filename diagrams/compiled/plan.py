@@ -7,7 +7,6 @@ from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from diagrams.bodies import Surroundings
@@ -25,10 +24,9 @@ from diagrams.stop_rules import (
     UNJUDGED,
     RunRules,
 )
+from systems.framework.compiling import njit
 from systems.framework.host_step import HostCall, HostFunction, host_step
 from systems.framework.step_block import RunFacts, Step
-
-__all__ = ["LoopPlan", "LoopRobot", "LoopWorld"]
 
 #: What a robot is judged by, and sizes of what not every robot has.
 _WATCHED = {
@@ -122,7 +120,10 @@ class LoopPlan:
         self.hosts: list[HostCall] = []
         """What is called in Python."""
         self.ended = np.zeros((len(robots), 2), dtype=np.int64)
-        """Of each robot what its judge said, and whether it has touched a body."""
+        """Of each robot what its judge said, and 1 more than the number of the body
+        that it has touched."""
+        self.touched_at = np.zeros(len(robots))
+        """Of each robot the part of the tick that had passed by then."""
         self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
         """Of each robot the judge's state."""
         self._parts: list[tuple[LoopPart, str]] = []
@@ -160,7 +161,7 @@ class LoopPlan:
     def show(
         self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
     ) -> None:
-        """Shows numbers to a Python function, after what is done before the log.
+        """Shows numbers to a Python function, as they are when the robots are judged.
 
         Args:
             view: (n,) what a port carries.
@@ -236,7 +237,7 @@ class LoopPlan:
         contacts = tuple(
             contacts_of(rules.robots[name], [*robots], self._times) for name in robots
         )
-        values = tick_s, watched, contacts, self.judged, self.ended
+        values = tick_s, watched, contacts, self.judged, self.ended, self.touched_at
         part = LoopPart()
         arguments = ", ".join(map(part.expression, values))
         lines = [f"if {part.name(judge_all)}(tick, {arguments}):", "    return 1"]
@@ -255,22 +256,20 @@ class LoopPlan:
         ]
         parts = [(address_of(code), words.ctypes.data) for code, words in self._kept]
         ports = [(values.ctypes.data, values.size) for values in self.logged]
-        after = [
-            (part, publishes)
-            for parts_of_a_kind in (self._late, self._plants)
-            for publishes in (False, True)
-            for part in parts_of_a_kind
-        ]
-        first = [part for part, publishes in after if publishes]
-        before = [*self._filled, *self._early]
+        late, plants = (
+            [(part, publishes) for publishes in (False, True) for part in of_a_kind]
+            for of_a_kind in (self._late, self._plants)
+        )
+        begins, first = [*self._late, *self._plants], [*self._filled, *self._early]
         return (
             _table(ports),
             _table(parts),
             (
+                np.array(begins, dtype=np.int64),
                 np.array(first, dtype=np.int64),
-                np.array(before, dtype=np.int64),
                 self._judge,
-                _table(after),
+                _table(late),
+                _table(plants),
             ),
         )
 

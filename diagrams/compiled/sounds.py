@@ -17,8 +17,6 @@ from systems.sound.parameters import SoundParameters
 from systems.sound.sound_emitter import emissions_along, history_ticks
 from systems.sound.waveforms import make_waveform
 
-__all__ = ["Sounds", "sounds_of_a_run"]
-
 
 class Sounds(NamedTuple):
     """What robots hear in a run."""

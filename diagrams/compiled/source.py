@@ -24,17 +24,14 @@ from typing import Any
 
 import numba
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from diagrams.compiled.parts import ARRAYS
-from diagrams.own_code import OURS, files_of
-from systems.framework.compiling import cache_folder
+from diagrams.own_code import digests_of
+from systems.framework.compiling import cache_folder, njit, source_digest
 from systems.framework.input_error import InputError, shortened
 from systems.framework.parameters import Parameters
-
-__all__ = ["LoopPart", "address_of", "compiled_part"]
 
 #: Generated files that were not used for so long are removed, s.
 _KEPT_S = 30 * 86_400.0
@@ -131,8 +128,9 @@ class LoopPart:
             if whole.dtype not in ARRAYS:
                 raise InputError(
                     "engine",
-                    f"{shortened(repr(value), 60)} is nothing that compiled loops "
-                    "take; give blocks numbers or arrays, or run with engine drake",
+                    f"{shortened(repr(value), 60)} cannot be used in compiled "
+                    "loops; give blocks numbers or arrays, or run with engine "
+                    "drake",
                 )
             self._kept += value, whole
             at = self._word(whole.ctypes.data)
@@ -197,7 +195,7 @@ def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
 
 @cache
 def _say_that_it_takes_time() -> None:
-    _LOGGER.info("compiling what this kind of scenario needs, for up to 15 s ...")
+    _LOGGER.info("compiling code for this kind of scenario, for up to 15 s ...")
 
 
 def address_of(part: Any) -> int:
@@ -224,8 +222,8 @@ def _file(source: str, names: Mapping[str, Any]) -> Path | None:
     )
     if not origins:
         return None
-    text = "".join([*(f"# {line}\n" for line in (*origins, _digest())), source])
-    folder = cache_folder() / "phonotaxis_parts"
+    text = "".join([*(f"# {line}\n" for line in origins), source])
+    folder = cache_folder() / "parts"
     file = folder / f"part_{hashlib.sha256(text.encode()).hexdigest()[:24]}.source"
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -244,39 +242,37 @@ def _file(source: str, names: Mapping[str, Any]) -> Path | None:
 def _is_known(value: Any) -> bool:
     """Whether the files that define a function decide what it does."""
     function = getattr(value, "py_func", value)
-    if isinstance(function, FunctionType) and function.__closure__:
-        return False
-    return bool(_files(function))
-
-
-def _files(function: Any) -> tuple[Path, ...]:
-    """Of a user's function; of ours the digest of the package tells."""
     module = sys.modules.get(function.__module__)
-    if module is None or function.__module__.partition(".")[0] in OURS:
-        return (Path(__file__),) if module else ()
-    return files_of(module)
+    if module is None:
+        return False
+    if isinstance(function, FunctionType):
+        # A user's module that was loaded anew is not that of an older function.
+        stale = function.__globals__ is not vars(module)
+        if function.__closure__ or stale:
+            return False
+    return _is_ours(function) or bool(digests_of(module))
+
+
+def _is_ours(function: Any) -> bool:
+    """Whether the digest of the package tells what a function does."""
+    return str(function.__module__).partition(".")[0] in ("diagrams", "systems")
 
 
 def _origins(names: Mapping[str, Any]) -> Iterator[str]:
-    """Where each name comes from, and what is in files that are not ours."""
+    """Where each name comes from, and the content of all files that it depends on."""
+    files = {Path(__file__)}
     for name, value in names.items():
         function = getattr(value, "py_func", value)
+        module = sys.modules[function.__module__]
         fields = " ".join(getattr(value, "_fields", ()))
         yield f"{name}: {function.__module__}.{function.__qualname__} {fields}".strip()
-        for file in _files(function):
-            if file != Path(__file__):
-                yield f"{file} {hashlib.sha256(file.read_bytes()).hexdigest()}"
-
-
-@cache
-def _digest() -> str:
-    """Of the package's own source and of what compiles it."""
-    digest = hashlib.sha256()
-    for name in ("diagrams", "systems"):
-        package = Path(sys.modules[name].__path__[0])
-        for file in sorted(package.rglob("*.py")):
-            digest.update(file.read_bytes())
-    return f"{digest.hexdigest()} numba {numba.__version__} numpy {np.__version__}"
+        if module.__file__:
+            files.add(Path(module.__file__).resolve())
+        if not _is_ours(function):
+            for file, digest in digests_of(module).items():
+                files.add(Path(file))
+                yield f"{file} {digest}"
+    yield f"{source_digest(*files)} numba {numba.__version__}"
 
 
 def _remove_unused(folder: Path) -> None:

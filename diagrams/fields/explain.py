@@ -14,8 +14,6 @@ from systems.framework.input_error import InputError, shortened
 if TYPE_CHECKING:
     from pydantic import BaseModel
 
-__all__ = ["explain", "single_faults"]
-
 
 def explain(error: ValidationError, schema: Mapping[str, Any], what: str) -> InputError:
     """All complaints, each as field, value and remedy on one line.

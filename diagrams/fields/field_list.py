@@ -11,8 +11,6 @@ from diagrams.fields.near_miss import did_you_mean
 from diagrams.fields.schema_walk import options, resolved
 from systems.framework.input_error import InputError
 
-__all__ = ["Field", "find_fields", "list_fields"]
-
 _KINDS = {
     "number": "number",
     "integer": "whole number",
@@ -83,8 +81,8 @@ def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
     hint = did_you_mean(pattern, [*last, *(f.path for f in every)], most=3)
     raise InputError(
         "pattern",
-        f"{pattern!r} is in no field's path or meaning{hint}; 'phonotaxis fields' "
-        "lists all",
+        f"{pattern!r} is in no field's path or meaning{hint}; 'phonotaxis "
+        "fields' lists all fields",
     )
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-__all__ = ["begins_anew", "joined"]
-
 
 def begins_anew(changes: Mapping[str, Any]) -> bool:
     """Whether changes to a group choose its preset, so that the rest is forgotten.

@@ -9,8 +9,6 @@ from typing import Any
 from diagrams.fields.schema_walk import at_place, leaf_paths
 from systems.framework.input_error import InputError
 
-__all__ = ["did_you_mean", "near_field", "unknown_law"]
-
 #: Words for one thing, which letters do not show: scenarios call it by one of them.
 _SAME_THING = (
     ("position", "location", "place", "pose", "centre", "center", "xy", "waypoints"),

@@ -7,9 +7,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-__all__ = ["SCHEMA_FILE", "known_laws", "scenario_schema", "schema_text"]
-
-#: ``python -m docs.tables.schemas`` writes it.
+#: ``make schemas`` writes it.
 SCHEMA_FILE = Path(__file__).parents[1] / "scenario.schema.json"
 
 

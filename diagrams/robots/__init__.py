@@ -1,3 +1,1 @@
 """Blocks of each kind of robot: that follows a sound, drives on a route, searches."""
-
-__all__: list[str] = []

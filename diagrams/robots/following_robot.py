@@ -19,8 +19,6 @@ from systems import (
 )
 from systems.framework.input_error import InputError
 
-__all__ = ["following_blocks"]
-
 
 def following_blocks(
     scenario: Scenario,
@@ -163,6 +161,8 @@ def _obstacle_sensing(
             parameters=scenario.free_space,
             sensors=scenario.ultrasonic,
             robot=scenario.robot,
+            odometry=scenario.odometry,
+            plant=scenario.plant,
             tick_s=scenario.tick_s,
         )
         sensing.append(known)

@@ -22,8 +22,6 @@ from systems.laws.trajectory.parameters import (
     FilteredTrajectoryParameters,
 )
 
-__all__ = ["make_trajectory_controller", "routed_blocks", "trajectory_command"]
-
 
 def _gains(scenario: Scenario) -> Any:
     return getattr(scenario.repulsion, scenario.law)

@@ -20,8 +20,6 @@ from systems import (
     SoundSearch,
 )
 
-__all__ = ["search_command", "search_controller", "searching_blocks"]
-
 
 def search_controller(scenario: Scenario) -> Any:
     """The block of the search.

@@ -14,8 +14,6 @@ from typing import Any
 
 from docs.building.reference import page_of
 
-__all__ = ["setup"]
-
 
 def setup(app: Any) -> dict[str, bool]:
     """Joins Sphinx."""

@@ -12,8 +12,6 @@ from typing import Any
 from docutils import nodes
 from latex2mathml.converter import convert
 
-__all__ = ["setup"]
-
 
 def setup(app: Any) -> dict[str, bool]:
     """Joins Sphinx."""

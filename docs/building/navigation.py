@@ -5,8 +5,6 @@ from __future__ import annotations
 import re
 from typing import Any
 
-__all__ = ["setup"]
-
 
 def setup(app: Any) -> dict[str, bool]:
     """Joins Sphinx."""
@@ -19,6 +17,6 @@ def _add_trees(app: Any, page: str, source: list[str]) -> None:
         return
     sections = re.split(r"(?m)^## (.+)$", source[0])[1:]
     for caption, text in zip(sections[::2], sections[1::2], strict=True):
-        pages = re.findall(r"\]\(([\w./]+)\.(?:md|ipynb)\)", text)
+        pages = re.findall(r"\]\(([\w./]+)\.md\)", text)
         source[0] += f"\n```{{toctree}}\n:hidden:\n:caption: {caption}\n\n"
         source[0] += "\n".join(pages) + "\n```\n"

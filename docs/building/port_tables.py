@@ -9,8 +9,6 @@ from docutils.statemachine import StringList
 from ruamel.yaml import YAML
 from sphinx.util.docutils import SphinxDirective
 
-__all__ = ["setup"]
-
 
 class PortTable(SphinxDirective):
     """The directive ``pydrake_system``, as a table of inputs and outputs."""

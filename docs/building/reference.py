@@ -1,38 +1,24 @@
-"""Pages of the reference, one for each room that docs/api.md names.
-
-In the site each name of that page leads to its docstring, that of a constant to the
-comment ``#:`` above it.
-"""
+"""Pages of the reference: one per public package, with the docstring of each name."""
 
 from __future__ import annotations
 
-import ast
 import inspect
-import re
-from collections.abc import Collection, Mapping
-from functools import cache
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from sphinx.errors import ExtensionError
-from sphinx.ext.napoleon import GoogleDocstring
-from sphinx.pycode import ModuleAnalyzer
-
-__all__ = ["page_of", "setup"]
+from sphinx.ext.napoleon.docstring import GoogleDocstring
 
 _DOCS = Path(__file__).resolve().parents[1]
 _PAGES = _DOCS / "reference"
-_LIST = "docs/api"
-#: All blocks have a room of their own, too.
-_EVERY_BLOCK = "systems"
+_PACKAGES = ("phonotaxis", "systems", "diagrams")
 
 
 def setup(app: Any) -> dict[str, bool]:
     """Joins Sphinx."""
     app.connect("builder-inited", _write_pages)
     app.connect("builder-inited", _name_blocks)
-    app.connect("source-read", _lead_names_to_docstrings)
+    app.connect("source-read", _lead_to_pages)
     app.connect("autodoc-process-docstring", _read_google_style)
     app.connect("autodoc-process-signature", _ask_for_what_is_constructed)
     app.connect("autodoc-skip-member", _leave_out_drake)
@@ -42,117 +28,48 @@ def setup(app: Any) -> dict[str, bool]:
 def page_of(folder: Path) -> Path | None:
     """The page of a folder of code, if it has one."""
     name = ".".join(folder.relative_to(_DOCS.parent).parts)
-    return _PAGES / f"{name}.rst" if name in _rooms() else None
+    return _PAGES / f"{name}.rst" if name in _PACKAGES else None
 
 
-@cache
-def _rooms() -> dict[str, list[str]]:
-    """Names by room, as the page lists them."""
-    text = (_DOCS / "api.md").read_text("utf-8")
-    parts = re.split(r"(?m)^## ([\w.]+)$", text)[1:]
-    return {
-        room: re.findall(r"`(\w+)`", told)
-        for room, told in zip(parts[::2], parts[1::2], strict=True)
-    }
-
-
-def _homes() -> dict[str, str]:
-    """The room whose page has a name: the first that exports it, but for systems."""
-    rooms = sorted(_rooms().items(), key=lambda room: room[0] != _EVERY_BLOCK)
-    found = {name: room for room, names in reversed(rooms[1:]) for name in names}
-    return dict.fromkeys(rooms[0][1], _EVERY_BLOCK) | found
+def _names(package: str) -> list[str]:
+    """What a package offers, without templates and without what phonotaxis offers."""
+    module, public = import_module(package), import_module("phonotaxis")
+    return [
+        name
+        for name in module.__all__
+        if not name.endswith("_")
+        and (
+            module is public or getattr(public, name, None) is not getattr(module, name)
+        )
+    ]
 
 
 def _write_pages(_app: Any) -> None:
     _PAGES.mkdir(exist_ok=True)
-    homes = _homes()
-    for room, names in _rooms().items():
-        own = [name for name in names if homes[name] == room]
-        constants = [name for name in own if _is_constant(room, name)]
-        told = [name for name in own if name not in constants]
-        lines = [room, "=" * len(room), "", f".. automodule:: {room}"]
-        lines += [f"   :members: {', '.join(told)}", ""] if told else [""]
-        for name in constants:
-            lines += _constant(room, name)
-        others = [f":py:obj:`{n} <{homes[n]}.{n}>`" for n in names if n not in own]
-        if others:
-            lines += [f"Exported here as well: {', '.join(others)}.", ""]
-        page, text = _PAGES / f"{room}.rst", "\n".join(lines)
+    for package in _PACKAGES:
+        members = ", ".join(_names(package))
+        lines = [package, "=" * len(package), "", f".. automodule:: {package}"]
+        page, text = (
+            _PAGES / f"{package}.rst",
+            "\n".join([*lines, f"   :members: {members}", ""]),
+        )
         if not page.exists() or page.read_text("utf-8") != text:
             page.write_text(text, "utf-8")
 
 
-def _is_constant(room: str, name: str) -> bool:
-    """Whether a name is of a value, which has no docstring of its own."""
-    value = getattr(import_module(room), name)
-    return not (inspect.isclass(value) or inspect.isroutine(value))
-
-
-def _constant(room: str, name: str) -> list[str]:
-    """What is known of a constant: its value, or what it holds, and its comment.
-
-    Autodoc looks for that comment in the room alone, which imports the constant.
-    """
-    value = getattr(import_module(room), name)
-    lines = [f".. py:data:: {name}", f"   :module: {room}"]
-    if isinstance(value, int | float | str):
-        lines.append(f"   :value: {value!r}")
-    lines += ["", *(f"   {line}" for line in _comment(room, name)), ""]
-    if isinstance(value, Mapping):
-        keys = ", ".join(f"``{key}``" for key in value)
-        lines += [f"   Holds: {keys}.", ""]
-    elif isinstance(value, Collection) and not isinstance(value, str):
-        if all(isinstance(each, str) for each in value):
-            lines += [f"   Holds: {', '.join(f'``{each}``' for each in value)}.", ""]
-        else:
-            kinds = dict.fromkeys(type(each).__name__ for each in value)
-            lines += [f"   Holds {len(value)} of {' and '.join(kinds)}.", ""]
-    return lines
-
-
-def _comment(room: str, name: str) -> list[str]:
-    """The comment ``#:`` above a constant, where the room has it from.
-
-    Raises:
-        ExtensionError: There is none.
-    """
-    code = Path(str(import_module(room).__file__)).read_text("utf-8")
-    homes = {
-        alias.name: node.module
-        for node in ast.walk(ast.parse(code))
-        if isinstance(node, ast.ImportFrom) and node.module
-        for alias in node.names
-    }
-    home = homes.get(name, room)
-    comments = ModuleAnalyzer.for_module(home).find_attr_docs()
-    if not comments.get(("", name)):
-        raise ExtensionError(f"{home}.{name} has no comment '#:' that says what it is")
-    return comments["", name]
+def _lead_to_pages(_app: Any, page: str, source: list[str]) -> None:
+    """Only the site has the pages: the list of names is read elsewhere as well."""
+    if page == "docs/api":
+        pages = "\n".join(f"reference/{package}" for package in _PACKAGES)
+        source[0] += f"\n```{{toctree}}\n:maxdepth: 1\n\n{pages}\n```\n"
 
 
 def _name_blocks(_app: Any) -> None:
     """Blocks for several scalars are called as they are exported, not as templates."""
-    for room, names in _rooms().items():
-        module = import_module(room)
-        for name in names:
-            if hasattr(module, f"{name}_"):
-                getattr(module, name).__name__ = name
-
-
-def _lead_names_to_docstrings(_app: Any, page: str, source: list[str]) -> None:
-    if page != _LIST:
-        return
-    homes = _homes()
-
-    def reference(match: re.Match[str]) -> str:
-        name = match[1]
-        return (
-            f"{{py:obj}}`{name} <{homes[name]}.{name}>`" if name in homes else match[0]
-        )
-
-    pages = "\n".join(f"reference/{room}" for room in _rooms())
-    source[0] = re.sub(r"`(\w+)`", reference, source[0])
-    source[0] += f"\n```{{toctree}}\n:hidden:\n\n{pages}\n```\n"
+    module = import_module("systems")
+    for name in _names("systems"):
+        if f"{name}_" in module.__all__:
+            getattr(module, name).__name__ = name
 
 
 def _read_google_style(*told: Any) -> None:

@@ -11,7 +11,6 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
@@ -19,10 +18,9 @@ from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_deriva
 from systems.base.hermite import value_weights
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
-
-__all__ = ["drive", "drive_along", "poses_between"]
 
 register_jitable(value_weights)
 

@@ -24,12 +24,6 @@ from systems.framework.parameters import (
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
-__all__ = [
-    "CarrierParameters",
-    "SourceRobotParameters",
-    "driven_path",
-]
-
 #: The wheels' acceleration is this many times the path's at least: as much as a
 #: command that is held for half a lag needs, and some to correct.
 _HEADROOM = 1.5
@@ -46,7 +40,7 @@ class CarrierParameters(Parameters):
     speed_m_s: NonNegativeSpeed = 0.3
     """Speed along the path, m/s (Han 2019, 5.3)."""
     acceleration_m_s2: Acceleration = ACCELERATION_M_S2
-    """Of the speed along the path, m/s^2."""
+    """Acceleration along the path, m/s^2."""
     corner_radius_m: Length = 0.3
     """Largest radius of the rounded corners, m."""
     start_time_s: Time = 0.0
@@ -123,7 +117,7 @@ class CarrierParameters(Parameters):
 
 
 class SourceRobotParameters(CarrierParameters):
-    """Path, drive and size of the master robot (Han 2019, 5.3 and table 5)."""
+    """Path, drive and size of the leader robot (Han 2019, 5.3 and table 5)."""
 
     heading_deg: Angle = 0.0
     """Heading of a source at rest, deg CCW from the x axis of W."""

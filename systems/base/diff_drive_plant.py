@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from pydrake.systems.framework import BasicVector_, LeafSystem_
 
@@ -14,24 +13,18 @@ from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.tyre_grip import GripNumbers, grip_accelerations
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.finite import check_finite, check_port
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step
 
-__all__ = [
-    "DiffDrivePlant",
-    "DiffDrivePlant_",
-    "PlantNumbers",
-    "body_twist",
-    "plant_derivatives",
-    "slipping_derivatives",
-]
-
 
 @register_jitable
-def body_twist(wheel_speeds, robot: RobotParameters, slip=(0.0, 0.0)):
+def body_twist(
+    wheel_speeds: Any, robot: RobotParameters, slip: Any = (0.0, 0.0)
+) -> Any:
     """Motion of the body from the speeds of its wheels.
 
     Args:
@@ -89,14 +82,14 @@ class PlantNumbers(NamedTuple):
 
 @njit(cache=True)
 def plant_derivatives(
-    state,
-    commanded,
-    left_rim_m,
-    right_rim_m,
-    wheel_separation_m,
-    top_wheel_speed,
-    motor_lag_s,
-):
+    state: Any,
+    commanded: Any,
+    left_rim_m: Any,
+    right_rim_m: Any,
+    wheel_separation_m: Any,
+    top_wheel_speed: Any,
+    motor_lag_s: Any,
+) -> Any:
     """Time derivatives of the plant; ``.py_func`` takes AutoDiffXd.
 
     Args:
@@ -122,15 +115,15 @@ def plant_derivatives(
 
 @njit(cache=True)
 def slipping_derivatives(
-    state,
-    commanded,
-    left_rim_m,
-    right_rim_m,
-    wheel_separation_m,
-    top_wheel_speed,
-    motor_lag_s,
-    grip,
-):
+    state: Any,
+    commanded: Any,
+    left_rim_m: Any,
+    right_rim_m: Any,
+    wheel_separation_m: Any,
+    top_wheel_speed: Any,
+    motor_lag_s: Any,
+    grip: Any,
+) -> Any:
     """``plant_derivatives`` with friction: the body moves by the tyres' forces.
 
     Args:
@@ -167,8 +160,8 @@ def slipping_derivatives(
 def _set_wheel_rates(rates, state, commanded, top_wheel_speed, motor_lag_s):
     left, right = state[5], state[6]
     rates[3], rates[4] = left, right
-    rates[5] = (_saturate(commanded[0], top_wheel_speed) - left) / motor_lag_s
-    rates[6] = (_saturate(commanded[1], top_wheel_speed) - right) / motor_lag_s
+    rates[5] = (saturated(commanded[0], top_wheel_speed) - left) / motor_lag_s
+    rates[6] = (saturated(commanded[1], top_wheel_speed) - right) / motor_lag_s
 
 
 @njit(cache=True)
@@ -186,7 +179,16 @@ def _checked_slipping(state, commanded, *numbers):  # pragma: no cover  (compile
 
 
 @register_jitable
-def _saturate(value, limit):
+def saturated(value: Any, limit: Any) -> Any:
+    """A value, its magnitude limited.
+
+    Args:
+        value: Float or AutoDiffXd.
+        limit: Not negative.
+
+    Returns:
+        The value, or the limit with its sign, of which no derivative is left.
+    """
     if value > limit:
         return value * 0.0 + limit
     if value < -limit:
@@ -222,7 +224,7 @@ class PlantStepNumbers(NamedTuple):
     of_plant: tuple[Any, ...]
     """``PlantNumbers``, and ``GripNumbers`` with friction."""
     advance: Any
-    """One of ``_SCHEMES``."""
+    """One of ``SCHEMES``."""
     step_s: float
     """Largest step, s."""
     tick_s: float
@@ -232,7 +234,7 @@ class PlantStepNumbers(NamedTuple):
     wheel_separation_m: float
 
 
-def plant_step(tick, state, inputs, outputs, numbers):
+def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
     """Moves the robot on by one tick, by Drake's explicit Runge-Kutta steps.
 
     Args:
@@ -249,7 +251,7 @@ def plant_step(tick, state, inputs, outputs, numbers):
     while time < end:
         h = end - time
         if h > _STRETCH * numbers.step_s:
-            h = numbers.step_s
+            h = (time + numbers.step_s) - time
         numbers.advance(state, h, commanded, derivatives, of_plant)
         time += h
 
@@ -299,7 +301,9 @@ def _fifth_order(state, h, commanded, derivatives, of_plant):
         state[k] = reached[k]
 
 
-_SCHEMES = {
+#: Drake's explicit Runge-Kutta steps, by the names of ``integrator.scheme``:
+#: ``advance(state, h, commanded, derivatives, numbers)`` changes the state.
+SCHEMES = {
     "runge_kutta2": _second_order,
     "runge_kutta3": _third_order,
     "runge_kutta5": _fifth_order,
@@ -445,7 +449,7 @@ def DiffDrivePlant_(T):
         def step_for(self, run):
             """What the block does in each tick of a compiled loop, ``Step``."""
             numbers = self._step_numbers._replace(
-                advance=_SCHEMES[run.scheme],
+                advance=SCHEMES[run.scheme],
                 step_s=run.step_s,
                 tick_s=run.tick_s,
             )

@@ -16,8 +16,6 @@ from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.world.paths import WaypointPath
 
-__all__ = ["DrivenPath"]
-
 #: After the end of the planned motion the robot is held: by then the feedback moves
 #: it by less than 1 nm/s.
 _SETTLING_S = 10.0
@@ -129,3 +127,22 @@ class DrivenPath:
             p * (b[1] - a[1]) + q * a[4] + r * b[4],
             p * (b[2] - a[2]) + q * a[5] + r * b[5],
         )
+
+    def extreme_twists(self, until: float) -> NDArray[np.float64]:
+        """Speeds and yaw rates at the ticks of the path.
+
+        Within a tick the speed of each wheel nears that which is commanded, so that
+        every point of the body is fastest at one of the ends.
+
+        Args:
+            until: Ticks count up to this time, s.
+
+        Returns:
+            (n, 2) m/s and rad/s.
+        """
+        ticks = max(until - self._start, 0.0) / TICK_S
+        if not self.moves:
+            return np.zeros((1, 2))
+        self._since(ticks)
+        table = self._table[: math.ceil(ticks) + 1]
+        return np.column_stack([np.hypot(table[:, 3], table[:, 4]), table[:, 5]])

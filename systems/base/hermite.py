@@ -6,8 +6,6 @@ from typing import Any
 
 from systems.framework.signals import TICK_S
 
-__all__ = ["value_weights"]
-
 
 def value_weights(s: Any) -> tuple[Any, Any, Any]:
     """Weights of the cubic Hermite polynomial over a tick.

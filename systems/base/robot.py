@@ -22,26 +22,20 @@ from systems.framework.parameters import (
     with_preset,
 )
 
-__all__ = [
-    "LEAST_SPACING_M",
-    "RobotParameters",
-    "body_radius",
-    "microphones_B",
-]
-
 #: Microphones nearer to one another than this are one, m.
 LEAST_SPACING_M = 1e-3
 
 
 class RobotParameters(Parameters):
-    """The slave robot of Han 2019, table 6.
+    """The follower robot of Han 2019, table 6.
 
-    The table prints "350 (W) x 820 (L)" beside a wheel distance of 410 mm and
+    The table prints "350 (W) x 820 (L)" next to a wheel distance of 410 mm and
     a microphone row of 800 mm, so that 820 mm can only be the lateral size.
     """
 
     preset: RobotPreset = "han2019"
-    """A named robot: defaults of the other fields; of these, what is given wins."""
+    """A named robot: defaults of the other fields; fields that are set take
+    precedence."""
     length_m: Length = 0.35
     """Extent of the body along its x axis, m."""
     width_m: Length = 0.82
@@ -55,7 +49,7 @@ class RobotParameters(Parameters):
     )
     """Microphones from P in B axes, m, at least three; no two within 1 mm.
 
-    A row with 0.4 m between neighbours, from left to right (Han 2019, 2.3).
+    A row with 0.4 m between neighbors, from left to right (Han 2019, 2.3).
     """
     wheel_radius_m: Length = 0.06
     """Radius of the driven wheels, m."""

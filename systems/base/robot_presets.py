@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-__all__ = ["ROBOT_PRESETS", "RobotPreset"]
-
 RobotPreset = Literal[
     "han2019", "turtlebot3_burger", "song2011_olfactory", "song2011_hearing"
 ]
@@ -25,9 +23,10 @@ _SONG: Mapping[str, Any] = {
 ROBOT_PRESETS: Mapping[str, Mapping[str, Any]] = {
     "han2019": {},
     # ROBOTIS e-Manual, TurtleBot3 Burger: 138 x 178 mm, 1 kg, wheels of 66 mm,
-    # 160 mm apart, 0.22 m/s. P is half a wheel separation ahead of the axle, so that
-    # its speeds along and across have one limit. It has no microphones of its own:
-    # these are ours.
+    # 160 mm apart, 0.22 m/s; mass, wheels and track are also in tables 1 and 2 of
+    # Engelbrecht, Steyn and Djouani (2021). P is half a wheel separation ahead of the
+    # axle, so that its speeds along and across have one limit. It has no microphones of
+    # its own: these are ours.
     "turtlebot3_burger": {
         "length_m": 0.138,
         "width_m": 0.178,

@@ -9,11 +9,6 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.scalar_types import define_for_scalars
 from systems.world.paths import seconds
 
-__all__ = [
-    "SourceRobot",
-    "SourceRobot_",
-]
-
 
 @define_for_scalars("SourceRobot_", __name__)
 def SourceRobot_(T):

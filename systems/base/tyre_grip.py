@@ -9,8 +9,6 @@ from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
 
-__all__ = ["GripNumbers", "grip_accelerations"]
-
 GRAVITY_M_S2 = 9.81
 #: Slip that is left when a wheel grips again decays in this time, s: a third-order
 #: step of 25 ms takes 98 % of it, and any scheme of the integrator is stable.

@@ -3,28 +3,21 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
-from systems.base.diff_drive_plant import body_twist
-from systems.base.parameters import OdometryParameters
+from systems.base.diff_drive_plant import body_twist, saturated
+from systems.base.lagged_motion import LaggedMotion, advance_pose, lagged_motion
+from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
-from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
-
-__all__ = [
-    "WheelOdometry",
-    "WheelOdometry_",
-    "advance_pose",
-    "encoder_angle",
-]
 
 
 @register_jitable
@@ -42,40 +35,21 @@ def encoder_angle(angle: float, pulses_per_revolution: int) -> float:
     return math.floor(angle / pulse) * pulse
 
 
-@register_jitable
-def advance_pose(pose, wheel_angle_steps, robot: RobotParameters):
-    """Pose after the wheels have turned, by the arc's chord.
-
-    Args:
-        pose: (x, y, theta), m and rad; floats or AutoDiffXd.
-        wheel_angle_steps: Left and right angle turned, rad.
-        robot: Wheel radius and separation.
-
-    Returns:
-        (x, y, theta). The chord is taken along the mean heading; its length
-        is that of the arc, to second order in the angle.
-    """
-    distance, turn = body_twist(wheel_angle_steps, robot)
-    mean = pose[2] + turn / 2.0
-    return (
-        pose[0] + distance * cos(mean),
-        pose[1] + distance * sin(mean),
-        pose[2] + turn,
-    )
-
-
 class OdometryNumbers(NamedTuple):
     """What the step of ``WheelOdometry`` depends on."""
 
     robot: RobotParameters
     pulses: int
     """A revolution; 0 where angles are not rounded."""
-    tick_s: float
+    motion: LaggedMotion
+    """Of the wheels in a tick."""
     lost_tick: int = -1
     """At which the pose is lost; -1: never."""
 
 
-def odometry_step(tick, state, inputs, outputs, numbers):
+def odometry_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """Pose and velocity of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
@@ -89,15 +63,24 @@ def odometry_step(tick, state, inputs, outputs, numbers):
     if numbers.pulses > 0:
         left = encoder_angle(left, numbers.pulses)
         right = encoder_angle(right, numbers.pulses)
+    robot, motion = numbers.robot, numbers.motion
     then = state[0], state[1], state[2]
     if tick == numbers.lost_tick:
         then = 0.0 * then[0], 0.0 * then[1], 0.0 * then[2]
     turned = left - state[3], right - state[4]
-    now = advance_pose(then, turned, numbers.robot)
+    travelled = body_twist(turned, robot)
+    steady = travelled
+    # Right after an update nothing of the present command has been driven.
+    if turned[0] != 0.0 or turned[1] != 0.0:
+        top = robot.top_wheel_speed
+        steady_left = motion.duration_s * saturated(inputs[1][0], top)
+        steady_right = motion.duration_s * saturated(inputs[1][1], top)
+        steady = body_twist((steady_left, steady_right), robot)
+    now = advance_pose(then, travelled, steady, motion)
     pose, velocity = outputs
     for k in range(3):
         pose[k] = now[k]
-        velocity[k] = (now[k] - then[k]) / numbers.tick_s
+        velocity[k] = (now[k] - then[k]) / motion.duration_s
         state[k] = now[k]
     state[3], state[4] = left, right
 
@@ -112,9 +95,20 @@ def WheelOdometry_(T):
             name: WheelOdometry
             input_ports:
             - wheel_angles [rad, left and right]
+            - wheel_speeds [rad/s, left and right, commanded]
             output_ports:
             - pose_WB_estimated [m, m, rad]
             - velocity_WB_estimated [m/s, m/s, rad/s]
+
+        Between two ticks it takes the wheels to approach their command with the
+        motors' nominal lag: the encoders give the angles of both ends, command and lag
+        the motion in between. With rolling wheels of that lag and exact angles the
+        pose at a tick is exact. The mean heading over a tick would not do: forward
+        speed in phase with the yaw acceleration gives errors that add up.
+
+        Of angles in whole pulses the place is off by (q/L) s + q at most: q is the way
+        of the rim for a pulse, L the wheel separation, s the mean way of both rims
+        (docs/guard.md has the proof).
 
         Discrete state, every tick: pose and encoder angles at the last tick. The
         outputs continue it to the present angles: no latency. The velocity
@@ -124,6 +118,7 @@ def WheelOdometry_(T):
         Args:
             robot: Wheel radius and separation.
             odometry: ``OdometryParameters``.
+            plant: Lag of the motors.
             initial_pose: (x, y, theta) at time zero, known.
             tick_s: Period of the update, s.
 
@@ -150,6 +145,7 @@ def WheelOdometry_(T):
             *,
             robot=None,
             odometry=None,
+            plant=None,
             initial_pose=(0.0, 0.0, 0.0),
             tick_s=TICK_S,
             converter=None,
@@ -158,6 +154,7 @@ def WheelOdometry_(T):
             self._tick_s = tick_s
             self._robot = robot or RobotParameters()
             self._odometry = odometry or OdometryParameters()
+            self._plant = plant or PlantParameters()
             self._initial_pose = tuple(initial_pose)
             check_finite("WheelOdometry: initial_pose", self._initial_pose)
             if self._odometry.rounding and T is not float:
@@ -172,11 +169,12 @@ def WheelOdometry_(T):
                 pulses = self._odometry.pulses_per_revolution
             lost_s = self._odometry.lost_at_s
             lost_tick = -1 if lost_s is None else round(lost_s / tick_s)
-            numbers = OdometryNumbers(self._robot, pulses, tick_s, lost_tick)
+            motion = lagged_motion(tick_s, self._plant.motor_lag_s)
+            numbers = OdometryNumbers(self._robot, pulses, motion, lost_tick)
             self.declare_step(
                 T,
                 Step(odometry_step, numbers, [*self._initial_pose, 0.0, 0.0]),
-                (("wheel_angles", 2),),
+                (("wheel_angles", 2), ("wheel_speeds", 2)),
                 (("pose_WB_estimated", 3), ("velocity_WB_estimated", 3)),
                 tick_s,
             )
@@ -190,6 +188,7 @@ def WheelOdometry_(T):
                 self,
                 robot=other._robot,
                 odometry=other._odometry,
+                plant=other._plant,
                 initial_pose=other._initial_pose,
                 tick_s=other._tick_s,
                 converter=converter,

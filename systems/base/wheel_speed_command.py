@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
@@ -17,28 +18,16 @@ from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step
 from systems.world.geometry import rotate, safe_norm
 
-__all__ = [
-    "COMMANDS",
-    "TwistWheelCommand",
-    "TwistWheelCommand_",
-    "VelocityWheelCommand",
-    "VelocityWheelCommand_",
-    "WheelSpeedCommand",
-    "WheelSpeedCommand_",
-    "clamped_velocity",
-    "hand_position_twist",
-    "hand_position_velocity",
-    "integrate_velocity",
-    "limited_wheel_speeds",
-]
-
 # Groups of the discrete state; numbers and arrays pass to Drake faster
 # than its own indices and lists.
 _V_WP, _WHEEL_SPEEDS = range(2)
 
+#: ``turned_off_back`` turns by no more than this.
+_ASIDE = math.tan(math.radians(5.0))
+
 
 @register_jitable
-def clamped_velocity(vx, vy, top_speed):
+def clamped_velocity(vx: Any, vy: Any, top_speed: Any) -> Any:
     """A velocity in its direction, its magnitude top_speed at most.
 
     Args:
@@ -56,7 +45,9 @@ def clamped_velocity(vx, vy, top_speed):
 
 
 @register_jitable
-def integrate_velocity(v_WP, acceleration_W, period, top_speed):
+def integrate_velocity(
+    v_WP: Any, acceleration_W: Any, period: Any, top_speed: Any
+) -> Any:
     """Velocity of the virtual mass after one period, its magnitude clamped.
 
     The clamp acts on the state: without it v_P would wind up to F_m/D_r,
@@ -77,7 +68,7 @@ def integrate_velocity(v_WP, acceleration_W, period, top_speed):
 
 
 @register_jitable
-def hand_position_twist(v_WP, theta, control_point_m):
+def hand_position_twist(v_WP: Any, theta: Any, control_point_m: Any) -> Any:
     """Forward speed and yaw rate that give P the velocity v_WP.
 
     v = v_P . x_B and omega = v_P . y_B / epsilon: exact, and smooth at
@@ -96,7 +87,7 @@ def hand_position_twist(v_WP, theta, control_point_m):
 
 
 @register_jitable
-def hand_position_velocity(twist_B, theta, control_point_m):
+def hand_position_velocity(twist_B: Any, theta: Any, control_point_m: Any) -> Any:
     """Velocity of P in W that a twist gives it: undoes ``hand_position_twist``.
 
     Args:
@@ -111,7 +102,34 @@ def hand_position_velocity(twist_B, theta, control_point_m):
 
 
 @register_jitable
-def limited_wheel_speeds(v, omega, robot: RobotParameters):
+def turned_off_back(x: Any, y: Any, theta: Any, least: Any) -> Any:
+    """A vector along which P is to move, turned aside where it points straight back.
+
+    The heading follows theta' = |v_P| sin(psi - theta)/epsilon, psi the direction of
+    v_P: stable where P moves ahead, and an equilibrium, though not a stable one, where
+    it moves straight back. There the robot would back for metres, into what it follows,
+    until rounding errors have grown. Aim P aside instead, and the body turns round.
+    Ours: the papers do not say how an acceleration becomes wheel speeds.
+
+    Args:
+        x: Component in W, any unit; float or AutoDiffXd.
+        y: See x.
+        theta: Heading of B in W, rad.
+        least: A shorter vector stays as it is, in that unit.
+
+    Returns:
+        (x, y): up to 5 deg off straight back, to the side to which it tends already,
+        and to the left if to none. All other vectors stay as they are.
+    """
+    along, across = rotate(-theta, x, y)
+    aside = _ASIDE * (-along - least)
+    if abs(across) >= aside:
+        return x, y
+    return rotate(theta, along, aside if across >= 0.0 else -aside)
+
+
+@register_jitable
+def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
     """Left and right wheel speed, scaled together to the limit.
 
     Args:
@@ -142,7 +160,9 @@ class CommandNumbers(NamedTuple):
     tick_s: float
 
 
-def command_step(tick, state, inputs, outputs, numbers):
+def command_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
 
     Args:

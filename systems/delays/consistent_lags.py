@@ -11,8 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
-__all__ = ["consistent_lags"]
-
 # Peaks of a pair, and sets of lags, that are followed up.
 _PEAKS, _SETS = 12, 48
 

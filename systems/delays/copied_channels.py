@@ -12,11 +12,10 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["copied_pairs", "frame_repeats", "repeats"]
+from systems.framework.compiling import njit
 
 # A copy is off by its rounding alone, a twelfth of a squared step; or by less than
 # this share of its power.

@@ -10,10 +10,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["measure_peaks"]
+from systems.framework.compiling import njit
 
 # Largest number of steps, and the step at which it ends, samples.
 _ITERATIONS = 10

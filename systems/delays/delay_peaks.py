@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from systems.delays.correlation_peak import measure_peaks
 from systems.delays.overlap import EDGE_SAMPLES, cut_rows
 from systems.delays.transforms import filled_rows, transform_filled_rows
-
-__all__ = ["PairTables", "Peaks", "find_peaks", "whitening"]
+from systems.framework.compiling import njit
 
 # Weights of PHAT fall to zero where the cross-spectrum is below this share of
 # its mean: bins of noise would otherwise weigh as much as bins of sound.

@@ -14,8 +14,6 @@ from systems.delays.delay_peaks import PairTables
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["DelayPlan"]
-
 # Samples a period of the highest frequency on the grid of the first search.
 _GRID_DENSITY = 5.0
 
@@ -58,9 +56,9 @@ class DelayPlan:
         if self.max_lag > (1.0 - _LEAST_OVERLAP) * self.frame_samples:
             raise InputError(
                 "microphones",
-                f"sound takes {self.shape.max_delay(self.c) * 1e3:.2f} ms "
-                f"across them, too long for frames of {self.frame_samples} samples; "
-                "use longer frames",
+                f"sound takes {self.shape.max_delay(self.c) * 1e3:.2f} ms across "
+                f"the microphones, too long for frames of {self.frame_samples} "
+                "samples; use longer frames",
             )
 
     @cached_property

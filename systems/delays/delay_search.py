@@ -12,14 +12,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from rocket_fft import c2r
 
 from systems.delays.delay_peaks import whitening
 from systems.delays.delay_plan import DelayPlan
-
-__all__ = ["DelaySearch", "amdf", "search_delays", "weakest_sound"]
+from systems.framework.compiling import njit
 
 # Largest coherence: there is always some noise.
 _WHOLE = 0.99

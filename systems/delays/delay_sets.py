@@ -20,8 +20,6 @@ from systems.delays.delay_search import DelaySearch
 from systems.delays.delays import DelayEstimate, settled_delays
 from systems.delays.transforms import transform_rows
 
-__all__ = ["estimate_delay_sets"]
-
 # A pair's peak may be off the lag that closes the triangle by so much, columns.
 _OFF = 2
 

@@ -20,8 +20,6 @@ from systems.delays.delay_search import DelaySearch, search_delays
 from systems.delays.occupied_band import occupied_band
 from systems.delays.transforms import transform_rows
 
-__all__ = ["METHODS", "DelayEstimate", "estimate_delays", "look", "settled_delays"]
-
 # The channels are cut again when a delay has moved by more than this, samples.
 _SETTLED = 0.75
 _CUTS = 4

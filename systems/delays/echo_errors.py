@@ -9,12 +9,10 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["echo_errors", "energy_spread"]
-
 # Such echoes, those off the floor above all, shift each arrival by itself
 # (standard deviation, s) and the whole direction (rad). The less of a frame is
 # news, the more: from this share on they count fully. All from the trials in
-# rooms, docs/localization.md.
+# rooms, docs/results_hearing.md.
 _ARRIVAL_S = 1.2e-6
 _DIRECTION_RAD = 2e-3
 _NEWS = 0.12

@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["BLOCK_SAMPLES", "frame_energy"]
+from systems.framework.compiling import njit
 
 #: The mean of so many samples does not count: rumble of 100 Hz loses 19 dB of it at
 #: 100 kHz, so that a motor's does not hide a sound.

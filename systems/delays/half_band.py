@@ -10,10 +10,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["PASSED", "halve_rate"]
+from systems.framework.compiling import njit
 
 #: Highest frequency that passes, as a share of the rate.
 PASSED = 0.15

@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["occupied_band"]
-
 # Spectra are smoothed over this width: bins of one frame scatter by 100 %.
 _SMOOTHING_HZ = 400.0
 

@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["EDGE_SAMPLES", "cut_rows", "cut_to_overlap"]
+from systems.framework.compiling import njit
 
 #: Raised-cosine edges of the cut channels, samples. Sharp edges pull a peak to
 #: whole samples by one over the length and the squared bandwidth: 2e-3 samples of

@@ -11,8 +11,6 @@ from scipy import fft
 
 from systems.delays.delay_peaks import whitening
 
-__all__ = ["PairCorrelations", "correlate_pairs"]
-
 # Loudest frames that are looked at; they lie anywhere in the recording.
 _FRAMES = 64
 

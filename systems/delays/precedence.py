@@ -13,18 +13,17 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
-__all__ = ["EchoMemory", "keep_first_wave_front"]
+from systems.framework.compiling import njit
 
 # Short against the first echoes, long against a period of the lowest band, s.
 _WINDOW_S = 2.56e-3
 _HOPS_PER_WINDOW = 4
 
 # Memory of a room that decays by 60 dB in 0.69 s; the trials in
-# docs/localization.md change little from 20 to 100 ms.
+# docs/results_hearing.md change little from 20 to 100 ms.
 _DECAY_S = 0.05
 
 # Only what rises this many times above the noise is news: one bin of noise in

@@ -9,11 +9,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from rocket_fft import r2c
 
-__all__ = ["filled_rows", "transform_filled_rows", "transform_rows"]
+from systems.framework.compiling import njit
 
 
 @njit(cache=True)

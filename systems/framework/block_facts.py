@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-__all__ = ["STAGES", "BlockFacts", "Stage", "block_facts"]
-
 Stage = Literal["world", "hearing", "obstacle sensing", "control", "robot"]
 #: Stages of the signal, in its order.
 STAGES: tuple[Stage, ...] = (

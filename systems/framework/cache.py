@@ -8,8 +8,6 @@ from typing import Any
 from pydrake.common.value import Value
 from pydrake.systems.framework import CacheEntry, DependencyTicket, ValueProducer
 
-__all__ = ["declare_cache"]
-
 
 def declare_cache(
     system: Any,

@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-__all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
-
 # From some way above this exponent on a float is infinite.
 _LARGEST_EXPONENT = 709.0
 

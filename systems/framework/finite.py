@@ -13,20 +13,10 @@ from itertools import chain
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.framework.scalar_math import float_of
-
-__all__ = [
-    "check_finite",
-    "check_port",
-    "check_record",
-    "read_arrays",
-    "read_list",
-    "read_lists",
-    "total",
-]
 
 # Between a template's name and its scalar in the names of pydrake's classes.
 _SCALAR = "_\N{MATHEMATICAL BOLD SCRIPT CAPITAL T}"

@@ -18,8 +18,6 @@ from numpy.typing import NDArray
 
 from systems.framework.step_block import Step
 
-__all__ = ["HostCall", "HostError", "host_step"]
-
 #: Reads the inputs of a tick and fills the outputs of the next, each one after the
 #: other as the ports are.
 HostFunction = Callable[[int, NDArray[np.float64], NDArray[np.float64]], None]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-__all__ = ["InputError", "shortened"]
-
 #: A whole message, with its field, has at most so many characters.
 LONGEST_MESSAGE = 280
 _LONGEST_FIELD = 100

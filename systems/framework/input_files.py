@@ -6,8 +6,6 @@ from pathlib import Path
 
 from systems.framework.input_error import InputError
 
-__all__ = ["require_file"]
-
 
 def require_file(path: str | Path, field: str, kind: str) -> Path:
     """Refuses what is no file before anything is loaded that could read it.

@@ -13,8 +13,6 @@ from itertools import pairwise
 
 from systems.framework.parameters import Parameters
 
-__all__ = ["meanings"]
-
 
 def meanings(model: type[Parameters]) -> dict[str, str]:
     """Docstrings of a model's fields, those of its bases included.

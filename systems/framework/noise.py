@@ -5,21 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.random import SFC64, Generator
 from numpy.random.bit_generator import ISeedSequence
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-__all__ = [
-    "BEFORE_THE_RUN",
-    "TickNoise",
-    "fill_with_tick_noise",
-    "frame_noise",
-    "standard_normals",
-    "tick_generator",
-    "tick_noise",
-]
+from systems.framework.compiling import njit
 
 #: Tick of what is drawn once, when a block is built; no run gets there.
 BEFORE_THE_RUN = 2**62
@@ -95,7 +86,7 @@ def _add_quantiles(
     seed: np.uint64,
     tick: np.uint64,
     quantiles: NDArray[np.float32],
-    out: NDArray[np.float32],
+    out: NDArray[np.float64],
 ) -> None:  # pragma: no cover  (compiled)
     """Fills out from the words of splitmix64 after theirs, two numbers a word."""
     state, low = _tick_word(seed, tick), np.uint64(0xFFFF)
@@ -111,7 +102,7 @@ def _add_quantiles(
 
 def standard_normals(
     shape: tuple[int, int], seed: int, tick: int
-) -> NDArray[np.float32]:
+) -> NDArray[np.float64]:
     """A few normal numbers for one tick of one block; for many see ``frame_noise``.
 
     Sums of two numbers from a table of 65 536 quantiles, normal up to 5.9 standard
@@ -126,7 +117,7 @@ def standard_normals(
     Returns:
         (rows, columns) of unit variance.
     """
-    out = np.empty(shape, dtype=np.float32)
+    out = np.empty(shape)
     words = np.uint64(seed & _WORD), np.uint64(tick & _WORD)
     _add_quantiles(*words, _QUANTILES, out.reshape(-1))
     return out
@@ -146,23 +137,33 @@ def tick_noise(seed: int) -> TickNoise:
         seed: Of the block.
 
     Returns:
-        For ``fill_with_tick_noise``.
+        For ``tick_normals``.
     """
     return TickNoise(np.uint64(seed & _WORD), _QUANTILES)
 
 
 @njit(cache=True)
-def fill_with_tick_noise(
-    noise: TickNoise, tick: int, out: NDArray[np.float32]
-) -> None:  # pragma: no cover  (compiled)
+def tick_normals(
+    noise: TickNoise, tick: int, rows: int, columns: int
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
     """``standard_normals`` of a tick.
+
+    They are double precision: the product of a Python float and a number of single
+    precision is single precision in numpy and double precision in compiled code, so
+    that the two engines would differ.
 
     Args:
         noise: Of the block.
         tick: Number of the tick.
-        out: (rows, columns), filled with numbers of unit variance.
+        rows: How many.
+        columns: How many.
+
+    Returns:
+        (rows, columns) of unit variance.
     """
+    out = np.empty((rows, columns))
     _add_quantiles(noise.seed, np.uint64(tick), noise.quantiles, out.reshape(-1))
+    return out
 
 
 def _polynomial(function: Any, low: float, high: float, degree: int) -> tuple[Any, ...]:

@@ -13,34 +13,6 @@ from typing import Annotated, Any, Self
 
 from pydantic import BaseModel, ConfigDict, Field, Strict
 
-__all__ = [
-    "Acceleration",
-    "Angle",
-    "Coordinate",
-    "Damping",
-    "Duration",
-    "Fraction",
-    "Frequency",
-    "Length",
-    "Mass",
-    "NonNegative",
-    "NonNegativeDamping",
-    "NonNegativeLength",
-    "NonNegativeSpeed",
-    "NonNegativeStiffness",
-    "Parameters",
-    "Period",
-    "Point",
-    "Positive",
-    "Size",
-    "SoundSpeed",
-    "Speed",
-    "Stiffness",
-    "Time",
-    "Waypoints",
-    "with_preset",
-]
-
 # Every quantity has a range that a robot on a floor can have, with decades to spare:
 # what lies outside is a slip of the pen, and would overflow or never end. Where a
 # field needs a narrower range, it says so itself.

@@ -13,9 +13,13 @@ import pydrake.math
 from numba import types
 from numba.extending import overload, register_jitable
 
-from systems.framework.elementary import cos, exp, float_of, sin, sqrt
-
-__all__ = ["cos", "exp", "float_of", "sin", "sqrt"]
+from systems.framework.elementary import (
+    cos as cos,
+    exp as exp,
+    float_of as float_of,
+    sin as sin,
+    sqrt as sqrt,
+)
 
 
 @register_jitable

@@ -11,8 +11,6 @@ from pydrake.autodiffutils import AutoDiffXd
 from pydrake.systems import scalar_conversion
 from pydrake.systems.scalar_conversion import TemplateSystem
 
-__all__ = ["define_for_scalars"]
-
 
 class _Template(TemplateSystem):
     """Makes classes without a search for the module that they belong to.

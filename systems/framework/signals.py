@@ -7,16 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = [
-    "FRAME_SAMPLES",
-    "SAMPLE_RATE_HZ",
-    "TICK_S",
-    "AudioFrame",
-    "Emission",
-    "read_only",
-    "whole",
-]
-
 #: Period of a robot's control, and of its frames, unless a scenario says another, s
 #: (Han 2019, section 4.1; printed "25 m/s").
 TICK_S = 0.025

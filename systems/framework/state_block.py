@@ -11,8 +11,6 @@ from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
 from systems.framework.step_block import RunFacts, Step
 
-__all__ = ["StateOutputs", "ticks_of"]
-
 
 def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
     """A time as a number of ticks.

@@ -13,8 +13,6 @@ from systems.framework.finite import read_lists
 from systems.framework.noise import tick_noise
 from systems.framework.scalar_math import float_of
 
-__all__ = ["RunFacts", "Step", "StepBlock", "reseeded"]
-
 
 class Step(NamedTuple):
     """What a block does in a tick.

@@ -5,23 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.heading.parameters import CompassParameters
-
-__all__ = [
-    "MagneticHeading",
-    "field_in_body",
-    "heading_of_field",
-    "magnetic_heading_step",
-    "wrapped_deg",
-]
 
 
 @register_jitable
@@ -90,8 +81,7 @@ def magnetic_heading_step(
     hx, hy = field_in_body(inputs[0][2], numbers.own)
     heading = heading_of_field(hx, hy)
     if numbers.own.noise_deg > 0.0:
-        normals = np.empty((1, 2), dtype=np.float32)
-        fill_with_tick_noise(numbers.noise, tick, normals)
+        normals = tick_normals(numbers.noise, tick, 1, 2)
         heading += numbers.own.noise_deg * float(normals[0, 0])
     outputs[0][0] = wrapped_deg(heading)
 

@@ -13,14 +13,6 @@ from systems.framework.step_block import Step, StepBlock
 from systems.heading.compass import wrapped_deg
 from systems.heading.parameters import HeadingControlParameters
 
-__all__ = [
-    "PULSE_WIDTHS",
-    "HeadingController",
-    "heading_controller_step",
-    "heading_error",
-    "motor_duties",
-]
-
 #: How an error becomes duties: mended, as printed, and with the missing ``else`` alone.
 PULSE_WIDTHS = ("mended", "printed", "else_only")
 _MENDED, _PRINTED, _ELSE_ONLY = range(len(PULSE_WIDTHS))

@@ -14,11 +14,6 @@ from systems.framework.state_block import StateOutputs
 from systems.framework.step_block import Step
 from systems.heading.parameters import MotorDriverParameters
 
-__all__ = [
-    "MotorDriver",
-    "motor_driver_step",
-]
-
 
 class MotorNumbers(NamedTuple):
     """What the step of ``MotorDriver`` depends on."""

@@ -8,27 +8,21 @@ from pydantic import Field, Strict
 
 from systems.framework.parameters import Angle, NonNegative, Parameters, Positive, Speed
 
-__all__ = [
-    "CompassParameters",
-    "HeadingControlParameters",
-    "MotorDriverParameters",
-]
-
 _Part = Annotated[float, Field(ge=-0.9, le=0.9)]
 
 _Gain = Annotated[float, Field(ge=0.1, le=10.0)]
 
 
 class CompassParameters(Parameters):
-    """Where north is, and what bends the field; nothing of it is printed."""
+    """Direction of north, and distortions of the field; the paper prints no values."""
 
     north_deg: Angle = 90.0
     """Direction of magnetic north in W, deg CCW from its x axis."""
     hard_iron: Annotated[tuple[_Part, _Part], Strict(False)] = (0.0, 0.0)
-    """Field of the robot itself along x and y of B, as a share of the earth's level
-    one: 0.02, 0.05, 0.1 turn the heading by up to 1.1, 2.9, 5.7 deg."""
+    """Field of the robot itself along x and y of B, as a share of the earth's
+    horizontal field: 0.02, 0.05, 0.1 turn the heading by up to 1.1, 2.9, 5.7 deg."""
     soft_iron: Annotated[tuple[_Gain, _Gain], Strict(False)] = (1.0, 1.0)
-    """By what the components along x and y of B are multiplied."""
+    """Factors of the components along x and y of B."""
     noise_deg: float = Field(default=0.5, ge=0.0, le=90.0)
     """Standard deviation of the heading, deg."""
 
@@ -43,7 +37,8 @@ class HeadingControlParameters(Parameters):
     differential: NonNegative = 0.01
     """K_D, s."""
     integral_within_deg: NonNegative = 20.0
-    """The integral grows where the deviation is smaller, deg; else it is 0."""
+    """The integral grows where the deviation is smaller than this, deg; else it is
+    0."""
     largest_integral_deg: NonNegative = 30.0
     """Limit of the integral part, deg."""
     largest_differential_deg: NonNegative = 20.0
@@ -51,15 +46,15 @@ class HeadingControlParameters(Parameters):
     largest_error_deg: Positive = 100.0
     """Limit of the output, deg: in the text, not in table 1."""
     turning_beyond_deg: Positive = 50.0
-    """L: beyond, the wheels turn against one another, deg."""
+    """L: beyond it the wheels turn in opposite directions, deg."""
     pulse_widths: Literal["mended", "printed", "else_only"] = "mended"
     """``mended``: duties go from full ahead to turning on the spot without a jump;
-    ``printed``: table 2, which drives backwards; ``else_only``: with its missing
-    ``else`` alone."""
+    ``printed``: table 2, which drives backward; ``else_only``: table 2 with only its
+    missing ``else`` added."""
 
 
 class MotorDriverParameters(Parameters):
-    """What a full duty gives."""
+    """Speed at full duty."""
 
     full_speed_m_s: Speed = 0.2
     """Rim speed of a wheel at full duty, m/s (Song 2011, 2.3.2: 10 to 20 cm/s)."""

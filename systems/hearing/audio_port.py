@@ -10,8 +10,6 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.framework.step_block import RunFacts
 
-__all__ = ["audio_of_run", "check_rate", "read_audio"]
-
 
 def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
     """The frame on a port.
@@ -53,8 +51,8 @@ def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
     if "audio" not in run.carried:
         raise InputError(
             "engine",
-            "frames of sound come to compiled loops from a MicArray alone; run "
-            "with engine drake",
+            "compiled loops take frames of sound from a MicArray only; run with "
+            "engine drake",
         )
     return run.carried["audio"]
 

@@ -18,16 +18,14 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import fft
 
 from systems.delays.overlap import EDGE_SAMPLES, cut_to_overlap
+from systems.framework.compiling import njit
 from systems.hearing.multilateration import locate_source
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
-
-__all__ = ["arrival_delays", "refine_source"]
 
 # Newton steps, and the change of a delay at which they end, samples.
 _STEPS = 8

@@ -37,12 +37,6 @@ from systems.hearing.steer_near import near_grid, steer
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import MicArrayParameters
 
-__all__ = [
-    "ArrayListener",
-    "CrossPowerEstimator",
-    "Direction",
-]
-
 #: Sound that fills fewer Hz than this repeats within the array: any bearing fits. A
 #: steady tone fills up to 310 Hz by its ends and its echoes, a siren some thousand.
 _LEAST_BANDWIDTH_HZ = 600.0
@@ -94,8 +88,8 @@ class ArrayListener:
         if len(places) < 4:
             raise InputError(
                 "robot.microphones_m",
-                f"has {len(places)} microphones; give four or more, the first in the "
-                "middle",
+                f"has {len(places)} microphones; give four or more, with the "
+                "first in the middle",
             )
         top = min(parameters.high_hz, 0.5 * microphones.sample_rate_hz)
         if parameters.low_hz >= top:

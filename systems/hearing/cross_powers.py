@@ -10,14 +10,6 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-__all__ = [
-    "CrossPowers",
-    "FrameSpectra",
-    "cross_correlations",
-    "gather_frame",
-    "signal_powers",
-]
-
 #: A bin is occupied where this share of the channels' power is the sound's,
 _LEAST_SHARE = 0.25
 #: and more than this share of the noise's: its cross power differs by about as much

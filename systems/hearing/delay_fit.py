@@ -22,10 +22,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["DelayProblem", "fit_delays"]
+from systems.framework.compiling import njit
 
 _STEPS = 30
 _SETTLED = 1e-9
@@ -350,7 +349,7 @@ def _starts(
         # Direction as a function of w, of length 1: a quadratic in w.
         v_w = _least_squares(A, half, rank, 0.0)
         # The loops above count with a and b.
-        a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0  # type: ignore[assignment]
+        a, b, c = _dot(v_w, v_w), _dot(v_far, v_w), _dot(v_far, v_far) - 1.0
         reach = math.sqrt(max(0.0, b * b - a * c))
         for sign in (1.0, -1.0):
             w = (-b + sign * reach) / max(a, 1e-300)

@@ -16,8 +16,6 @@ from systems.hearing.multilateration import angles_of, whitening_matrix
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["locate_far_source"]
-
 _STEPS = 8
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
@@ -24,15 +24,9 @@ from systems.hearing.parameters import IdealHearingParameters
 from systems.sound.parameters import SoundParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
-__all__ = [
-    "IdealSourceSensor",
-    "IdealSourceSensor_",
-    "relative_position",
-]
-
 
 @register_jitable
-def relative_position(pose_WB, pose_WS, control_point_m):
+def relative_position(pose_WB: Any, pose_WS: Any, control_point_m: Any) -> Any:
     """The source as seen from the robot; floats or AutoDiffXd.
 
     Args:
@@ -48,7 +42,7 @@ def relative_position(pose_WB, pose_WS, control_point_m):
 
 
 @register_jitable
-def disturbed(x, y, numbers, hearing):
+def disturbed(x: Any, y: Any, numbers: Any, hearing: Any) -> Any:
     """A position with the noise of bearing and range.
 
     Args:
@@ -67,7 +61,7 @@ def disturbed(x, y, numbers, hearing):
 
 
 @register_jitable
-def stated_covariance(x, y, hearing):
+def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
     """Covariance of a position for the noise that is set, row by row, m^2.
 
     Args:
@@ -105,7 +99,9 @@ class IdealSourceNumbers(NamedTuple):
     """(n, 2) standard normal numbers likewise; (0, 2) without noise."""
 
 
-def ideal_source_step(tick, state, inputs, outputs, numbers):
+def ideal_source_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """What is heard at one tick; see ``systems.framework.step_block.Step``.
 
     Args:

@@ -26,12 +26,6 @@ from systems.hearing.source_fix import SourceFix
 from systems.hearing.steered_response import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "Candidate",
-    "HearingMemory",
-    "Localiser",
-]
-
 # From this correlation on, a frame holds hardly anything but the direct sound; and
 # where the noise was not heard alone yet, so that it may be the rest.
 _DIRECT_CORRELATION = 0.98
@@ -346,7 +340,7 @@ class Localiser:
             channels, samples = self._frame_shape
             raise InputError(
                 "audio",
-                f"a frame of shape {frame.shape}; give a channel for each of "
+                f"a frame of shape {frame.shape}; give one channel for each of "
                 f"the {channels} microphones, of {samples} samples",
             )
         energy = frame_energy(frame)

@@ -16,8 +16,6 @@ from systems.hearing.delay_fit import DelayProblem, fit_delays
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["angles_of", "locate_source", "whitening_matrix"]
-
 # Keeps errors of the azimuth finite right above an array.
 _LEAST_COSINE = 1e-3
 

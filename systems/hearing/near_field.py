@@ -12,13 +12,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.hearing.source_fix import SourceFix
 from systems.sound.array_shape import EqualRow
-
-__all__ = ["locate_in_row", "source_from_delays"]
 
 # Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
 _LEAST_GAP_M = 1e-9

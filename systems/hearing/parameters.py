@@ -22,38 +22,31 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import SAMPLE_RATE_HZ
 
-__all__ = [
-    "CrossPowerParameters",
-    "IdealHearingParameters",
-    "TDOAParameters",
-    "TrackerParameters",
-]
-
 
 class TDOAParameters(Parameters):
-    """How delays are measured, and when they are believed."""
+    """How delays are measured, and when they are accepted."""
 
     method: Literal["gcc", "gcc_phat", "ml", "amdf"] = "gcc"
-    """Cross-correlation, the same with whitened spectrum, maximum likelihood
-    that starts from it, or the papers' AMDF."""
+    """Cross-correlation, cross-correlation with whitened spectrum, maximum likelihood
+    that starts from the latter, or the papers' AMDF."""
     low_hz: Frequency = 300.0
     """Lower end of the band, Hz."""
     high_hz: float = Field(default=15_000.0, ge=1.0, le=SAMPLE_RATE_HZ / 2)
     """Upper end of the band, Hz."""
     band: Literal["set", "found"] = "set"
-    """Use the band as it is set, or what of it each frame's sound occupies."""
+    """Use the whole band, or the part of it that the sound of each frame occupies."""
     sound_speed_m_s: SoundSpeed | None = None
-    """Speed of sound that the estimator believes in, m/s; unset: the true one."""
+    """Speed of sound that the estimator assumes, m/s; unset: the true one."""
     false_alarm_rate: float = Field(default=1e-7, gt=0.0, lt=1.0)
-    """Share of frames of steady noise in which a sound is heard, at most."""
+    """Greatest share of frames of steady noise in which a sound is detected."""
     suppress_echoes: bool = True
     """Weigh frames with echoes by the precedence of the first wave front."""
     maximum_closure_s: Duration = 5e-6
     """Largest disagreement of a pair's own delay with those of all pairs, s."""
     maximum_misfit: Fraction = 0.05
-    """Largest disagreement of a delay with that of the place beyond
-    ``maximum_closure_s``, as a share of the longest that sound can take across the
-    array. It shows with four microphones or more."""
+    """Largest disagreement of a delay with the delay of the estimated position beyond
+    ``maximum_closure_s``, as a share of the longest delay across the array. It has an
+    effect with four microphones or more."""
     maximum_ambiguity: Fraction = 0.8
     """Largest second peak over the first one."""
     maximum_bearing_std_deg: Positive = 3.0
@@ -61,14 +54,14 @@ class TDOAParameters(Parameters):
     maximum_relative_range_std: Positive = 0.25
     """A range is valid where its standard deviation is below this share."""
     schedule_known: bool = False
-    """Hear nothing in frames that cannot hold the source's sound by its schedule:
-    sources that take turns are told apart so, and a robot's own loudspeaker."""
+    """Hear nothing in frames that cannot contain the source's sound by its schedule:
+    this distinguishes sources that take turns, and a robot's own loudspeaker."""
     choose: Literal["loudest", "followed"] = "loudest"
-    """Of sounds that overlap, hear the one that outweighs the others, or the one that
-    has been followed until now."""
+    """Which of several overlapping sounds it hears: the loudest, or the one that it has
+    followed until now."""
     first_bearing_deg: Angle | None = None
-    """Of the source to be followed, from the microphones' centroid as the robot stands
-    before it has heard it, deg CCW; unset: the first one heard alone. For ``choose:
+    """Bearing of the source to follow, from the microphones' centroid at the robot's
+    start, deg CCW; unset: the first source that is heard alone. For ``choose:
     followed``."""
 
     @model_validator(mode="after")
@@ -80,27 +73,29 @@ class TDOAParameters(Parameters):
         if self.first_bearing_deg is not None and self.choose == "loudest":
             raise InputError(
                 "first_bearing_deg",
-                "is of no use to choose: loudest; set choose to followed, or leave "
-                "the bearing out",
+                "has no effect with choose: loudest; set choose to followed, or "
+                "leave the bearing out",
             )
         return self
 
 
 class CrossPowerParameters(Parameters):
-    """How gathered spectra become a bearing."""
+    """How cross-power spectra become a bearing."""
 
     method: Literal["srp_near", "gcc_plane", "gcc_si"] = "srp_near"
-    """``srp_near``: steers all pairs at places near and far; ``gcc_plane``: delays of
-    all pairs between samples, a place where one can be believed, else a plane wave;
-    ``gcc_si``: whole samples, three pairs and spherical interpolation, as printed."""
+    """``srp_near``: steers all pairs to near and far positions; ``gcc_plane``: delays
+    of all pairs with sub-sample resolution, and a position where it is reliable, else a
+    plane wave; ``gcc_si``: whole samples, three pairs and spherical interpolation, as
+    printed."""
     low_hz: Frequency = 200.0
-    """Lower edge of what is heard, Hz (Song 2011, 4.3)."""
+    """Lower edge of the band, Hz (Song 2011, 4.3)."""
     high_hz: Frequency = 8_000.0
     """Upper edge, Hz (4.3)."""
     noise_cross_power: bool = True
-    """Whether the cross powers of the noise before are subtracted (4.3)."""
+    """Whether the cross powers of the noise, measured before, are subtracted (4.3)."""
     ambiguous_share: Fraction = 0.9
-    """Another direction whose response is this share of the strongest is as good."""
+    """Another direction counts as equally good if its response is this share of the
+    strongest."""
 
 
 class TrackerParameters(Parameters):
@@ -114,26 +109,27 @@ class TrackerParameters(Parameters):
     assumed_range_m: Length = 3.0
     """Range of the first target when only its bearing is known, m."""
     resolve_front_back: bool = True
-    """Let the robot's motion tell the source from its mirror image behind a row
+    """Let the robot's motion distinguish the source from its mirror image behind a row
     of microphones; off: every source is in front."""
     source_top_speed_m_s: Speed = 0.7
-    """Speed of a fast source, m/s: two standard deviations of each component of
-    a velocity that is not known."""
+    """Speed of a fast source, m/s: two standard deviations of each component of an
+    unknown velocity."""
     velocity_fade_s: Duration = 5.0
     """Time constant with which a source's velocity is forgotten, s."""
     measurement_floor_m: NonNegativeLength = 0.01
-    """Standard deviation of what the covariance of an estimate leaves out, m."""
+    """Standard deviation of errors that the covariance of an estimate does not include,
+    m."""
     gate_floor_m: Length = 0.2
-    """Standard deviation that the gate allows for besides the covariances, m."""
+    """Standard deviation that the gate allows for in addition to the covariances, m."""
     believed_outliers: int = Field(default=3, ge=1, le=1_000)
-    """The outlier of this number in a row is believed, if they agree."""
+    """Number of outliers in a row after which they are accepted, if they agree."""
 
 
 class IdealHearingParameters(Parameters):
-    """What is left of imperfection when hearing is ideal."""
+    """Imperfections of ideal hearing."""
 
     burst_gaps: bool = True
-    """Hears only while the source sounds; off: at every tick."""
+    """Whether it hears only while the source sounds; off: it hears at every tick."""
     bearing_noise_deg: NonNegative = 0.0
     """Standard deviation of a bearing, deg."""
     range_noise_fraction: NonNegative = 0.0

@@ -13,13 +13,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
-
-__all__ = ["FARTHEST_M", "RangePosterior", "range_posterior"]
 
 #: Ranges beyond are told by no array, m.
 FARTHEST_M = 30.0

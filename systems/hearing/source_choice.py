@@ -23,8 +23,6 @@ from systems.hearing.localise import Candidate
 from systems.hearing.tracking.target_filter import NEVER_HEARD_S
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["Belief", "ChoiceMemory", "SourceChoice"]
-
 # Other sources that are remembered, and for how long, s.
 _OTHERS = 4
 _FORGOTTEN_S = 6.0

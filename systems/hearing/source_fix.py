@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["SourceFix"]
-
 
 @dataclass(frozen=True)
 class SourceFix:

@@ -7,8 +7,6 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["interpolate_sphere", "near_or_far", "plane_wave_bearing"]
-
 #: Places farther than this are none: the plane wave's bearing is better, m.
 FARTHEST_M = 4.0
 #: A place counts if its bearing is this near to that of the plane wave, deg.

@@ -7,8 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["NearGrid", "Steered", "near_grid", "steer"]
-
 #: Ranges of the grid, m, near and far: more of them find more echoes.
 _RANGES_M = (0.4, 3.0)
 #: Bearings of the grid are so far apart, deg; the peak is refined between them.

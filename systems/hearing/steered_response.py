@@ -13,19 +13,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
+from systems.framework.compiling import njit
 from systems.sound.array_shape import ArrayShape
-
-__all__ = [
-    "LAG_DENSITY",
-    "NEAREST_M",
-    "SearchGrid",
-    "centroid_delays",
-    "steered_response",
-]
 
 # Between two neighbours of the grid a pair's path changes by less than twice
 # this share of the shortest wavelength.

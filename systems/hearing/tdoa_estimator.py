@@ -26,14 +26,6 @@ from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
-__all__ = [
-    "TDOAEstimator",
-    "TDOAParameters",
-    "may_sound",
-    "port_values",
-    "robot_localiser",
-]
-
 
 def robot_localiser(
     parameters: TDOAParameters,

@@ -8,12 +8,6 @@ from systems.laws.law_controller import define_law_controller
 from systems.laws.parameters import Active2017Parameters
 from systems.laws.records import ACTIVE_2017
 
-__all__ = [
-    "ActiveImpedance2017Controller",
-    "ActiveImpedance2017Controller_",
-    "active_2017_force",
-]
-
 
 def active_2017_force(c: Any, s: Any, gains: Active2017Parameters) -> Any:
     """K_a(c)/c + D_a(s) s: inverse distance, both terms saturating.

@@ -9,12 +9,6 @@ from systems.laws.law_controller import define_law_controller
 from systems.laws.parameters import ActiveParameters
 from systems.laws.records import ACTIVE
 
-__all__ = [
-    "ActiveImpedanceController",
-    "ActiveImpedanceController_",
-    "active_force",
-]
-
 
 def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
     """k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s) (Han 2019, eq. 20).

@@ -22,8 +22,6 @@ from systems.laws.trajectory.trajectory_laws import (
     TRAJECTORY_FILTERED,
 )
 
-__all__ = ["FORCE_LAWS", "LAWS", "law_title"]
-
 #: The laws that come with the package, by name.
 LAWS: Mapping[str, Law] = {
     law.name: law

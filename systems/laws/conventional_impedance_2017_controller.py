@@ -8,12 +8,6 @@ from systems.laws.law_controller import define_law_controller
 from systems.laws.parameters import Conventional2017Parameters
 from systems.laws.records import CONVENTIONAL_2017
 
-__all__ = [
-    "ConventionalImpedance2017Controller",
-    "ConventionalImpedance2017Controller_",
-    "conventional_2017_force",
-]
-
 
 def conventional_2017_force(
     c: Any, s: Any, gains: Conventional2017Parameters, least_range_m: float

@@ -8,12 +8,6 @@ from systems.laws.law_controller import define_law_controller
 from systems.laws.parameters import ConventionalParameters
 from systems.laws.records import CONVENTIONAL
 
-__all__ = [
-    "ConventionalImpedanceController",
-    "ConventionalImpedanceController_",
-    "conventional_force",
-]
-
 
 def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
     """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).

@@ -37,11 +37,6 @@ from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import make_free_space
 from systems.safety.parameters import FreeSpaceParameters
 
-__all__ = [
-    "GuardedController",
-    "hazard_sensors",
-]
-
 
 def guarded_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DriveNumbers
@@ -112,7 +107,7 @@ class GuardedController(LeafSystem):
         known: Grid of the map.
         tick_s: Period of the controller, s.
 
-    Reference: ours; docs/safety.md.
+    Reference: ours; docs/guard.md.
     """
 
     FACTS = BlockFacts(

@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import turned_off_back
 from systems.framework.block_facts import BlockFacts
 from systems.framework.scalar_math import float_of
 from systems.framework.signals import TICK_S
@@ -24,20 +25,17 @@ from systems.ranging.collision_vector import SLOTS
 from systems.ranging.parameters import UltrasonicParameters
 from systems.world.geometry import control_point, rotate, safe_norm
 
-__all__ = [
-    "ImpedanceLoop",
-    "attraction_force",
-    "obstacle_speed",
-    "repulsion_force",
-]
-
-
 #: Numbers that are remembered a tick: feature, C_x and C_y of each slot.
 _ROW = 3 * SLOTS
 
+#: A target that is farther than this straight behind P pulls a little aside, m.
+_BEHIND_M = 0.3
+
 
 @register_jitable
-def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):
+def attraction_force(
+    p_WP: Any, v_WP: Any, p_WS: Any, valid: Any, attraction: Any, mass: Any
+) -> Any:
     """Force on the virtual mass towards the follow point, N.
 
     Args:
@@ -62,7 +60,9 @@ def attraction_force(p_WP, v_WP, p_WS, valid, attraction, mass):
     return pull * dx - damping * v_WP[0], pull * dy - damping * v_WP[1]
 
 
-def obstacle_speed(C_now, C_before, velocity_term: VelocityTerm, period):
+def obstacle_speed(
+    C_now: Any, C_before: Any, velocity_term: VelocityTerm, period: Any
+) -> Any:
     """s in m/s: how fast the collision vector changes.
 
     Args:
@@ -97,7 +97,9 @@ def _push(C_W, s, law, arguments):
     return -f * C_W[0] / c, -f * C_W[1] / c
 
 
-def repulsion_force(vectors, before, law, velocity_term: VelocityTerm, period):
+def repulsion_force(
+    vectors: Any, before: Any, law: Any, velocity_term: VelocityTerm, period: Any
+) -> Any:
     """Sum of the forces away from the obstacles.
 
     Args:
@@ -138,7 +140,9 @@ class ImpedanceNumbers(NamedTuple):
     """Time of a round of the sensors, s."""
 
 
-def impedance_step(tick, state, inputs, outputs, numbers):
+def impedance_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """The forces of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
@@ -151,10 +155,12 @@ def impedance_step(tick, state, inputs, outputs, numbers):
     """
     p_WS, valid, C_B, features, pose, v_WP = inputs
     acceleration, forces, speeds = outputs
+    x, y = control_point(pose, numbers.control_point_m)
+    dx, dy = turned_off_back(p_WS[0] - x, p_WS[1] - y, pose[2], _BEHIND_M)
     F_m = attraction_force(
-        control_point(pose, numbers.control_point_m),
+        (0.0 * dx, 0.0 * dy),
         v_WP,
-        p_WS,
+        (dx, dy),
         valid[0] > 0.5,
         numbers.attraction,
         numbers.mass_kg,

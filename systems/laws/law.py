@@ -9,8 +9,6 @@ from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
 
-__all__ = ["Equation", "Law", "Tuning"]
-
 
 @dataclass(frozen=True)
 class Equation:

@@ -10,8 +10,6 @@ from systems.framework.scalar_types import define_for_scalars
 from systems.laws.impedance import ImpedanceLoop
 from systems.laws.law import Law
 
-__all__ = ["define_law_controller"]
-
 _DOCUMENTATION = """Follows the target; {about}.
 
 .. pydrake_system::

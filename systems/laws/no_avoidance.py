@@ -4,10 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from systems.laws.records import NONE
-
-__all__ = ["NONE", "no_force"]
-
 
 def no_force(c: Any, s: Any, gains: Any) -> Any:
     """No push, N.

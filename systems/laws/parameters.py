@@ -24,18 +24,6 @@ from systems.framework.parameters import (
     Stiffness,
 )
 
-__all__ = [
-    "Active2017Parameters",
-    "ActiveParameters",
-    "AttractionParameters",
-    "Conventional2017Parameters",
-    "ConventionalParameters",
-    "GuardedParameters",
-    "SharedRepulsion",
-    "VelocityTerm",
-    "matched_decay",
-]
-
 VelocityTerm = Literal["printed", "closing"]
 
 
@@ -47,17 +35,17 @@ class AttractionParameters(Parameters):
     damping_n_s_m: NonNegativeDamping = 1.0
     """D_r, N s/m; printed without unit. Damping ratio 0.18 with K_r = 2."""
     follow_distance_m: NonNegativeLength = 1.2
-    """Distance d_f from the source at which the attraction rests, m; ours.
-    0 is as printed: P is pulled onto the source itself."""
+    """Distance d_f from the source at which the attraction is at rest, m; our choice. 0
+    is as printed: P is pulled onto the source itself."""
     brake_time_s: Duration = 0.5
-    """Time constant of the stop when there is no target, s; ours."""
+    """Time constant of the stop when there is no target, s; our choice."""
 
 
 class SharedRepulsion(Parameters):
     """What every law reads beside its own gains."""
 
     velocity_term: VelocityTerm = "printed"
-    """s = |dC/dt| as printed, or ``closing``: the speed of approach alone."""
+    """s = |dC/dt| as printed, or ``closing``: the speed of approach only."""
 
 
 class ConventionalParameters(Parameters):
@@ -96,7 +84,7 @@ class ActiveParameters(Parameters):
     matched_stiffness_n_m: Stiffness = 17.1
     """K_0, N/m: the push at rho_0/2 is K_0 rho_0/2."""
     reach_m: Length = 0.8
-    """rho_0, m (Han 2019, 5.2); the law itself has no end."""
+    """rho_0, m (Han 2019, 5.2); the law itself has no limit of reach."""
     reference_damping_n_s_m: Damping = 0.0811
     """d_ref, N s/m, below D_0."""
     matched_damping_n_s_m: Damping = 0.839
@@ -161,44 +149,46 @@ class Active2017Parameters(Parameters):
     """D_0, N s/m."""
     saturation_speed_m_s: Speed = 0.72
     """mu_1: faster than this the velocity term stays at D_0 mu_1, m/s. Kim 2017, 5
-    chooses it by trial so that the robot stays below 720 mm/s, and prints no
-    value; ours is that speed."""
+    chooses it by trial so that the robot stays below 720 mm/s, and prints no value; the
+    default is that speed."""
 
 
 class GuardedParameters(Parameters):
     """How the guarded law drives, looks and plans."""
 
     look_ahead_m: Length = 1.5
-    """It heads for points of its way no farther away, m."""
+    """Greatest distance of the points of its path that it heads for, m."""
     weave_rad: float = Field(default=0.3, ge=0.0, le=1.5)
-    """It weaves by so much to both sides, so that its sensors sweep, rad."""
+    """Amplitude of weaving to both sides, with which its sensors sweep, rad."""
     weave_period_s: Duration = 2.4
-    """Period of that, s."""
+    """Period of weaving, s."""
     search_rad: float = Field(default=1.0, ge=0.0, le=1.5)
-    """The same where something moves, the target or another body, rad."""
+    """Amplitude of weaving where the target or another body moves, rad."""
     search_period_s: Duration = 3.4
-    """Period of that, s."""
+    """Period of weaving where something moves, s."""
     search_less: Fraction = 0.3
-    """By this share it searches less where it lags behind the target."""
+    """Share by which it weaves less where it lags behind the target."""
     hazard_speed_m_s: Speed = 0.6
-    """Bodies that it tracks are no faster, m/s."""
+    """Greatest speed of the bodies that it tracks, m/s."""
     risk_gain: NonNegative = 8.0
-    """Price of a body that would be hit, m/s off the wanted speed."""
+    """Cost of a predicted contact with a body, as loss of wanted speed, m/s."""
     watch_gain: NonNegative = 0.7
-    """Price of a threat that is 1 rad out of view, m/s off the wanted speed."""
+    """Cost of a threat that is 1 rad out of view, as loss of wanted speed, m/s."""
     replan_s: Duration = 0.5
     """Time from one plan to the next, s."""
     patience_s: Duration = 0.3
-    """Blocked by the guard for so long, it looks at what blocks it, s."""
+    """After being blocked by the guard for this time it looks at the obstacle, s."""
     give_up_s: Duration = 5.5
-    """It stays for so long at most, then it marks what is ahead and backs off, s."""
+    """Longest time that it stays there before it marks the obstacle ahead and backs
+    off, s."""
     search_way_s: Duration = 20.0
-    """For so long it seeks a way where all lead through what echoes, s."""
+    """Time that it seeks a path where all paths lead through echoes, s."""
     mark_s: Duration = 10.0
-    """For so long it seeks ways that keep off what has blocked it, s."""
+    """Time that it seeks paths away from the obstacle that blocked it, s."""
     clearance_m: NonNegativeLength = 0.02
-    """By so much ways keep the disc that holds the body off echoes, m."""
+    """Distance that paths keep between the disc around the body and echoes, m."""
     source_clearance_m: NonNegativeLength = 0.85
-    """Echoes from so near to the target do not block ways, m."""
+    """Echoes within this distance of the target do not block paths, m."""
     source_radius_m: Length = 0.35
-    """Echoes from so near to the target are its own: no other body is there, m."""
+    """Echoes within this distance of the target count as echoes of the target: no other
+    body is there, m."""

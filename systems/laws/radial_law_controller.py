@@ -9,8 +9,6 @@ from systems.laws.impedance import ImpedanceLoop
 from systems.laws.no_avoidance import no_force
 from systems.laws.repulsion import RepulsionParameters
 
-__all__ = ["RadialLawController", "RadialLawController_"]
-
 
 @define_for_scalars("RadialLawController_", __name__)
 def RadialLawController_(T):

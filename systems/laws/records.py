@@ -13,17 +13,6 @@ from systems.laws.parameters import (
     GuardedParameters,
 )
 
-__all__ = [
-    "ACTIVE",
-    "ACTIVE_2017",
-    "CONVENTIONAL",
-    "CONVENTIONAL_2017",
-    "GUARDED",
-    "NONE",
-    "PLUME_SEARCH",
-    "SOUND_SEARCH",
-]
-
 NONE = Law(
     name="none",
     title="No avoidance",
@@ -164,7 +153,7 @@ GUARDED = Law(
 
 PLUME_SEARCH = Law(
     name="plume_search",
-    title="Search for an odour source by smell and wind (Song 2011)",
+    title="Search for an odor source by smell and wind (Song 2011)",
     label="plume search",
     equations=(
         Equation(

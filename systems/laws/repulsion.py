@@ -2,7 +2,7 @@
 
 K_0, k_ref, D_0 and d_ref are not printed in the papers. These defaults are what
 ``phonotaxis design`` derives from stated requirements, the same for each law;
-docs/design.md explains.
+docs/avoidance.md explains.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from pydantic import Field, create_model
 
 from systems.laws.catalogue import LAWS
 from systems.laws.parameters import SharedRepulsion
-
-__all__ = ["RepulsionParameters"]
 
 if TYPE_CHECKING:
 
@@ -29,7 +27,7 @@ else:
         "RepulsionParameters",
         __base__=SharedRepulsion,
         __module__=__name__,
-        __doc__="What pushes the robot off obstacles; each law reads its own set.",
+        __doc__="Gains of the push off obstacles; each law reads its own set.",
         **{
             law.name: (
                 law.gains,

@@ -6,22 +6,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.compiling import njit
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.odor.parameters import AirflowParameters
 from systems.odor.wind import WIND_SIZE, wind_velocity
-
-__all__ = [
-    "AirflowSensors",
-    "airflow_reading",
-    "airflow_step",
-]
 
 #: What a crosswind wire feels of wind along it, as a share of its square.
 _ALONG = 0.04
@@ -77,8 +71,7 @@ def airflow_step(
     ux, uy = _wind_at(np.asarray(wind), np.asarray(pose))
     speed = math.hypot(ux, uy)
     source = math.atan2(-uy, -ux) - pose[2]
-    normals = np.empty((1, 2), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, 1, 2)
     for k in range(2):
         value = numbers.gain * speed * airflow_reading(source, k, numbers.crosswind)
         outputs[0][k] = value * (1.0 + numbers.noise_share * float(normals[0, k]))

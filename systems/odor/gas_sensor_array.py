@@ -6,29 +6,24 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.finite import read_arrays
 from systems.framework.noise import (
     BEFORE_THE_RUN,
     TickNoise,
-    fill_with_tick_noise,
     standard_normals,
     tick_noise,
+    tick_normals,
 )
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock
 from systems.odor.odor_plume import PLUME_SIZE, concentration
 from systems.odor.parameters import GAS_SENSORS, GasSensorParameters
-
-__all__ = [
-    "GasSensorArray",
-    "gas_sensor_step",
-]
 
 _HOUR_S = 3_600.0
 _DEAD, _STUCK = 1, 2
@@ -83,8 +78,7 @@ def gas_sensor_step(
     ratios, truths = outputs
     gas = np.empty(3)
     _concentrations(inputs[0], inputs[1], numbers.positions, numbers.height_m, gas)
-    normals = np.empty((1, 4), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, 1, 4)
     time = tick * numbers.tick_s
     for k in range(3):
         rest = (1.0 + gas[k]) ** -numbers.exponents[k]

@@ -6,31 +6,20 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
 from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_velocity
-
-__all__ = [
-    "MOST_PUFFS",
-    "PLUME_SIZE",
-    "PUFFS_BEGIN",
-    "PUFF_SIZE",
-    "OdorPlume",
-    "concentration",
-    "plume_step",
-    "release_rate",
-]
 
 #: Puffs that are kept, the youngest.
 MOST_PUFFS = 320
@@ -151,8 +140,7 @@ def _advance(
         plume[_BACKGROUND] = numbers.rate * plume[_AGE] / numbers.volume
     if numbers.steady:
         return
-    normals = np.empty((2 * MOST_PUFFS, 2), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, 2 * MOST_PUFFS, 2)
     change = math.sqrt(1.0 - numbers.own_keep**2) * numbers.own_intensity
     kept = 0
     for puff in range(int(plume[_COUNT])):
@@ -272,8 +260,9 @@ class OdorPlume(LeafSystem):
         if self._own.kind == "steady" and self._wind.speed_m_s < _STEADY_M_S:
             raise InputError(
                 "wind.speed_m_s",
-                f"is {self._wind.speed_m_s:g}, but a steady plume (odor.kind) has no "
-                "end without wind; set it to 0.5 or more, or odor.kind to puffs",
+                f"is {self._wind.speed_m_s:g}, but a steady plume (odor.kind) is "
+                "unbounded without wind; set it to 0.5 or more, or odor.kind to "
+                "puffs",
             )
         self.set_name("odor_plume")
         self._port = self.DeclareVectorInputPort(name="wind", size=WIND_SIZE)

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from numba import njit
-
-__all__ = ["scaled_erfc", "sharan_concentration", "steady_concentration"]
+from systems.framework.compiling import njit
 
 #: From here on the series of ``scaled_erfc`` is right to double precision.
 _ASYMPTOTIC = 12.0

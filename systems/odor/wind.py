@@ -6,29 +6,21 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.noise import (
     BEFORE_THE_RUN,
     TickNoise,
-    fill_with_tick_noise,
     standard_normals,
     tick_noise,
+    tick_normals,
 )
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.odor.parameters import WindParameters
-
-__all__ = [
-    "WIND_PERIOD_S",
-    "WIND_SIZE",
-    "WindField",
-    "wind_step",
-    "wind_velocity",
-]
 
 #: Size of the port ``wind``: whether it is a jet; mean and unsteady velocity, each x
 #: and y, m/s; a jet's origin, m, its diameter, m, and its growth.
@@ -96,8 +88,7 @@ def wind_step(
     """
     if tick % numbers.period != 0 or numbers.spread == 0.0:
         return
-    normals = np.empty((1, 2), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, 1, 2)
     change = numbers.spread * math.sqrt(1.0 - numbers.keep**2)
     for k in range(2):
         state[_GUST + k] = numbers.keep * state[_GUST + k] + change * float(

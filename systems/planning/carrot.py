@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
+from systems.framework.compiling import njit
 from systems.planning.way import STRAIGHT, Way
-
-__all__ = ["find_carrot"]
 
 #: The straight line may cost so much more than the way, which zigzags on its cells.
 _DEARER = 1.1

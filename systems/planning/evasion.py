@@ -6,12 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from systems.framework.compiling import njit
 from systems.planning.hazards import AGE_S, SPREAD, VX, VY, WEIGHT, X, Y
 from systems.planning.turning import wrapped
-
-__all__ = ["EvasionNumbers", "choose_motion", "find_threats", "risk_of", "watch_of"]
 
 #: What is looked ahead, s, and in which steps.
 _AHEAD_S, _STEP_S = 4.0, 0.2
@@ -50,7 +48,7 @@ class EvasionNumbers(NamedTuple):
     """What a choice depends on."""
 
     turn_gain: float
-    """Yaw rate for an error of the heading, 1/s."""
+    """Yaw rate per error of the heading, 1/s."""
     turn_rate_rad_s: float
     """The largest one, rad/s."""
     half_size: tuple[float, float]

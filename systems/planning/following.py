@@ -9,12 +9,6 @@ from numba.extending import register_jitable
 
 from systems.planning.parameters import FollowingParameters
 
-__all__ = [
-    "FollowNumbers",
-    "approach",
-    "wanted_speed",
-]
-
 
 class FollowNumbers(NamedTuple):
     """What following depends on."""

@@ -6,10 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.planning.carrot import find_carrot
 from systems.planning.evasion import EvasionNumbers, choose_motion
 from systems.planning.following import wanted_speed
@@ -25,16 +25,6 @@ from systems.planning.turning import turn_towards, wrapped
 from systems.planning.way import NEAR, OCCUPIED, TIGHT, Way, find_way, mark_blocked
 from systems.safety.braking import TURNED
 from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
-
-__all__ = [
-    "BACKING",
-    "DRIVING",
-    "GIVING_UP",
-    "LOOKING",
-    "WAITING",
-    "DriveNumbers",
-    "drive_guarded",
-]
 
 #: What the robot does.
 WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)

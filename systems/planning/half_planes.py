@@ -6,9 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
-__all__ = ["nearest_velocity"]
+from systems.framework.compiling import njit
 
 #: Rounding of a constraint, m/s.
 _ROUNDING = 1e-9

@@ -11,25 +11,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.planning.turning import wrapped
 from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
-
-__all__ = [
-    "AGE_S",
-    "EXISTS",
-    "MOVED_S",
-    "SPREAD",
-    "WEIGHT",
-    "HazardSensors",
-    "Hazards",
-    "find_movers",
-    "make_hazards",
-    "pick_hazards",
-    "track_hazards",
-]
 
 #: Tracks, particles of each, and how many of these are looked at to choose a motion.
 _TRACKS, _PARTICLES, _PICKED = 8, 200, 25

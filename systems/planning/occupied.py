@@ -10,12 +10,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, FreeSpace
-
-__all__ = ["list_occupied"]
 
 #: From a cell with fewer hits nothing has echoed for sure; more of them do not count.
 _LEAST_HITS, _MOST_HITS = 1.0, 6.0

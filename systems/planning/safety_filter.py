@@ -22,11 +22,6 @@ from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.velocity_filter import FilterNumbers, filtered_velocity
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
-__all__ = [
-    "SafetyFilter",
-    "safety_filter_step",
-]
-
 #: What moves and has come too near is left within this, s.
 _LEAVE_S = 0.1
 #: Groups of the discrete state, which are the outputs: wheel speeds, velocity of P, and
@@ -112,9 +107,9 @@ class SafetyFilter(LeafSystem):
         robot: Dimensions and top speed.
         tick_s: Period of the command, s.
 
-    Reference: ours, in the place of eq. 6 of Engelbrecht, Steyn and Djouani (2021),
-    which stops for ever what has come too near; half planes of van den Berg and others
-    (2011).
+    Reference: ours; half planes of van den Berg and others (2011). Eq. 6 of
+    Engelbrecht, Steyn and Djouani (2021), which only stops the robot, is
+    ``TrajectoryImpedanceParameters.block_distance_m``.
     """
 
     FACTS = BlockFacts(

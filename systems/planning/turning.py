@@ -7,8 +7,6 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-__all__ = ["turn_towards", "wrapped"]
-
 #: Farther off its heading than this, the robot turns before it drives, rad.
 _TURN_FIRST_RAD = 1.0
 

@@ -6,14 +6,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.planning.half_planes import nearest_velocity
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-
-__all__ = ["FilterNumbers", "disc_plane", "filtered_velocity", "wheel_planes"]
 
 #: What is slower rests, m/s.
 _RESTS_M_S = 0.02

@@ -6,24 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.safety.free_space import FIRST_I, FIRST_J, NEVER, FreeSpace
-
-__all__ = [
-    "DOUBTFUL",
-    "FREE",
-    "NEAR",
-    "OCCUPIED",
-    "STRAIGHT",
-    "TIGHT",
-    "UNKNOWN",
-    "Way",
-    "find_way",
-    "make_way",
-    "mark_blocked",
-]
 
 #: Price of a cell: seen free; unknown; so that the disc is near, or tight to, what
 #: echoed; so that it would lie on what echoed now and then, or often.

@@ -11,22 +11,6 @@ from numba.extending import register_jitable
 
 from systems.framework.input_error import InputError
 
-__all__ = [
-    "FIRST_BYTE",
-    "FRAMES_SIZE",
-    "FRAME_BYTES",
-    "FRAME_NAMES",
-    "MOST_FRAMES",
-    "SECOND_BYTE",
-    "SINK",
-    "Frame",
-    "decode_frame",
-    "encode_frame",
-    "frame_is_sound",
-    "frame_value",
-    "write_frame",
-]
-
 #: Bytes of a frame: FA FB, address, function, four of data, sum of the others.
 FRAME_BYTES = 9
 #: Frames that a robot sends in a tick at most.

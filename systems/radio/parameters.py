@@ -6,20 +6,16 @@ from pydantic import Field
 
 from systems.framework.parameters import Fraction, Parameters, Time
 
-__all__ = [
-    "RadioParameters",
-]
-
 
 class RadioParameters(Parameters):
-    """Latency, losses and levels; none is printed."""
+    """Latency, losses and levels; the paper prints none of them."""
 
     latency_s: Time = 0.05
-    """From sending to hearing, s; at least a tick."""
+    """Time from sending to reception, s; at least one tick."""
     loss: Fraction = 0.0
     """Share of the frames that do not arrive."""
     byte_error: Fraction = 0.0
-    """Share of the bytes that arrive as something else."""
+    """Share of the bytes that arrive with a wrong value."""
     level_at_1_m_dbm: float = Field(default=-42.4, ge=-150.0, le=50.0)
     """-A of eq. 8, dBm (an example of the CC2431's data sheet)."""
     path_loss_exponent: float = Field(default=2.5, ge=1.0, le=10.0)

@@ -6,23 +6,16 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.framework.state_block import StateOutputs
 from systems.framework.step_block import RunFacts, Step, reseeded
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 from systems.radio.parameters import RadioParameters
-
-__all__ = [
-    "AIR_SIZE",
-    "RadioChannel",
-    "radio_channel_step",
-]
 
 #: Frames that arrive in a tick at most.
 _MOST_ON_AIR = 3 * MOST_FRAMES
@@ -84,9 +77,8 @@ def radio_channel_step(
     for frames in inputs:
         sends = sends or frames[0] > 0.5
     if sends:
-        random = np.zeros((_MOST_ON_AIR + 1, 1 + 2 * FRAME_BYTES), dtype=np.float32)
-        if numbers.loss > 0.0 or numbers.byte_error > 0.0:
-            fill_with_tick_noise(numbers.noise, tick, random)
+        rows, columns = _MOST_ON_AIR + 1, 1 + 2 * FRAME_BYTES
+        random = tick_normals(numbers.noise, tick, rows, columns)
         for frames in inputs:
             _send(state, place, frames, numbers, random)
 

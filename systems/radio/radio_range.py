@@ -5,17 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
 
 from systems.framework.block_facts import BlockFacts
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.radio.parameters import RadioParameters
-
-__all__ = ["RadioRange", "radio_distance", "radio_level", "radio_range_step"]
 
 #: Levels are measured so often, s.
 _PERIOD_S = 0.1
@@ -80,8 +77,7 @@ def radio_range_step(
     if tick % numbers.period == 0:
         pose, other = inputs
         distance = math.hypot(other[0] - pose[0], other[1] - pose[1])
-        normals = np.empty((1, 2), dtype=np.float32)
-        fill_with_tick_noise(numbers.noise, tick, normals)
+        normals = tick_normals(numbers.noise, tick, 1, 2)
         level = radio_level(distance, numbers.level_at_1_m_dbm, numbers.exponent)
         state[0] = level + numbers.fading_db * float(normals[0, 0])
     outputs[0][0] = state[0]

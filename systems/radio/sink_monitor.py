@@ -18,8 +18,6 @@ from systems.framework.step_block import Step
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.stream import PARSER_SIZE, parse_byte
 
-__all__ = ["SINK_FIELDS", "SinkMonitor", "sink_monitor_step"]
-
 #: What the sink knows of each robot: frames so far, the last one's function (-1: none
 #: yet) and value, time since then, s, and what it says of its search: -1 nothing, 0
 #: not found, 1 found.

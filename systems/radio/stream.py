@@ -16,8 +16,6 @@ from systems.radio.codec import (
     frame_value,
 )
 
-__all__ = ["PARSER_SIZE", "StreamParser", "parse_byte"]
-
 #: Numbers of a parser's state: how many bytes it holds, and these.
 PARSER_SIZE = 1 + FRAME_BYTES
 

@@ -6,23 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.ranging.collision_vector import foot_on_segment
-
-__all__ = [
-    "CHORD",
-    "EXTENT",
-    "GROUP_SIZE",
-    "MIDDLE_X",
-    "MIDDLE_Y",
-    "NEAR_X",
-    "NEAR_Y",
-    "OPEN",
-    "BeamNumbers",
-    "group_beams",
-]
 
 #: Numbers of a group: vectors from P to its nearest point and to the middle between its
 #: outer hits, m; how far these are apart, m; how far beams are apart there, m; and

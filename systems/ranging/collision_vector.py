@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
@@ -18,24 +18,12 @@ from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
-__all__ = [
-    "COLLISION_FACTS",
-    "SLOTS",
-    "CollisionVector",
-    "CollisionVector_",
-    "carried_point",
-    "collision_vectors",
-    "echo_point",
-    "echo_points",
-    "foot_on_segment",
-]
-
 #: Collision vectors that a controller takes at once.
 SLOTS = 3
 
 
 @register_jitable
-def echo_point(range_, axis, position):
+def echo_point(range_: Any, axis: Any, position: Any) -> Any:
     """Where an echo is taken to lie: on the sensor's axis.
 
     Args:
@@ -53,7 +41,7 @@ def echo_point(range_, axis, position):
     )
 
 
-def echo_points(ranges, echo, sensors: UltrasonicParameters):
+def echo_points(ranges: Any, echo: Any, sensors: UltrasonicParameters) -> Any:
     """The points that the sensors see, None where there is no echo.
 
     Args:
@@ -73,7 +61,9 @@ def echo_points(ranges, echo, sensors: UltrasonicParameters):
 
 
 @register_jitable
-def carried_point(point, pose_then, pose_now, control_point_m):
+def carried_point(
+    point: Any, pose_then: Any, pose_now: Any, control_point_m: Any
+) -> Any:
     """Where a point that was seen from another pose lies now, if it rests.
 
     Args:
@@ -93,7 +83,7 @@ def carried_point(point, pose_then, pose_now, control_point_m):
 
 
 @register_jitable
-def foot_on_segment(a, b):
+def foot_on_segment(a: Any, b: Any) -> Any:
     """Point of the segment a-b that is nearest to the origin.
 
     Args:
@@ -117,7 +107,9 @@ def foot_on_segment(a, b):
     return a[0] + t * ex, a[1] + t * ey
 
 
-def collision_vectors(points, parameters: CollisionVectorParameters, neighbours=None):
+def collision_vectors(
+    points: Any, parameters: CollisionVectorParameters, neighbours: Any = None
+) -> Any:
     """Collision vectors from the points that the sensors see.
 
     Args:
@@ -223,7 +215,7 @@ def _all_vectors(points, heard, pairs, vectors):
 
 
 @register_jitable
-def fill_slots(vectors, outputs):
+def fill_slots(vectors: Any, outputs: Any) -> None:
     """Fills the ports of vectors, mask and features: 6, 3 and 3 elements.
 
     Args:
@@ -282,7 +274,9 @@ class CollisionNumbers(NamedTuple):
     tick_s: float
 
 
-def collision_step(tick, state, inputs, outputs, numbers):
+def collision_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """Collision vectors of one tick; see ``systems.framework.step_block.Step``.
 
     Args:

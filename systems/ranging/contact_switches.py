@@ -6,21 +6,16 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import ContactParameters
 from systems.world.geometry import beyond_rectangle
-
-__all__ = [
-    "ContactSwitches",
-    "contact_switches_step",
-]
 
 #: Points along half of the front edge at which it feels.
 _POINTS = 8

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S, whole
 from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.ranging.objects import (
@@ -34,11 +34,6 @@ from systems.world.geometry import (
     nearest_point_on_rectangle,
     segment_clearance,
 )
-
-__all__ = [
-    "IdealObjectSensor",
-    "ideal_object_step",
-]
 
 #: A body that moves is taken for a disc unless it is longer than this many times its
 #: width.
@@ -170,8 +165,7 @@ def ideal_object_step(
     size = OBJECT_SLOTS * OBJECT_SIZE
     kept, pose = np.asarray(state), np.asarray(inputs[0])
     seen = _seen(kept, pose, np.asarray(inputs[1]), np.asarray(inputs[2]), numbers)
-    normals = np.empty((OBJECT_SLOTS, 4), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, OBJECT_SLOTS, 4)
     for k in range(OBJECT_SLOTS):
         if seen[k, THERE] > 0.5:
             for j in range(2):
@@ -246,8 +240,8 @@ class IdealObjectSensor(LeafSystem, StepBlock):
         if own.latency_s > 0.0 and not whole(own.latency_s / tick_s):
             raise InputError(
                 "objects.latency_s",
-                f"{own.latency_s:g} s is no multiple of a tick of {tick_s:g} s; use "
-                f"{round(own.latency_s / tick_s) * tick_s:g}",
+                f"{own.latency_s:g} s is not a multiple of a tick of {tick_s:g} "
+                f"s; use {round(own.latency_s / tick_s) * tick_s:g}",
             )
         delay = round(own.latency_s / tick_s)
         numbers = ObjectNumbers(

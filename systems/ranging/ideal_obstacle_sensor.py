@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
@@ -22,11 +22,11 @@ from systems.ranging.collision_vector import (
 )
 from systems.world.geometry import control_point, nearest_point_on_rectangle, rotate
 
-__all__ = ["IdealObstacleSensor", "IdealObstacleSensor_", "nearest_vectors"]
-
 
 @register_jitable
-def nearest_vectors(pose_WB, rectangles, control_point_m, maximum_range, slots):
+def nearest_vectors(
+    pose_WB: Any, rectangles: Any, control_point_m: Any, maximum_range: Any, slots: Any
+) -> Any:
     """Vectors from P to the nearest points of the nearest bodies.
 
     Args:
@@ -71,7 +71,9 @@ class ObstacleNumbers(NamedTuple):
     """Length and width of the master robot, m."""
 
 
-def ideal_obstacle_step(tick, state, inputs, outputs, numbers):
+def ideal_obstacle_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """Nearest points of one tick; see ``systems.framework.step_block.Step``.
 
     Args:

@@ -6,12 +6,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.ranging.beam_groups import BeamNumbers, group_beams
@@ -28,11 +28,6 @@ from systems.ranging.parameters import (
     UltrasonicParameters,
 )
 from systems.world.geometry import control_point
-
-__all__ = [
-    "ObjectDetector",
-    "object_detector_step",
-]
 
 #: Numbers that are kept of a beam: its last hit in W and its range, m, and whether
 #: there was an echo.

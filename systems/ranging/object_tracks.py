@@ -6,9 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.ranging.beam_groups import (
     CHORD,
     EXTENT,
@@ -20,8 +20,6 @@ from systems.ranging.beam_groups import (
 )
 from systems.ranging.objects import KNOWN, RADIUS, THERE, VX, VY, X, Y, nearest_objects
 from systems.ranging.parameters import OBJECT_SIZE
-
-__all__ = ["TRACKS", "TRACK_SIZE", "TrackNumbers", "track_objects"]
 
 #: Tracks, and numbers of one: whether it exists; for how long its motion was seen, and
 #: for how long it was not seen at all, s; its nearest point in W, m; its radius and how
@@ -59,7 +57,7 @@ class TrackNumbers(NamedTuple):
     memory_s: float
     """What is not seen is there for so long, s."""
     resting_m_s: float
-    """What is slower rests, m/s."""
+    """Objects slower than this count as at rest, m/s."""
     tick_s: float
 
 

@@ -16,21 +16,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from systems.framework.compiling import njit
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-
-__all__ = [
-    "KNOWN",
-    "RADIUS",
-    "ROBOT",
-    "THERE",
-    "VX",
-    "VY",
-    "X",
-    "Y",
-    "nearest_objects",
-]
 
 THERE, X, Y, VX, VY, KNOWN, RADIUS, ROBOT = range(8)
 

@@ -30,19 +30,6 @@ from systems.framework.signals import TICK_S, whole
 from systems.ranging.sensor_faults import SensorFaultParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS, SensorPreset
 
-__all__ = [
-    "NEIGHBOURS_DEG",
-    "OBJECT_SIZE",
-    "OBJECT_SLOTS",
-    "Aggregation",
-    "CollisionVectorParameters",
-    "ContactFaultParameters",
-    "ContactParameters",
-    "ObjectDetectorParameters",
-    "ObjectSensorParameters",
-    "UltrasonicParameters",
-]
-
 #: Objects that a port holds, and numbers of each; see ``systems.ranging.objects``.
 OBJECT_SLOTS, OBJECT_SIZE = 8, 8
 
@@ -63,16 +50,18 @@ class UltrasonicParameters(Parameters):
     """Range finders: three SRF-05 (Han 2019, 4.2), or any others."""
 
     preset: SensorPreset = "three"
-    """A named set: defaults of the other fields, of which those that are given win."""
+    """A named set: defaults of the other fields; fields that are set take
+    precedence."""
     axes_deg: _Axes = (30.0, 0.0, -30.0)
-    """Directions of the cones in B, left to right, deg CCW from x; or a whole number,
-    of as many all around."""
+    """Directions of the cones in B, left to right, deg CCW from x; or the number of
+    cones all around."""
     positions_m: _Places = ()
-    """Places of the sensors from P, in B axes, m; one: that of all; none: all at P."""
+    """Positions of the sensors from P, in B axes, m; one: for all sensors; none: all
+    are at P."""
     beam_half_angle_deg: float = Field(default=15.0, gt=0.0, lt=90.0)
     """Half of each cone's opening angle, deg."""
     minimum_range_m: Length = 0.03
-    """Nearer surfaces read this range, m."""
+    """Nearer surfaces give this range, m."""
     maximum_range_m: Length = 3.0
     """Farther surfaces give no echo, m."""
     noise_m: NonNegativeLength = 0.001
@@ -82,9 +71,10 @@ class UltrasonicParameters(Parameters):
     period_s: Period = TICK_S
     """Time from one firing to the next, s."""
     firing: Literal["simultaneous", "sequential"] = "simultaneous"
-    """All sensors at once, or one after the other, a period each."""
+    """All sensors at once, or one after the other, each for one period."""
     assumed_sound_speed_m_s: SoundSpeed | None = None
-    """Speed by which the sensors turn time into range, m/s; none: the true one."""
+    """Speed of sound by which the sensors convert time to range, m/s; none: the true
+    one."""
     faults: _Faults = ()
     """Sensors that fail."""
 
@@ -104,26 +94,26 @@ class UltrasonicParameters(Parameters):
         if any(b >= a for a, b in pairwise(self.axes_deg)):
             raise InputError(
                 "axes_deg",
-                f"{shortened(str(self.axes_deg), 80)} must fall from left to right, as "
-                "30, 0, -30",
+                f"{shortened(str(self.axes_deg), 80)} must fall from left to "
+                "right, for example 30, 0, -30",
             )
         if self.axes_deg[0] - self.axes_deg[-1] >= 360.0:
             raise InputError(
                 "axes_deg",
-                f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or more; "
-                "end before the first direction comes again",
+                f"{self.axes_deg[0]:g} to {self.axes_deg[-1]:g} is a turn or "
+                "more; end before the first direction repeats",
             )
         for number, fault in enumerate(self.faults):
             if fault.sensor > self.count:
                 raise InputError(
                     f"faults.{number}.sensor",
-                    f"{fault.sensor} is none of {self.count} sensors; lower it",
+                    f"{fault.sensor} is not one of {self.count} sensors; lower it",
                 )
         if len(self.positions_m) not in (0, 1, self.count):
             raise InputError(
                 "positions_m",
-                f"has {len(self.positions_m)} places for {self.count} sensors of "
-                "axes_deg; give one each, one for all, or none",
+                f"has {len(self.positions_m)} positions for {self.count} sensors "
+                "of axes_deg; give one per sensor, one for all, or none",
             )
         return self
 
@@ -137,7 +127,7 @@ class UltrasonicParameters(Parameters):
         """So many directions all around, one of them ahead."""
         if isinstance(axes, int) and not isinstance(axes, bool):
             if not 1 <= axes <= 360:
-                raise InputError("", f"{axes} sensors; take 1 to 360")
+                raise InputError("", f"{axes} sensors; use 1 to 360")
             return tuple(180.0 - 360.0 * k / axes for k in range(axes))
         return axes
 
@@ -185,8 +175,8 @@ class UltrasonicParameters(Parameters):
         if not whole(ticks):
             raise InputError(
                 "period_s",
-                f"{self.period_s:g} s is no multiple of a tick of {tick_s:g} s; give "
-                "one",
+                f"{self.period_s:g} s is not a multiple of a tick of {tick_s:g} "
+                "s; give a multiple",
             )
         return round(ticks)
 
@@ -236,9 +226,9 @@ class CollisionVectorParameters(Parameters):
     """How echoes become collision vectors."""
 
     aggregation: Aggregation = "paper"
-    """``paper``: nearest echo, joined with its nearer neighbour where close
-    enough; ``nearest``: nearest echo alone; ``sum``: every echo or pair its
-    own vector, whose forces add; of more than three the nearest three."""
+    """``paper``: the nearest echo, joined with its nearer neighbor if that is close
+    enough; ``nearest``: only the nearest echo; ``sum``: one vector per echo or pair,
+    whose forces add; if there are more than three, the nearest three."""
     pair_separation_m: NonNegativeLength = 0.5
     """Echoes farther apart than this are taken as two obstacles, m."""
 
@@ -247,7 +237,7 @@ class ContactFaultParameters(Parameters):
     """A switch that fails in a run, and how."""
 
     switch: int = Field(default=1, ge=1, le=2)
-    """1 left, 2 right."""
+    """Which switch: 1 left, 2 right."""
     kind: Literal["stuck_open", "stuck_closed"] = "stuck_open"
     """``stuck_open``: it never closes; ``stuck_closed``: it never opens."""
     start_s: Time = 0.0
@@ -255,7 +245,7 @@ class ContactFaultParameters(Parameters):
 
 
 class ContactParameters(Parameters):
-    """The two switches behind the front bumper (Song 2011, 2.1); sizes are ours."""
+    """The two switches behind the front bumper (Song 2011, 2.1), with our sizes."""
 
     reach_m: Length = 0.01
     """A switch closes where a body is this near to the front, m."""
@@ -266,45 +256,47 @@ class ContactParameters(Parameters):
 
 
 class ObjectSensorParameters(Parameters):
-    """How far and how well objects are seen."""
+    """Range and errors of the object sensor."""
 
     maximum_range_m: Length = 2.0
     """Objects beyond it are not seen, m: R, the range of the scan (table 1)."""
     noise_m: NonNegativeLength = 0.0
-    """Standard deviation of each coordinate of a place, m."""
+    """Standard deviation of each coordinate of a position, m."""
     velocity_noise_m_s: NonNegativeSpeed = 0.0
     """Standard deviation of each component of a velocity, m/s."""
     latency_s: Time = 0.0
-    """Age of what is seen, s, a multiple of the tick."""
+    """Age of the measured objects, s, a multiple of the tick."""
     occlusion: bool = False
     """Whether bodies hide those behind them, unless they leave a corner or the nearest
     place in view."""
 
 
 class ObjectDetectorParameters(Parameters):
-    """How beams become objects; all ours, for the paper prints nothing of it."""
+    """How beams become objects; the paper prints no values."""
 
     gap_m: Length = 0.2
-    """Hits of neighbouring beams are on one object if they are nearer than this and
-    what a surface takes that is seen as obliquely as the next field says, m."""
+    """Hits of neighboring beams belong to one object if they are nearer than this plus
+    the spacing on a surface at the angle of the next field, m."""
     most_oblique_deg: float = Field(default=60.0, ge=0.0, le=85.0)
     """Angle of a beam to a surface's normal up to which hits belong together, deg."""
     dip_m: Length = 0.08
-    """Where the distance from P rises by this and falls again, two objects meet, m."""
+    """Two objects meet where the distance from P rises by this and falls again, m."""
     wide_m: Length = 0.8
-    """Of what is wider, motion along it is not seen, m."""
+    """The motion of an object along itself is not seen if the object is wider than
+    this, m."""
     coarse_m: Length = 0.25
-    """Nor is any where beams are farther apart than this, m: no velocity is known."""
+    """No velocity is known where beams are farther apart than this, m."""
     gate_m: Length = 0.3
-    """Farther from where it is to be, an object is another one, m."""
+    """An object farther than this from its predicted position counts as another object,
+    m."""
     noise_m: NonNegativeLength = 0.04
-    """Standard deviation of an object's distance besides that of ranges, m: beams hit
-    it elsewhere from tick to tick."""
+    """Standard deviation of an object's distance in addition to the noise of ranges, m:
+    beams hit other points of it from tick to tick."""
     velocity_change_m_s: Speed = 0.1
     """Standard deviation of a velocity's change within a second, m/s."""
     confirmation_s: Time = 0.5
     """An object's velocity is known when it was seen for this long, s."""
     memory_s: Time = 0.5
-    """What beams do not see any more is still there for this long, s."""
+    """Time for which an object that beams do not see any more is kept, s."""
     resting_m_s: NonNegativeSpeed = 0.05
-    """What is slower rests, m/s."""
+    """Objects slower than this count as at rest, m/s."""

@@ -8,8 +8,6 @@ from pydantic import Field
 
 from systems.framework.parameters import Parameters, Time
 
-__all__ = ["BLIND", "FROZEN", "NOISY", "SILENT", "SensorFaultParameters"]
-
 FaultKind = Literal["silent", "blind", "frozen", "noisy"]
 #: Numbers of the kinds; 0: sound.
 SILENT, BLIND, FROZEN, NOISY = range(1, 5)
@@ -25,10 +23,10 @@ class SensorFaultParameters(Parameters):
     """A range sensor that fails in a run, and how."""
 
     sensor: int = Field(default=1, ge=1, le=360)
-    """Which one, from the left, from 1."""
+    """Number of the sensor, counted from the left, from 1."""
     kind: FaultKind = "silent"
-    """``silent``: it fires no more; ``blind``: it never has an echo; ``frozen``: it
-    repeats what it read last; ``noisy``: its noise is 0.3 m more."""
+    """``silent``: it does not fire any more; ``blind``: it never has an echo;
+    ``frozen``: it repeats its last reading; ``noisy``: its noise is 0.3 m more."""
     start_s: Time = 0.0
     """When that begins, s."""
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, Literal
 
-__all__ = ["SENSOR_PRESETS", "SensorPreset"]
-
 SensorPreset = Literal["three", "six", "ring_8", "ring_12", "lidar", "scan_7"]
 
 #: A mast over the axle: a ring there has no body of the robot in its view.

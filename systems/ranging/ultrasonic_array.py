@@ -7,7 +7,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
 from pydrake.systems.framework import LeafSystem
@@ -15,8 +14,9 @@ from pydrake.systems.framework import LeafSystem
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
+from systems.framework.compiling import njit
 from systems.framework.finite import check_finite, read_arrays
-from systems.framework.noise import TickNoise, fill_with_tick_noise, tick_noise
+from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.parameters import (
     Size,
 )
@@ -31,15 +31,6 @@ from systems.ranging.sensor_faults import (
 )
 from systems.sound.acoustics import AcousticParameters
 from systems.world.geometry import fan_ranges
-
-__all__ = [
-    "UltrasonicArray",
-    "body_rectangles",
-    "cone_ranges",
-    "measured_ranges",
-    "world_rectangles",
-]
-
 
 #: Standard deviation of what a noisy sensor's ranges are off besides, m.
 _NOISY_M = 0.3
@@ -185,7 +176,6 @@ class UltrasonicNumbers(NamedTuple):
     """As of ``UltrasonicParameters.fault_ticks``."""
 
 
-# Not compiled by themselves: a cached function does not notice changes in other files.
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
@@ -233,8 +223,7 @@ def _read_ranges(
     beams = numbers.axes, numbers.places, numbers.half_angle
     true = fan_ranges(pose_WB, bodies, *beams, numbers.control_point_m)
     count = len(true)
-    normals = np.empty((2, count), dtype=np.float32)
-    fill_with_tick_noise(numbers.noise, tick, normals)
+    normals = tick_normals(numbers.noise, tick, 2, count)
     new_ranges, new_echo = _measured_ranges(true, normals, *numbers.errors)
     for k in range(count):
         age = (tick - numbers.turns[k]) % numbers.round

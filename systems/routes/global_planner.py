@@ -6,13 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
@@ -34,11 +34,6 @@ from systems.routes.seen_points import (
     remember_objects,
 )
 from systems.world.geometry import control_point
-
-__all__ = [
-    "GlobalPlanner",
-    "planner_step",
-]
 
 #: Places in the state after the route.
 REPLANS, SINCE_S, FROM_M = range(ROUTE_SIZE, ROUTE_SIZE + 3)

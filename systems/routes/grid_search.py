@@ -6,10 +6,9 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["find_cells", "search_cells"]
+from systems.framework.compiling import njit
 
 _DIAGONAL = math.sqrt(2.0)
 

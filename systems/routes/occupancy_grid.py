@@ -6,23 +6,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.routes.parameters import check_cells
 from systems.world.geometry import beyond_rectangle, rectangle_corners
-
-__all__ = [
-    "Discs",
-    "OccupancyGrid",
-    "arena_about",
-    "block_discs",
-    "block_rectangles",
-    "cell_middle",
-    "cell_of",
-    "make_occupancy_grid",
-]
 
 #: Cells of a grid at most: a search among them takes 40 MB.
 _MOST_CELLS = 1_000_000

@@ -16,12 +16,6 @@ from systems.framework.parameters import (
     Speed,
 )
 
-__all__ = [
-    "PathTargetParameters",
-    "RouteParameters",
-    "check_cells",
-]
-
 #: Cells in the radius of the disc at least: then a step between two free cells comes
 #: nearer than the radius by less than 3 % of it.
 _LEAST_CELLS = 3.0
@@ -49,44 +43,49 @@ class PathTargetParameters(Parameters):
     """How the target moves along the route."""
 
     speed_m_s: Speed = 0.15
-    """Its speed along the route, m/s (ours; Engelbrecht and others print none)."""
+    """Speed of the target along the route, m/s (our choice; Engelbrecht and others
+    print none)."""
     acceleration_m_s2: Acceleration = 0.15
-    """Of that speed from rest and to rest, m/s^2 (ours)."""
+    """Acceleration from rest and to rest, m/s^2 (our choice)."""
     timing: Literal["timed", "waiting"] = "timed"
-    """It moves by the clock, as in the paper, or waits for the robot."""
+    """Whether the target moves by the clock, as in the paper, or waits for the
+    robot."""
     lead_m: Length = 0.5
-    """Where it waits, it is no farther ahead of P along the route, m (ours)."""
+    """Greatest lead of a waiting target over P along the route, m (our choice)."""
 
 
 class RouteParameters(PathTargetParameters):
     """Where the robot goes, how its route is planned, and how the target moves."""
 
     goal_m: Point = (4.0, 0.0)
-    """Where P is to go in W, m."""
+    """Goal of P in W, m."""
     clearance_m: Length = 0.35
-    """Kept between the route and all obstacles, m (ours)."""
+    """Planned distance between the route and known obstacles, m (our choice). After
+    rounding the route keeps at least 92 % of it."""
     cell_m: Length = 0.05
-    """Side of a cell of the grid, m (ours)."""
+    """Side of a cell of the grid, m (our choice)."""
     arena_margin_m: Length = 2.0
-    """Routes stay in the least rectangle about start, goal and known obstacles, and
-    this margin, m (ours)."""
+    """Margin around the smallest rectangle of start, goal and known obstacles in which
+    routes stay, m (our choice)."""
     replan: bool = True
-    """Whether a robot that stalls plans anew, with what it has seen (ours)."""
+    """Whether a robot that stalls plans a new route, with the obstacles that it has
+    seen (our choice)."""
     stall_m: Length = 0.1
-    """It stalls where P does not come so far along the route, m ..."""
+    """The robot stalls if P advances less than this along the route within
+    ``stalled_s``, m."""
     stalled_s: Duration = 6.0
-    """... in this time, s."""
+    """See ``stall_m``, s."""
     arrived_m: Length = 0.15
-    """Nearer to the goal than this it has arrived, and does not stall, m."""
+    """Distance from the goal at which it has arrived and does not stall, m."""
 
     @model_validator(mode="after")
     def _check(self) -> RouteParameters:
         if self.stall_m > self.speed_m_s * self.stalled_s:
             raise InputError(
                 "stall_m",
-                f"{self.stall_m:g} m in stalled_s = {self.stalled_s:g} s is more than "
-                f"speed_m_s = {self.speed_m_s:g} makes: it would always stall; lower "
-                "it, or raise stalled_s",
+                f"{self.stall_m:g} m in stalled_s = {self.stalled_s:g} s is more "
+                f"than speed_m_s = {self.speed_m_s:g} allows: the robot would "
+                "always stall; lower it, or raise stalled_s",
             )
         check_cells(self.cell_m, self.clearance_m)
         return self

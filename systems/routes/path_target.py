@@ -6,28 +6,18 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
 from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.routes.parameters import PathTargetParameters
 from systems.routes.route import ROUTE_SIZE
 from systems.world.geometry import control_point
-
-__all__ = [
-    "PathTarget",
-    "TargetNumbers",
-    "nearest_on_route",
-    "next_speed",
-    "path_target_step",
-    "point_on_route",
-    "route_fingerprint",
-]
 
 #: Places in the state; of lengths along the route, m, speed in m/s.
 ALONG, SPEED, REACHED, FINGERPRINT = range(4)

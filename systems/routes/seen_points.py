@@ -6,15 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.ranging.objects import KNOWN, RADIUS, ROBOT, THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import OccupancyGrid, cell_of
 from systems.routes.route import place_clearance
-
-__all__ = ["SeenPoints", "discs_to_avoid", "make_seen_points", "remember_objects"]
 
 #: Points that are remembered at most; then the oldest are forgotten.
 _MOST_POINTS = 4_000

@@ -6,9 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from systems.base.lagged_motion import LaggedMotion, advance_pose
+from systems.framework.compiling import njit
 from systems.safety.free_space import (
     ROLLED,
     FreeSpace,
@@ -16,33 +18,16 @@ from systems.safety.free_space import (
     edge_cells,
     nearest_cell,
 )
-
-__all__ = [
-    "BRAKED",
-    "HALTED",
-    "PASSED",
-    "SLOWED",
-    "TURNED",
-    "BrakingNumbers",
-    "Danger",
-    "braked",
-    "can_be_braked",
-    "chosen",
-    "danger_of",
-    "roll_on",
-]
+from systems.safety.views import IN_PLACE_M, REST_M
 
 #: What was done with a wish.
 PASSED, SLOWED, TURNED, BRAKED, HALTED = range(5)
 #: Shares of a wish that are tried, from all of it on.
 _SHARES = (1.0, 0.8, 0.6, 0.4, 0.2)
 
-#: Rims are at rest where their lag leaves them no longer way, m.
-_REST_M = 2e-4
 #: A robot turns in its place where it is commanded no faster ahead, m/s, and where the
-#: lag leaves it no longer way ahead, m.
+#: lag leaves it no way ahead but ``IN_PLACE_M``.
 _IN_PLACE_M_S = 1e-6
-_IN_PLACE_M = 5e-5
 #: It withdraws from what is in view where it gets away by this share of its way: more,
 #: and it may not go on past what comes from behind.
 _WITHDRAWS = 0.2
@@ -62,6 +47,8 @@ class BrakingNumbers(NamedTuple):
     tick_s: float
     parts: int
     """Of a tick, at whose ends places are looked at."""
+    part: LaggedMotion
+    """Of the wheels in such a part."""
     top_wheel_speed: float
     """rad/s."""
     keep_m: float
@@ -92,39 +79,55 @@ class Danger(NamedTuple):
     """Of the axle from where the view ends now, m."""
 
 
+@register_jitable
+def rolled_speeds(speeds: Any, commanded: Any, kept: float) -> tuple[float, float]:
+    """Wheel speeds after a period in which a command was held.
+
+    Args:
+        speeds: Of the left and the right wheel before, rad/s.
+        commanded: The same, held.
+        kept: Share of the difference that the lag leaves.
+
+    Returns:
+        Left and right, rad/s.
+    """
+    left = commanded[0] + (speeds[0] - commanded[0]) * kept
+    right = commanded[1] + (speeds[1] - commanded[1]) * kept
+    return left, right
+
+
 @njit(cache=True)
 def roll_on(
-    pose: Any, speeds: Any, commanded: Any, duration: float, numbers: BrakingNumbers
+    pose: Any, speeds: Any, commanded: Any, numbers: BrakingNumbers
 ) -> tuple[Any, Any]:  # pragma: no cover  (compiled)
-    """Pose and wheel speeds a tick or a part of it later, of a plant without slip.
+    """Pose and wheel speeds a part of a tick later, of a plant without slip.
 
     Args:
         pose: (x, y, theta), m and rad.
         speeds: Of the left and the right wheel, rad/s.
         commanded: The same, held.
-        duration: For how long, s.
         numbers: The plant.
 
     Returns:
-        (x, y, theta) and the speeds. Speeds are exact; the chord is as long as its
-        arc, along the mean heading.
+        (x, y, theta) and the speeds.
     """
-    lag = numbers.motor_lag_s
-    kept = math.exp(-duration / lag)
-    less_left, less_right = speeds[0] - commanded[0], speeds[1] - commanded[1]
-    left, right = commanded[0] + less_left * kept, commanded[1] + less_right * kept
-    way_left = commanded[0] * duration + less_left * lag * (1.0 - kept)
-    way_right = commanded[1] * duration + less_right * lag * (1.0 - kept)
-    radius = numbers.wheel_radius_m
-    way = 0.5 * radius * (way_left + way_right)
-    turn = radius * (way_right - way_left) / numbers.wheel_separation_m
-    middle = pose[2] + 0.5 * turn
-    moved = (
-        pose[0] + way * math.cos(middle),
-        pose[1] + way * math.sin(middle),
-        pose[2] + turn,
+    part = numbers.part
+    duration, lagged = part.duration_s, part.lagged_s
+    steady_left, steady_right = commanded[0] * duration, commanded[1] * duration
+    left = steady_left + (speeds[0] - commanded[0]) * lagged
+    right = steady_right + (speeds[1] - commanded[1]) * lagged
+    forward = 0.5 * numbers.wheel_radius_m
+    turning = numbers.wheel_radius_m / numbers.wheel_separation_m
+    moved = advance_pose(
+        pose,
+        (forward * (left + right), turning * (right - left)),
+        (
+            forward * (steady_left + steady_right),
+            turning * (steady_right - steady_left),
+        ),
+        part,
     )
-    return moved, (left, right)
+    return moved, rolled_speeds(speeds, commanded, part.kept)
 
 
 @njit(cache=True)
@@ -198,7 +201,7 @@ def can_be_braked(
     # A robot that turns in its place stays within its disc.
     in_place = (
         _ahead(commanded, radius) < _IN_PLACE_M_S
-        and _ahead(speeds, radius) * lag < _IN_PLACE_M
+        and _ahead(speeds, radius) * lag < IN_PLACE_M
     )
     if now <= 0.0 and not in_place:  # nobody knows which way leads out of there
         return False
@@ -209,7 +212,7 @@ def can_be_braked(
     part_s = numbers.tick_s / numbers.parts
     parts = 0
     while True:
-        pose, speeds = roll_on(pose, speeds, commanded, part_s, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, numbers)
         parts += 1
         x, y = pose[0], pose[1]
         way = math.hypot(x - begin[0], y - begin[1])
@@ -225,7 +228,7 @@ def can_be_braked(
         ):
             return False
         fastest = max(abs(speeds[0]), abs(speeds[1])) * radius
-        if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest * lag < _REST_M:
+        if commanded[0] == 0.0 and commanded[1] == 0.0 and fastest * lag < REST_M:
             return in_place or not near or reached >= now + 0.05 * way
         if parts % numbers.parts == 0:
             commanded = braked(commanded, numbers)

@@ -6,23 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.safety.views import Sectors, lasting
-
-__all__ = [
-    "FreeSpace",
-    "cell_is_free",
-    "clear_disc",
-    "edge_cells",
-    "end_view",
-    "make_free_space",
-    "move_window",
-    "nearest_cell",
-    "see",
-]
 
 register_jitable(lasting)
 
@@ -273,7 +261,7 @@ def see(
     pose: Any,
     sectors: Sectors,
     readings: Any,
-    drift: Any,
+    error: Any,
 ) -> None:  # pragma: no cover  (compiled)
     """Enters what the sensors have just read.
 
@@ -285,7 +273,7 @@ def see(
         sectors: Directions that the sensors see.
         readings: (sensors, 2) of each sensor up to where it has seen free, m, 0: not
             at all, and where its echo came from, m, infinite: from nowhere.
-        drift: What ``lasting`` takes besides the distance.
+        error: ``PlaceError``.
     """
     cell, cells = space.cell_m, space.free_until.shape[0]
     half = cell * math.sqrt(0.5)
@@ -323,7 +311,7 @@ def see(
                 at = i % cells, j % cells
                 if free >= distance + half:
                     until = space.facts[0, ROLLED] + lasting(
-                        distance + from_axle, drift
+                        distance + from_axle, error
                     )
                     space.free_until[at] = max(space.free_until[at], until)
                     space.seen_s[at] = time

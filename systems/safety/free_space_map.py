@@ -6,10 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
+from systems.base.lagged_motion import lagged_motion
+from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block_facts import BlockFacts
 from systems.framework.cache import declare_cache
@@ -29,12 +32,7 @@ from systems.safety.free_space import (
     see,
 )
 from systems.safety.parameters import FreeSpaceParameters
-from systems.safety.views import Sectors, lasting, sensor_sectors
-
-__all__ = [
-    "FreeSpaceMap",
-    "map_step",
-]
+from systems.safety.views import PlaceError, Sectors, lasting, sensor_sectors
 
 #: Points of a sensor's arc are this near to one another, seen from it, rad.
 _ARC_STEP = 0.035
@@ -52,8 +50,11 @@ class MapNumbers(NamedTuple):
     """(sensors, 2) from the axle in B, m."""
     limits: tuple[float, float, float]
     """Least and greatest range, m, and what ranges may be too long, m."""
-    drift: tuple[float, float, float]
-    """As of ``lasting``."""
+    error: PlaceError
+    """Of the places of cells, by odometry."""
+    least_way: float
+    """Mean way of both rims that a tick counts for at least, m for each rad/s of the
+    faster wheel's command; 0 without pulses."""
     radius: float
     """Of the disc that holds the body, m."""
     bubble: float
@@ -77,9 +78,9 @@ def map_step(
         outputs: None.
         numbers: ``MapNumbers``.
     """
-    ranges, echo, ages, pose = inputs
-    space, was_at = numbers.space, numbers.was_at
-    time, (error, _, separation) = tick * numbers.tick_s, numbers.drift
+    ranges, echo, ages, pose, commanded = inputs
+    space, was_at, error = numbers.space, numbers.was_at, numbers.error
+    time = tick * numbers.tick_s
     low, high, margin = numbers.limits
     move_window(space, pose[0], pose[1])
     if space.facts[0, TICK] == NEVER:
@@ -88,17 +89,18 @@ def map_step(
             pose[0],
             pose[1],
             numbers.bubble,
-            lasting(numbers.bubble, numbers.drift),
+            lasting(numbers.bubble, error),
         )
     else:
-        way = math.hypot(pose[0] - was_at[0, 0], pose[1] - was_at[0, 1])
-        turn = 0.5 * separation * abs(pose[2] - was_at[0, 2])
-        space.facts[0, ROLLED] += max(way, turn)
+        fastest = max(abs(commanded[0]), abs(commanded[1]))
+        space.facts[0, ROLLED] += rolled_way(
+            was_at[0], pose, numbers.least_way * fastest, error
+        )
     for k in range(3):
         was_at[0, k] = pose[k]
     space.facts[0, TICK] = tick
-    if error > 0.0:
-        until = space.facts[0, ROLLED] + lasting(numbers.radius, numbers.drift)
+    if error.wheel_error > 0.0 or error.pulse_m > 0.0:
+        until = space.facts[0, ROLLED] + lasting(numbers.radius, error)
         clear_disc(space, pose[0], pose[1], numbers.radius, until)
     readings = np.empty((len(ranges), 2))
     for k in range(len(ranges)):
@@ -117,7 +119,29 @@ def map_step(
         end_view(space, k, time, pose, place, direction, readings[k, 0])
     # Each sensor enters other rows with each of its readings.
     turn_of_rows = tick // numbers.round_ticks
-    see(space, time, turn_of_rows, pose, numbers.sectors, readings, numbers.drift)
+    see(space, time, turn_of_rows, pose, numbers.sectors, readings, error)
+
+
+@register_jitable
+def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float:
+    """Mean way of both rims in a tick, as ``place_error`` counts it.
+
+    Args:
+        was_at: Pose at the tick before, m and rad.
+        pose: The same now.
+        least: That a wheel counts for at least, m: it may have moved back and forth.
+        error: Has the wheel separation and the pulse.
+
+    Returns:
+        m. By half a pulse it may be more than the encoders tell.
+    """
+    turn = pose[2] - was_at[2]
+    # The way is longer than its chord, by 1/cos(turn/2) at most; this is more.
+    chord = math.hypot(pose[0] - was_at[0], pose[1] - was_at[1])
+    way = chord * (1.0 + 0.25 * turn * turn)
+    aside = 0.5 * error.wheel_separation_m * abs(turn)
+    slower, faster = abs(way - aside), way + aside
+    return 0.5 * (max(slower, least) + max(faster, least) + error.pulse_m)
 
 
 class FreeSpaceMap(LeafSystem):
@@ -131,16 +155,18 @@ class FreeSpaceMap(LeafSystem):
         - echo [0 or 1]
         - range_ages [s, since each sensor fired]
         - pose_WB_estimated [m, m, rad]
+        - wheel_speeds [rad/s, left and right, commanded]
         output_ports:
         - free_space [FreeSpace]
 
     A cell has been seen free once its circumscribed circle lay within the apertures of
-    sensors at one place, nearer than what they read, less a margin. It stays so: but
-    with ``wheel_error`` for as long only as its place relative to the robot is known
-    to ``place_error_m``. All sensors that fire at a tick are entered at it.
+    sensors at one place, nearer than what they read, less a margin. It stays so as long
+    as its place relative to the robot is known to ``place_error_m``: encoders count
+    whole pulses, and ``wheel_error`` says how well the wheels are known. All sensors
+    that fire at a tick are entered at it.
 
-    At the start the bubble counts as free. With ``wheel_error`` the disc that holds
-    the body counts as free at every tick, as ``MotionGuard`` keeps it so.
+    At the start the bubble counts as free. The disc that holds the body counts as free
+    at every tick, as ``MotionGuard`` keeps it so.
 
     Abstract state: ``FreeSpace``, and the pose at the last tick.
     Rate and latency: a function of state and present inputs, at every tick: no
@@ -150,12 +176,14 @@ class FreeSpaceMap(LeafSystem):
         parameters: ``FreeSpaceParameters``.
         sensors: Places, apertures, ranges and noise of the sensors.
         robot: Its body, and place of P.
+        odometry: Pulses of the encoders.
+        plant: Lag of the motors.
         tick_s: Period of the robot, s.
 
     Raises:
         InputError: The grid does not serve the robot.
 
-    Reference: ours; docs/safety.md has the theorem that rests on it.
+    Reference: ours; docs/guard.md has the theorem that rests on it.
     """
 
     FACTS = BlockFacts("free_space", "obstacle sensing")
@@ -166,10 +194,14 @@ class FreeSpaceMap(LeafSystem):
         parameters: FreeSpaceParameters | None = None,
         sensors: UltrasonicParameters | None = None,
         robot: RobotParameters | None = None,
+        odometry: OdometryParameters | None = None,
+        plant: PlantParameters | None = None,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
         self._parameters = parameters or FreeSpaceParameters()
+        self._odometry = odometry or OdometryParameters()
+        self._plant = plant or PlantParameters()
         self._sensors = sensors or UltrasonicParameters()
         self._robot = robot or RobotParameters()
         self._parameters.check(self._robot)
@@ -184,6 +216,7 @@ class FreeSpaceMap(LeafSystem):
                 ("echo", count),
                 ("range_ages", count),
                 ("pose_WB_estimated", 3),
+                ("wheel_speeds", 2),
             )
         ]
         blank = self._numbers.space, self._numbers.was_at
@@ -205,6 +238,12 @@ class FreeSpaceMap(LeafSystem):
         own, sensors, robot = self._parameters, self._sensors, self._robot
         error = own.range_error(sensors)
         axes, places, half_angle = sensors.beams
+        place_error = PlaceError.of(own, robot, self._odometry)
+        least_way = 0.0
+        if place_error.pulse_m > 0.0:
+            motion = lagged_motion(self._tick_s, self._plant.motor_lag_s)
+            steady = robot.wheel_radius_m * self._tick_s
+            least_way = motion.least_share * steady
         points = 2 + math.ceil(2.0 * half_angle / _ARC_STEP)
         return MapNumbers(
             make_free_space(own.cells, own.cell_m, sensors.count, points),
@@ -212,7 +251,8 @@ class FreeSpaceMap(LeafSystem):
             np.column_stack([axes, np.full(len(axes), half_angle)]),
             np.add(places, [robot.control_point_m, 0.0]),
             (sensors.minimum_range_m, sensors.maximum_range_m, error),
-            (own.wheel_error, own.place_error_m, robot.wheel_separation_m),
+            place_error,
+            least_way,
             body_radius(robot),
             own.start_bubble_m,
             self._tick_s,

@@ -10,6 +10,7 @@ import numpy as np
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
+from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import (
@@ -28,20 +29,15 @@ from systems.safety.braking import (
     BrakingNumbers,
     chosen,
     danger_of,
-    roll_on,
+    rolled_speeds,
 )
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
-from systems.safety.views import stopping_way
-
-__all__ = ["MotionGuard"]
+from systems.safety.views import stopping_way, tick_parts
 
 # Groups of the discrete state.
 _V_WP, _WHEEL_SPEEDS, _REPORT, _MODEL = range(4)
 _SIZES = 2, 2, 4, 2
-#: In between, a robot that passes a corner at top speed comes a tenth of a millimetre
-#: nearer to it, s.
-_PART_S = 0.025
 
 
 class GuardNumbers(NamedTuple):
@@ -51,13 +47,15 @@ class GuardNumbers(NamedTuple):
     """As of ``CommandNumbers``."""
     robot: RobotParameters
     braking: BrakingNumbers
+    kept: float
+    """Share of a change of wheel speed that the lag leaves after a tick."""
     reach: tuple[float, float]
     """How far from the axle cells are looked at, m, and for what rolled way they have
     to stay free, m."""
     space: FreeSpace
 
 
-def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
+def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
     """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
 
     Args:
@@ -88,7 +86,7 @@ def guard_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untype
         v = 0.5 * radius * (wheels[0] + wheels[1])
         omega = radius * (wheels[1] - wheels[0]) / separation
         v_WP = hand_position_velocity((v, omega), theta, robot.control_point_m)
-    _, after = roll_on(here, speeds, wheels, tick_s, braking)
+    after = rolled_speeds(speeds, wheels, numbers.kept)
     fastest = max(abs(wheels[0]), abs(wheels[1])) * robot.wheel_radius_m
     state[0], state[1], state[2], state[3] = v_WP[0], v_WP[1], wheels[0], wheels[1]
     # Nothing near is as far as was looked.
@@ -157,7 +155,7 @@ class MotionGuard(LeafSystem):
             ``twist_B``.
         tick_s: Period of the command, s.
 
-    Reference: ours; docs/safety.md has theorem and proof. Passive safety is that of
+    Reference: ours; docs/guard.md has theorem and proof. Passive safety is that of
     Bouraine, Fraichard and Salhi (2012), passive orientation safety that of Mitsch,
     Ghorbal, Vogelbacher and Platzer (2017).
     """
@@ -252,13 +250,15 @@ def _numbers(
 ) -> GuardNumbers:
     radius = body_radius(robot) + known.place_error_m
     keep = radius + own.margin_m
+    parts = tick_parts(tick_s)
     braking = BrakingNumbers(
         robot.wheel_radius_m,
         robot.wheel_separation_m,
         plant.motor_lag_s,
         own.braking_m_s2,
         tick_s,
-        math.ceil(tick_s / _PART_S - 1e-9),
+        parts,
+        lagged_motion(tick_s / parts, plant.motor_lag_s),
         robot.top_wheel_speed,
         keep,
         radius + own.least_margin_m,
@@ -268,4 +268,5 @@ def _numbers(
     stopping = stopping_way(own, robot, plant, tick_s)
     reach = keep + stopping + 2.0 * known.cell_m, stopping
     blank = make_free_space(1, known.cell_m, 1, 2)
-    return GuardNumbers(velocity, robot, braking, reach, blank)
+    kept = math.exp(-tick_s / plant.motor_lag_s)
+    return GuardNumbers(velocity, robot, braking, kept, reach, blank)

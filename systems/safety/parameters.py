@@ -18,11 +18,6 @@ from systems.framework.parameters import (
 )
 from systems.ranging.parameters import UltrasonicParameters
 
-__all__ = [
-    "FreeSpaceParameters",
-    "GuardParameters",
-]
-
 #: Cells of a window at most: 16 million take 0.4 GB.
 _MOST_CELLS = 4_000
 
@@ -31,22 +26,23 @@ _SIGMAS = 5.0
 
 
 class FreeSpaceParameters(Parameters):
-    """How space is remembered."""
+    """How the robot remembers free space."""
 
     cell_m: float = Field(default=0.05, ge=0.005, le=0.25)
     """Side of a cell, m."""
     window_m: Length = 12.8
-    """Side of the square that is remembered, m; it moves along with the robot."""
+    """Side of the remembered square, m; it moves along with the robot."""
     start_bubble_m: Length = 1.0
-    """Radius about the axle in which nothing stands at the start, m: assumed."""
+    """Radius about the axle that is assumed to be free at the start, m."""
     range_margin_m: NonNegativeLength = 0.002
-    """What ranges may be too long, m, besides five standard deviations of their
-    noise."""
+    """Amount by which ranges may be too long, m, in addition to five standard
+    deviations of their noise."""
     wheel_error: Fraction = 0.0
-    """To what share each wheel's way is known: of 0, space stays known for ever."""
-    place_error_m: NonNegativeLength = 0.0
-    """Error of place by ``wheel_error`` up to which a cell counts as free, m; the guard
-    keeps off by as much more."""
+    """Unknown share of each wheel's travel, in addition to the pulses of its
+    encoder."""
+    place_error_m: NonNegativeLength = 0.006
+    """Error of a cell's position due to encoders and ``wheel_error``, up to which the
+    cell counts as free, m; the guard keeps this distance in addition."""
 
     @property
     def cells(self) -> int:
@@ -64,8 +60,7 @@ class FreeSpaceParameters(Parameters):
             robot: Its body.
 
         Raises:
-            InputError: The grid is too coarse, too large or too small, or nothing
-                would count as free for any way.
+            InputError: The grid is too coarse, too large or too small.
         """
         radius = body_radius(robot)
         if self.cells > _MOST_CELLS:
@@ -77,9 +72,10 @@ class FreeSpaceParameters(Parameters):
         if self.start_bubble_m < radius + 2.0 * self.cell_m:
             raise InputError(
                 "start_bubble_m",
-                f"{self.start_bubble_m:g} m does not hold the body, which turns within "
-                f"{radius:.3g} m, and two cells of {self.cell_m:g} m; raise it to "
-                f"{radius + 2.0 * self.cell_m:.3g}, or lower cell_m",
+                f"{self.start_bubble_m:g} m is too small for the body, which "
+                f"turns within {radius:.3g} m, and two cells of {self.cell_m:g} "
+                f"m; raise it to {radius + 2.0 * self.cell_m:.3g}, or lower "
+                "cell_m",
             )
         if self.window_m < 4.0 * self.start_bubble_m:
             raise InputError(
@@ -87,27 +83,23 @@ class FreeSpaceParameters(Parameters):
                 f"{self.window_m:g} m is less than four times the bubble of "
                 f"{self.start_bubble_m:g} m; raise it",
             )
-        if self.wheel_error > 0.0 and self.place_error_m == 0.0:
-            raise InputError(
-                "place_error_m",
-                f"is 0, but wheel_error is {self.wheel_error:g}: nothing would stay "
-                "known; give what a place may be off, as 0.03",
-            )
 
 
 class GuardParameters(Parameters):
     """How the guard keeps a robot in free space."""
 
     obstacle_speed_m_s: NonNegativeSpeed = 0.0
-    """Largest speed of bodies in view that it reckons with, m/s; 0: all rest."""
+    """Largest speed of bodies in view that the guard allows for, m/s; 0: all bodies are
+    at rest."""
     braking_m_s2: Acceleration = 1.5
     """Braking of the faster wheel's rim, m/s^2."""
-    margin_m: NonNegativeLength = 0.012
-    """It keeps the disc that holds the body off what is not free, m."""
-    least_margin_m: NonNegativeLength = 0.009
-    """The same where models were wrong and the robot has come nearer, m."""
+    margin_m: NonNegativeLength = 0.006
+    """Distance that the guard keeps between the disc around the body and space that is
+    not free, m, in addition to ``free_space.place_error_m``."""
+    least_margin_m: NonNegativeLength = 0.003
+    """The margin after models were wrong and the robot has come nearer, m."""
     slow_turn_rad_s: float = Field(default=0.3, ge=0.0, le=10.0)
-    """Turning in its place no faster, the robot counts as at rest, rad/s."""
+    """A robot that turns on the spot no faster than this counts as at rest, rad/s."""
 
     @model_validator(mode="after")
     def _check(self) -> GuardParameters:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem
@@ -13,8 +13,6 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import UltrasonicParameters
-
-__all__ = ["SENSING_FAULTS", "MonitorNumbers", "SensingMonitor", "monitor_step"]
 
 #: What can be found, by its number on the port.
 SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
@@ -87,7 +85,9 @@ def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyp
     return _NOISY if state[at + _STRANGE] > _MOST_STRANGE else _NONE
 
 
-def monitor_step(tick, state, inputs, outputs, numbers):  # type: ignore[no-untyped-def]
+def monitor_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
     """What is wrong in one tick; see ``systems.framework.step_block.Step``.
 
     Args:
@@ -160,7 +160,7 @@ class SensingMonitor(LeafSystem, StepBlock):
         robot: How fast its wheels turn.
         tick_s: Period of control, s.
 
-    Reference: ours; docs/safety.md.
+    Reference: ours; docs/guard.md.
     """
 
     FACTS = BlockFacts(

@@ -5,22 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.base.parameters import PlantParameters
-from systems.base.robot import RobotParameters
+from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.robot import RobotParameters, body_radius
 from systems.ranging.parameters import UltrasonicParameters
-from systems.safety.parameters import GuardParameters
+from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 
-__all__ = [
-    "Sectors",
-    "lasting",
-    "sensor_sectors",
-    "stopping_way",
-]
+#: Rims are at rest where their lag leaves them no longer way, m.
+REST_M = 2e-4
+#: A robot turns in its place where its lag leaves it no longer way ahead, m.
+IN_PLACE_M = 5e-5
+#: Longest time between two places that the guard compares with cells, s.
+_PART_S = 0.025
 
 
 class Sectors(NamedTuple):
@@ -42,26 +42,82 @@ class Sectors(NamedTuple):
     """(sectors, sensors) which sensors see a sector."""
 
 
-def lasting(distance: float, drift: Any) -> float:
-    """Way for which a cell's place stays known well enough, m.
+class PlaceError(NamedTuple):
+    """What the error of a remembered cell's place depends on, seen from the robot."""
 
-    If each wheel's way is known to a share e, then after a way s the place of a cell
-    that was d away is off by e s + 2 e s/L (d + s) at most, L between the wheels: the
-    error of the way, and that of the heading times the distance.
+    wheel_error: float
+    """To what share each wheel's way is known."""
+    pulse_m: float
+    """Way of the rim for a pulse of the encoder, m; 0: angles are not rounded."""
+    wheel_separation_m: float
+    allowed_m: float
+    """A cell counts as free as long as its error is no larger, m."""
+
+    @classmethod
+    def of(
+        cls,
+        known: FreeSpaceParameters,
+        robot: RobotParameters,
+        odometry: OdometryParameters,
+    ) -> PlaceError:
+        """From the parameters.
+
+        Args:
+            known: Wheel error, and what is allowed.
+            robot: Wheels.
+            odometry: Pulses of the encoders.
+
+        Returns:
+            What it depends on.
+        """
+        pulse_m = 0.0
+        if odometry.rounding:
+            pulse = math.tau / odometry.pulses_per_revolution
+            pulse_m = robot.wheel_radius_m * pulse
+        return cls(
+            known.wheel_error, pulse_m, robot.wheel_separation_m, known.place_error_m
+        )
+
+
+def place_error(distance: float, way: float, error: PlaceError) -> float:
+    """Largest error of a cell's place relative to the robot, m.
+
+    Args:
+        distance: Of the cell from the axle when it was seen, m.
+        way: Mean way of both rims since then, m.
+        error: What it depends on.
+
+    Returns:
+        e s + 2 e s/L (d + s) by wheels known to a share e, and q (s + d)/L + q by
+        pulses of q at the rim, L between the wheels (docs/guard.md).
+    """
+    e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
+    by_wheels = e * way + 2.0 * e * way / separation * (distance + way)
+    return by_wheels + pulse * (way + distance) / separation + pulse
+
+
+def lasting(distance: float, error: PlaceError) -> float:
+    """Mean way of both rims for which a cell's place stays known well enough, m.
 
     Args:
         distance: Of the cell from the axle when it was seen, m, or more.
-        drift: (wheel error e, allowed error of the place, m, wheel separation L, m).
+        error: What its error depends on.
 
     Returns:
-        m; infinite without wheel errors.
+        The way at which ``place_error`` is what is allowed, m; infinite where it does
+        not grow, minus infinity where it is too large from the start.
     """
-    error, allowed, separation = drift
-    if error == 0.0:
+    e, pulse, separation = error.wheel_error, error.pulse_m, error.wheel_separation_m
+    a = 2.0 * e / separation
+    b = e + a * distance + pulse / separation
+    left = error.allowed_m - pulse * (1.0 + distance / separation)
+    if left < 0.0:
+        return -np.inf
+    if b == 0.0:
         return np.inf
-    a = 2.0 * error / separation
-    b = error + a * distance
-    return (math.sqrt(b * b + 4.0 * a * allowed) - b) / (2.0 * a)
+    if a == 0.0:
+        return left / b
+    return (math.sqrt(b * b + 4.0 * a * left) - b) / (2.0 * a)
 
 
 def sensor_sectors(sensors: UltrasonicParameters, control_point_m: float) -> Sectors:
@@ -124,3 +180,54 @@ def stopping_way(
     top = robot.top_speed_m_s
     delayed = plant.motor_lag_s + 2.0 * tick_s
     return top * top / (2.0 * own.braking_m_s2) + top * delayed
+
+
+def tick_parts(tick_s: float) -> int:
+    """In how many parts of a tick the guard compares places with cells.
+
+    Args:
+        tick_s: Period of the command, s.
+
+    Returns:
+        The number; a part lasts 25 ms at most.
+    """
+    return math.ceil(tick_s / _PART_S - 1e-9)
+
+
+def unseen_approach(
+    robot: RobotParameters, plant: PlantParameters, tick_s: float
+) -> float:
+    """By how much the axle may come nearer to a cell than where the guard looks, m.
+
+    The guard compares the axle's place with cells at the ends of a tick's parts, until
+    braking leaves the rims ``REST_M`` of way. In between the axle may
+
+    * pass a corner: both ends of a chord d are R from a point, its middle is not;
+    * leave the chord, by a quarter of its length times the turn;
+    * go on and come back, where the wheels are reversed within the part;
+    * and coast after all that, also where it turns in its place.
+
+    Args:
+        robot: Body, wheels and top speed.
+        plant: Lag of the motors.
+        tick_s: Period of the command, s.
+
+    Returns:
+        The sum of the four, m: 1.6 mm with all defaults. ``least_margin_m`` has to hold
+        it.
+    """
+    top, lag, part_s = (
+        robot.top_speed_m_s,
+        plant.motor_lag_s,
+        tick_s / tick_parts(tick_s),
+    )
+    radius, half = body_radius(robot), min(0.5 * top * part_s, body_radius(robot))
+    corner = radius - math.sqrt(radius * radius - half * half)
+    # Of all ways to share the faster rim's speed between both.
+    bow = 0.25 * (0.5 * top * part_s) * (top * part_s / robot.wheel_separation_m)
+    # The speed with which it comes back to where it was, reversed to full speed.
+    lagged_s = -lag * math.expm1(-part_s / lag)
+    begin = min(top * (part_s / lagged_s - 1.0), top)
+    turns_s = lag * math.log1p(begin / top)
+    beyond = begin * lag - top * turns_s
+    return corner + bow + beyond + REST_M + IN_PLACE_M

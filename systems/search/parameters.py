@@ -16,121 +16,117 @@ from systems.framework.parameters import (
     Time,
 )
 
-__all__ = [
-    "PlumeSearchParameters",
-    "SongRuleParameters",
-    "SoundSearchParameters",
-    "UpwindGradientParameters",
-]
-
 
 class SongRuleParameters(Parameters):
     """Thresholds and angles of the four phases (Song 2011, 4.2)."""
 
     initial_threshold: float = Field(default=0.95, ge=0.0, le=2.0)
-    """R_init: in the plume where all three ratios Rs/R0 are below."""
+    """R_init: the robot is in the plume where all three ratios Rs/R0 are below this."""
     airflow_threshold: Positive = 1.0
-    """F_thresh, in the unit of ``airflow``: printed without one, so that
-    ``airflow_sensors.gain_s_m`` decides what it means."""
+    """F_thresh, in the unit of ``airflow``: printed without a unit, so that
+    ``airflow_sensors.gain_s_m`` defines its meaning."""
     turning_threshold: float = Field(default=0.75, ge=0.0, le=2.0)
-    """R_turning: phase 3 turns where R1 or R3 is below."""
+    """R_turning: phase 3 turns where R1 or R3 is below this."""
     reverse_threshold: float = Field(default=0.9, ge=0.0, le=2.0)
-    """R_reverse: phase 3 turns back where R2 is least and below. Used in the paper
-    without a value; ours."""
+    """R_reverse: phase 3 turns back where R2 is the least ratio and below this. The
+    paper uses it without a value; our choice."""
     upwind_turn_deg: float = Field(default=45.0, ge=0.0, le=180.0)
-    """Of phase 2, deg."""
+    """Turn of phase 2, deg."""
     gradient_turn_deg: float = Field(default=60.0, ge=0.0, le=180.0)
-    """Of phase 3, deg."""
+    """Turn of phase 3, deg."""
     local_turn_deg: float = Field(default=30.0, ge=0.0, le=180.0)
-    """Of phase 4, deg."""
+    """Turn of phase 4, deg."""
 
 
 class UpwindGradientParameters(Parameters):
-    """Upwind, with the gradient of the smell across; all ours."""
+    """Upwind, corrected by the gradient of the smell across; our rules."""
 
     gain_deg: Angle = 20.0
-    """Lean towards the front sensor that smells more, deg for each e-fold between their
+    """Lean toward the front sensor that smells more, deg per e-fold between their
     ratios Rs/R0."""
     largest_lean_deg: float = Field(default=45.0, ge=0.0, le=90.0)
     """Largest lean, deg."""
     lost_share: Fraction = 0.35
-    """Lost: no sensor's 1 - Rs/R0 is this share of the largest one so far."""
+    """The plume is lost if no sensor's 1 - Rs/R0 is this share of the largest value so
+    far."""
     cast_deg: float = Field(default=110.0, ge=45.0, le=180.0)
-    """Lost, it goes to either side in turn at this angle from upwind, a step farther
-    each time, deg."""
+    """Angle from upwind at which it casts to either side in turn after it lost the
+    plume, one step farther each time, deg."""
     still_air: Positive = 0.05
-    """No wind: both airflow sensors read less than this, in their own unit."""
+    """There is no wind if both airflow sensors read less than this, in their unit."""
 
 
 class PlumeSearchParameters(Parameters):
     """Times of a step, and the rules by which it turns."""
 
     rules: Literal["song2011", "upwind_gradient"] = "upwind_gradient"
-    """The paper's four phases, or ours."""
+    """The paper's four phases, or our rules."""
     wait_s: Time = 15.0
     """Rest before the sensors count, s (Song 2011, 4.2)."""
     sense_s: Duration = 2.0
-    """Their mean over this time counts, without the largest and the least reading, s
-    (4.2)."""
+    """Time over which readings are averaged, without the largest and the least reading,
+    s (4.2)."""
     move_s: Duration = 3.0
-    """Turning and driving, s (4.2)."""
+    """Time for turning and driving, s (4.2)."""
     most_steps: int = Field(default=40, ge=1, le=1_000)
-    """After so many steps the search is given up."""
+    """Number of steps after which the robot gives up the search."""
     gate: bool = True
-    """Whether what is touched has to smell to be the source; off: any touch ends the
-    search as a find, as printed."""
+    """Whether an object that the robot touches must smell to count as the source; off:
+    any touch ends the search as a find, as printed."""
     gate_share: Fraction = 0.95
-    """It smells where the least of the three ratios since the last stop but one, those
-    of the stops included, is below this share of that in clean air, 1."""
+    """An object smells if the least of the three ratios since the stop before the last
+    one, both stops included, is below this share of the ratio in clean air, 1."""
     address: int = Field(default=1, ge=1, le=3)
-    """Of the robot in its radio frames (Song 2011, 3.3)."""
+    """Address of the robot in its radio frames (Song 2011, 3.3)."""
     call_every_s: Duration = 1.0
-    """Once it has ended it reports so by radio every so often, s."""
+    """Period of its radio reports after the search has ended, s."""
     song2011: SongRuleParameters = SongRuleParameters()
-    """Of the paper's rules."""
+    """Gains of the paper's rules."""
     upwind_gradient: UpwindGradientParameters = UpwindGradientParameters()
-    """Of ours."""
+    """Gains of our rules."""
 
 
 class SoundSearchParameters(Parameters):
     """Times of a step, who calls, who waits, and where the robot stops."""
 
     await_call: bool = True
-    """Whether it starts when the caller reports its find by radio; off: at once."""
+    """Whether it starts when the caller reports its find by radio; off: it starts at
+    once."""
     caller: int = Field(default=1, ge=1, le=3)
     """Address of the robot that calls (Song 2011, 3.3)."""
     address: int = Field(default=2, ge=1, le=3)
-    """Of this robot in its radio frames."""
+    """Address of this robot in its radio frames."""
     waits_for: int = Field(default=0, ge=0, le=3)
-    """Address of a robot that goes first: this one holds within ``hold_within_m`` of
-    the caller until that one reports its result; 0: none."""
+    """Address of a robot that goes first: this robot holds within ``hold_within_m`` of
+    the caller until the other robot reports its result; 0: none."""
     hold_within_m: Length = 1.2
-    """By radio, m."""
+    """Distance by radio at which it holds, m."""
     hold_s: Duration = 200.0
-    """It holds for so long at most, s."""
+    """Longest time for which it holds, s."""
     call_within_s: Duration = 1800.0
-    """Without a call for so long it gives up, s."""
+    """Time without a call after which it gives up, s."""
     noise_s: Time = 0.5
-    """At the start it listens to the noise alone, s; 0: it does not."""
+    """Time at the start for which it listens to the noise only, s; 0: it does not."""
     listen_s: Duration = 2.0
-    """Of a step, s (Song 2011, 4.3)."""
+    """Listening time of a step, s (Song 2011, 4.3)."""
     compute_s: Duration = 5.0
-    """Of a step, s (4.3)."""
+    """Computing time of a step, s (4.3)."""
     move_s: Duration = 3.0
-    """Of a step, turning and driving, s (4.3)."""
+    """Time of a step for turning and driving, s (4.3)."""
     stop: Literal["range", "radio"] = "range"
-    """It has arrived by the range that it hears, or by radio; or by radio alone, as
-    printed."""
+    """Whether the heard range or the radio decides on its arrival; or the radio only,
+    as printed."""
     stop_range_m: Length = 0.52
-    """Nearer than this to what it hears it has arrived, m."""
+    """Heard range below which it has arrived, m."""
     radio_gate_m: Length = 1.2
-    """Only this near by radio does the range that it hears count, m."""
+    """The heard range counts only within this distance by radio, m."""
     radio_stop_m: Length = 0.42
-    """Nearer than this by radio, meant over a step's listening, it has arrived, m;
-    printed: 0.2 (4.3), where the robots' arms have long touched."""
+    """Distance by radio, averaged over the listening time of a step, below which it has
+    arrived, m; printed: 0.2 (4.3), at which the robots' arms already touch."""
     tries: int = Field(default=3, ge=1, le=100)
-    """So many times in a row it may hear nothing, or not whence, before it gives up."""
+    """Number of times in a row that it may hear nothing, or no direction, before it
+    gives up."""
     most_steps: int = Field(default=30, ge=1, le=1_000)
-    """After so many steps the search is given up."""
+    """Number of steps after which the robot gives up the search."""
     report_every_s: Duration = 1.0
-    """Once it has ended it reports so by radio every so often, s."""
+    """Period of its radio reports after the search has ended, s."""

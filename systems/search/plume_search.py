@@ -45,11 +45,6 @@ from systems.search.search_state import (
 from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 
-__all__ = [
-    "PlumeSearch",
-    "plume_search_step",
-]
-
 #: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
 _WAIT, _SENSE, _MOVE, _OVER = range(4)

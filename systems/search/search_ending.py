@@ -4,24 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-__all__ = [
-    "AMBIGUOUS",
-    "CALLER_LOST",
-    "DEAF",
-    "FOUND",
-    "NOT_CALLED",
-    "NOT_HEARD",
-    "NO_NOSE",
-    "NO_TOUCH",
-    "NO_WIND",
-    "REFUSED",
-    "REPORT_COLUMNS",
-    "SEARCH_REASONS",
-    "STEPS_GONE",
-    "UNDECIDED",
-    "fault_names",
-]
-
 #: Numbers of the endings; 0: the search goes on.
 (
     UNDECIDED,
@@ -41,15 +23,15 @@ __all__ = [
 #: Why a search was given up, by the number of its ending.
 SEARCH_REASONS: Mapping[int, str] = {
     REFUSED: "touched something that does not smell",
-    NO_WIND: "there is no wind to go by",
-    NO_NOSE: "two gas sensors or more are dead",
+    NO_WIND: "there is no wind to follow",
+    NO_NOSE: "two or more gas sensors are dead",
     NO_TOUCH: "both contact switches are stuck",
     STEPS_GONE: "all steps are used up",
     NOT_CALLED: "no call was received",
     CALLER_LOST: "the caller reports that it has found nothing",
     NOT_HEARD: "the caller is not heard",
     AMBIGUOUS: "the sound fits several directions",
-    DEAF: "two microphones or more are lost",
+    DEAF: "two or more microphones are lost",
 }
 
 #: Columns of the port ``search_report``: number of the ending, what the robot is at,

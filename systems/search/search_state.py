@@ -8,23 +8,6 @@ from numba.extending import register_jitable
 
 from systems.radio.codec import FRAME_BYTES, MOST_FRAMES, write_frame
 
-__all__ = [
-    "ACTIVITY",
-    "ENDED",
-    "EXPECTED",
-    "FAULT",
-    "FLAG",
-    "LEFT",
-    "MOVES",
-    "OWN",
-    "PHASE",
-    "STARTED",
-    "STEPS",
-    "add_frame",
-    "clear_frames",
-    "publish_search",
-]
-
 #: Places in the state: what the robot is at, for how many ticks, whether it has begun;
 #: its outputs: heading, whether it moves, whether it calls or what it listens to, and
 #: its report; then what each search has of its own.

@@ -8,8 +8,6 @@ from numba.extending import register_jitable
 
 from systems.search.search_ending import UNDECIDED
 
-__all__ = ["song2011_turn"]
-
 
 @register_jitable
 def song2011_turn(

@@ -46,11 +46,6 @@ from systems.search.search_state import (
     publish_search,
 )
 
-__all__ = [
-    "SoundSearch",
-    "sound_search_step",
-]
-
 #: What the robot is at; ``search_phase`` in its report.
 _WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
 # Places in the state, after those of both searches.

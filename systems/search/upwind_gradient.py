@@ -9,11 +9,6 @@ from numba.extending import register_jitable
 
 from systems.search.search_ending import NO_WIND, UNDECIDED
 
-__all__ = [
-    "RULE_MEMORY",
-    "upwind_gradient_turn",
-]
-
 #: Numbers that a rule may remember from stop to stop.
 RULE_MEMORY = 4
 _BEST, _CASTS, _SIDE, _CALM = range(RULE_MEMORY)

@@ -6,8 +6,6 @@ from pydantic import Field
 
 from systems.framework.parameters import Parameters, SoundSpeed
 
-__all__ = ["AcousticParameters", "sound_speed"]
-
 
 def sound_speed(temperature_c: float) -> float:
     """Speed of sound in m/s at a temperature in deg C (Han 2019, eq. 23)."""

@@ -5,17 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
 from systems.sound.parameters import MicArrayParameters
-
-__all__ = [
-    "check_faults",
-    "convert",
-]
 
 
 def check_faults(parameters: MicArrayParameters, count: int) -> None:

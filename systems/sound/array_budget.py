@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["ArrayBudget"]
-
 
 @dataclass(frozen=True)
 class ArrayBudget:

@@ -11,8 +11,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
 
-__all__ = ["ArrayShape", "EqualRow"]
-
 # Nearer than this, two microphones are one, m.
 _LEAST_DISTANCE_M = 1e-3
 
@@ -76,7 +74,8 @@ class ArrayShape:
         if p.ndim != 2 or p.shape[1] not in (2, 3):
             raise InputError(
                 "microphones",
-                f"positions have the shape {p.shape}; give (x, y) or (x, y, z) of each",
+                f"positions have the shape {p.shape}; give (x, y) or (x, y, z) "
+                "of each microphone",
             )
         _check(p)
         p -= p.mean(axis=0)
@@ -166,13 +165,13 @@ class ArrayShape:
         names = ("ahead", "behind") if self.dimension == 2 or level else _UPRIGHT
         if self.ahead is None:
             raise InputError(
-                "side", f"is {side}, but this array tells all sides; remove it"
+                "side", f"is {side}, but this array distinguishes all sides; remove it"
             )
         if side not in names:
             raise InputError(
                 "side",
-                f"is {side}, but this array tells {names[0]} from {names[1]} alone; "
-                "give one of them",
+                f"is {side}, but this array distinguishes only {names[0]} and "
+                f"{names[1]}; give one of them",
             )
         turned = side == names[1]
         return replace(

@@ -12,8 +12,6 @@ from numpy.typing import NDArray
 
 from systems.sound.parameters import MicArrayParameters, channel_skew
 
-__all__ = ["RealArray", "Tolerances", "draw_tolerances", "real_array"]
-
 # Widest spacing of knots, s: even a robot that spins at 4 rad/s bends the delay by
 # less than 1e-4 sample from a cubic in that time.
 _SPACING_S = 0.0025

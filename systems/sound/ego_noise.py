@@ -16,8 +16,6 @@ from systems.sound.parameters import MICROPHONE_BAND_HZ, MicArrayParameters
 from systems.sound.sound_file import read_noise
 from systems.sound.waveforms import band_limited
 
-__all__ = ["EgoNoise", "driving_share"]
-
 #: The end of the recording fades into its beginning over this time, s.
 FADE_S = 0.05
 
@@ -107,7 +105,7 @@ def _read_loops(file: str, count: int, rate_hz: float) -> NDArray[np.float32]:
         raise InputError(
             field,
             f"{file} has nothing between {low:g} and {high:g} Hz, which the "
-            "microphones pass; choose another",
+            "microphones pass; choose another file",
         )
     if rate_hz != SAMPLE_RATE_HZ:
         heard = soxr.resample(heard.T, SAMPLE_RATE_HZ, rate_hz, quality="VHQ").T

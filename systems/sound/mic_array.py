@@ -32,12 +32,6 @@ from systems.sound.recorder import MicMemory, Recorder
 from systems.sound.room import room_images
 from systems.sound.sound_emitter import MAXIMUM_RANGE_M
 
-__all__ = [
-    "MicArray",
-    "MicArrayParameters",
-    "microphone_reach",
-]
-
 
 def microphone_reach(
     room: RoomParameters | None, acoustics: AcousticParameters

@@ -24,17 +24,6 @@ from systems.framework.parameters import (
 )
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, whole
 
-__all__ = [
-    "EDGE_S",
-    "GREATEST_ORDER",
-    "MICROPHONE_BAND_HZ",
-    "MicArrayParameters",
-    "MicrophoneFaultParameters",
-    "RoomParameters",
-    "SoundParameters",
-    "channel_skew",
-]
-
 #: What the microphones pass (Han 2019, 4.1). The filter is applied to the
 #: waveform: a linear filter common to all microphones commutes with
 #: propagation, but for a Doppler factor of a part in a thousand.
@@ -45,12 +34,13 @@ EDGE_S = 0.004
 
 
 class SoundParameters(Parameters):
-    """What is played, how loud, and when (Han 2019, 4.1: 0.5 s in every 2 s)."""
+    """Waveform, level and schedule of the sound (Han 2019, 4.1: 0.5 s in every 2 s)."""
 
     kind: Literal["chirp", "band_noise", "tone", "horn", "siren", "wav"] = "chirp"
     """Waveform; ``wav`` plays ``file``."""
     file: str | None = None
-    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth."""
+    """Sound file (WAV, FLAC ...), one channel, any rate and bit depth; only for ``kind:
+    wav``."""
     low_hz: Frequency = 500.0
     """Lower end of chirp and band noise, Hz."""
     high_hz: Frequency = 8_000.0
@@ -58,14 +48,15 @@ class SoundParameters(Parameters):
     tone_hz: Frequency = 2_000.0
     """Frequency of the tone and fundamental of the horn, Hz."""
     level_pa: Positive = 0.05
-    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); less where the
-    peaks would exceed four times this, the loudspeaker's limit."""
+    """RMS pressure at 1 m while it sounds, Pa (0.05 Pa is 68 dB); lower where the peaks
+    would exceed four times this, the loudspeaker's limit."""
     on_s: float = Field(default=0.5, ge=2 * EDGE_S, le=60.0)
     """Length of a burst, s."""
     period_s: Duration = 2.0
-    """From burst to burst, s; equal to ``on_s`` it sounds on, but for the edges."""
+    """Time from burst to burst, s; if it equals ``on_s`` the sound is continuous, apart
+    from the edges."""
     start_s: Time = 0.0
-    """First burst, s."""
+    """Start of the first burst, s."""
 
     @model_validator(mode="after")
     def _check(self) -> SoundParameters:
@@ -87,7 +78,13 @@ class SoundParameters(Parameters):
                     "the microphones pass; lower it",
                 )
         if self.kind == "wav" and self.file is None:
-            raise InputError("file", "kind is wav but no file is given; name one")
+            raise InputError("file", "kind is wav but no file is given; name a file")
+        if self.kind != "wav" and self.file is not None:
+            raise InputError(
+                "file",
+                f"{self.file!r} is not used by kind: {self.kind}; set kind to "
+                "wav, or leave the file out",
+            )
         return self
 
     def sounds(self, time: Any) -> Any:
@@ -102,7 +99,8 @@ class MicrophoneFaultParameters(Parameters):
     microphone: int = Field(default=1, ge=1, le=64)
     """Which one, from 1."""
     kind: Literal["dead", "frozen"] = "dead"
-    """``dead``: its counts are 0; ``frozen``: they rest at a quarter of full scale."""
+    """``dead``: its counts are 0; ``frozen``: its counts stay at a quarter of full
+    scale."""
     start_s: Time = 0.0
     """When that begins, s."""
 
@@ -111,12 +109,13 @@ class MicArrayParameters(Parameters):
     """Microphones, amplifier and converter (Han 2019, 4.1)."""
 
     sample_rate_hz: float = Field(default=100_000.0, ge=1_000.0, le=SAMPLE_RATE_HZ)
-    """Rate of the converter, Hz; at most that at which sound is computed.
+    """Rate of the converter, Hz; at most the rate at which sound is computed.
 
-    No filter stands before the converter: what sounds above half the rate is folded.
+    There is no filter before the converter: sound above half the rate is aliased.
     """
     frame_s: Period = TICK_S
-    """Length of a frame, and time from one to the next, s: so often the robot hears."""
+    """Length of a frame, and time from one frame to the next, s: the robot hears once
+    per frame."""
     snr_db_at_1m: float = Field(default=30.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m over the noise, dB.
 
@@ -134,20 +133,20 @@ class MicArrayParameters(Parameters):
     channel_skew_s: Annotated[tuple[Time, ...], Strict(False)] = ()
     """Time by which each channel is sampled later, s; below one sample.
 
-    One time for each microphone, or none where all are sampled at once.
+    One time for each microphone, or an empty list where all are sampled at once.
     """
 
     ego_noise_file: str | None = None
-    """Recording of the robot's own noise (WAV, FLAC ...), repeated for ever.
+    """Recording of the robot's own noise (WAV, FLAC ...), repeated forever.
 
-    One channel for all microphones, or one for each.
+    One channel for all microphones, or one channel for each.
     """
     ego_noise_snr_db_at_1m: float = Field(default=20.0, ge=-40.0, le=150.0)
     """Level of the source at 1 m over the ego noise at top speed, dB."""
     ego_noise_share_at_rest: Fraction = 1.0
     """Amplitude of the ego noise at rest over that at top speed; linear between."""
     position_tolerance_m: float = Field(default=0.0, ge=0.0, le=0.1)
-    """Each microphone stands off its place by up to this in x and in y, m.
+    """Each microphone is off its position by up to this in x and in y, m.
 
     This error and the next two are uniform, and drawn once from the seed.
     """
@@ -177,7 +176,9 @@ class MicArrayParameters(Parameters):
         failing = [fault.microphone for fault in self.faults]
         if len({*failing}) < len(failing):
             raise InputError(
-                "faults", f"microphones {failing}: two faults of one; leave one of each"
+                "faults",
+                f"microphones {failing}: a microphone has two faults; keep "
+                "one fault per microphone",
             )
         return self
 
@@ -215,8 +216,8 @@ def channel_skew(parameters: MicArrayParameters, count: int) -> NDArray[np.float
     if len(skew) not in (0, count):
         raise InputError(
             "microphones.channel_skew_s",
-            f"{skew} has {len(skew)} times for {count} "
-            "microphones; give one for each, or []",
+            f"{skew} has {len(skew)} times for {count} microphones; give one "
+            "time for each microphone, or []",
         )
     return np.array(skew) if skew else np.zeros(count)
 
@@ -226,7 +227,7 @@ GREATEST_ORDER = 150
 
 
 class RoomParameters(Parameters):
-    """A shoebox room round the floor of W, for sound: obstacles are what can be hit."""
+    """A shoebox room around the floor of W, for sound only: robots do not hit walls."""
 
     size_m: Annotated[tuple[Length, Length, Length], Strict(False)] = (
         7.0,
@@ -242,9 +243,9 @@ class RoomParameters(Parameters):
     reverberation_time_s: float = Field(default=0.4, ge=1e-3, le=20.0)
     """Time in which sound decays by 60 dB according to Sabine's formula, s.
 
-    Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m
-    their decay from -5 to -35 dB stands for 0.25, 0.45 and 0.72 s where 0.25, 0.4
-    and 0.6 s are asked for.
+    Image sources follow it in compact rooms that absorb little. In 7 x 7 x 3 m their
+    decay from -5 to -35 dB corresponds to 0.25, 0.45 and 0.72 s where 0.25, 0.4 and 0.6
+    s are set.
     """
     absorption: float | None = Field(default=None, gt=0.0, le=1.0)
     """Share of the energy that a wall absorbs.
@@ -252,16 +253,16 @@ class RoomParameters(Parameters):
     When set, the reverberation time follows from it.
     """
     maximum_order: int | None = Field(default=None, ge=1, le=GREATEST_ORDER)
-    """Most walls that a reflection meets.
+    """Greatest number of walls that a reflection meets.
 
-    Unset, all count that arrive within the reverberation time.
+    Unset, all reflections count that arrive within the reverberation time.
     """
     source_height_m: Length = 0.3
     """Height of every loudspeaker above the floor, m."""
     microphone_height_m: Length = 0.3
     """Height of the microphones above the floor, m."""
     update_period_s: float = Field(default=0.1, ge=1e-3, le=60.0)
-    """Reflections are of the poses at multiples of this, s; a multiple of a frame."""
+    """Period at which poses for reflections are updated, s; a multiple of a frame."""
 
     @model_validator(mode="after")
     def _check(self) -> RoomParameters:

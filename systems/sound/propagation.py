@@ -11,22 +11,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.signals import Emission
-
-__all__ = [
-    "INTERPOLATION_KERNEL",
-    "KERNEL_REACH",
-    "MINIMUM_RANGE_M",
-    "check_reach",
-    "microphone_paths",
-    "propagate",
-    "retarded_delays",
-    "sampled_at",
-]
 
 #: Samples that the interpolation kernel touches on either side.
 KERNEL_REACH = 6
@@ -367,8 +356,8 @@ def check_reach(
 def _out_of_reach(distance: float) -> InputError:
     return InputError(
         "MicArray",
-        f"the source is {distance:.2f} m away, farther than the emission "
-        "reaches back; raise maximum_range_m of SoundEmitter",
+        f"the source is {distance:.2f} m away, farther than the stored emission "
+        "reaches; raise maximum_range_m of SoundEmitter",
     )
 
 

@@ -19,12 +19,6 @@ from systems.sound.parameters import MicArrayParameters, RoomParameters
 from systems.sound.propagation import check_reach, microphone_paths, propagate
 from systems.sound.reverberation import Reverberation
 
-__all__ = [
-    "MicMemory",
-    "Recorder",
-    "record_frame",
-]
-
 # Two instants closer than this are one tick of the clock, s.
 _SAME_INSTANT_S = 1e-6
 

@@ -17,8 +17,6 @@ from systems.sound.propagation import KERNEL_REACH, sampled_at
 from systems.sound.room import room_images, room_impulse_responses
 from systems.world.geometry import rotate
 
-__all__ = ["Reverberation"]
-
 # Responses kept, as spectra of half a megabyte a channel at most; two a source.
 _KEPT = 8
 
@@ -113,8 +111,8 @@ class Reverberation:
         if end < self._needed:
             raise InputError(
                 "MicArray",
-                f"reflections come by ways of {self.maximum_range_m:.0f} m, "
-                "longer than the emission reaches back; raise maximum_range_m of "
+                f"reflections travel {self.maximum_range_m:.0f} m, farther than "
+                "the stored emission reaches; raise maximum_range_m of "
                 "SoundEmitter",
             )
         if not emission.sounding:

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 from numpy.typing import ArrayLike, NDArray
 
+from systems.framework.compiling import njit
 from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import RoomParameters
 from systems.sound.propagation import (
@@ -22,12 +22,6 @@ from systems.sound.propagation import (
     KERNEL_REACH,
     MINIMUM_RANGE_M,
 )
-
-__all__ = [
-    "RoomImages",
-    "room_images",
-    "room_impulse_responses",
-]
 
 
 @dataclass(frozen=True)

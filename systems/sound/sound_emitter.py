@@ -19,16 +19,6 @@ from systems.sound.acoustics import AcousticParameters
 from systems.sound.parameters import SoundParameters
 from systems.sound.waveforms import make_waveform
 
-__all__ = [
-    "MAXIMUM_RANGE_M",
-    "SoundEmitter",
-    "called_sound",
-    "emissions_along",
-    "emitted_samples",
-    "history_ticks",
-    "make_emission",
-]
-
 #: Farthest way of sound without a room, m.
 MAXIMUM_RANGE_M = 30.0
 

@@ -14,8 +14,6 @@ from numpy.typing import NDArray
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 
-__all__ = ["MOST_SAMPLES", "read_noise", "read_played", "read_sound"]
-
 # Programs that write to a pipe cannot know the length and leave one of these.
 _UNKNOWN_SIZES = (0, 0x7FFFFFFF, 0x80000000, 0xFFFFFFFF)
 
@@ -95,7 +93,7 @@ def read_played(
     channels, rate = read_sound(path, field)
     if len(channels) != 1:
         raise InputError(
-            field, f"{path} has {len(channels)} channels; mix it down to one"
+            field, f"{path} has {len(channels)} channels; mix it down to one channel"
         )
     if rate < 2.0 * low_hz:
         raise InputError(
@@ -127,8 +125,8 @@ def read_noise(
     if len(channels) not in (1, count):
         raise InputError(
             field,
-            f"{path} has {len(channels)} channels for {count} microphones; give one "
-            "for each, or mix it down to one",
+            f"{path} has {len(channels)} channels for {count} microphones; give "
+            "one channel for each, or mix it down to one channel",
         )
     if channels.shape[1] < _LEAST_NOISE_S * rate:
         raise InputError(
@@ -162,9 +160,9 @@ def _check_header(
     if frames != _UNKNOWN_FRAMES and frames * channels > MOST_SAMPLES:
         raise InputError(
             field,
-            f"{where} says that it holds {frames} samples of {channels} channels, "
-            f"above {MOST_SAMPLES} in all; cut it into shorter files, or repair its "
-            "header",
+            f"{where} states that it holds {frames} samples of {channels} "
+            f"channels, above {MOST_SAMPLES} in all; cut it into shorter files, "
+            "or repair its header",
         )
 
 
@@ -205,7 +203,7 @@ def _check_samples(samples: NDArray[np.float64], field: str, where: str) -> None
             f"{channel + 1} as sample {sample}; export it again",
         )
     if not samples.any():
-        raise InputError(field, f"{where} is silent throughout; give one that sounds")
+        raise InputError(field, f"{where} is silent throughout; use a file with sound")
 
 
 def _opened(path: Path, field: str, where: str) -> Path | BytesIO:

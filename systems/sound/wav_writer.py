@@ -14,14 +14,6 @@ from numpy.typing import NDArray
 
 from systems.sound.waveforms import LARGEST_CREST
 
-__all__ = [
-    "LARGEST_WAV_BYTES",
-    "WavWriter",
-    "loudest_pa",
-    "pcm_of_counts",
-    "pcm_of_pressure",
-]
-
 #: Bytes of samples, at most: the header counts them, and itself, with 32 bits.
 LARGEST_WAV_BYTES = 2**32 - 1000
 

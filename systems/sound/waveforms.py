@@ -11,13 +11,6 @@ from systems.framework.signals import SAMPLE_RATE_HZ
 from systems.sound.parameters import EDGE_S, MICROPHONE_BAND_HZ, SoundParameters
 from systems.sound.sound_file import read_played
 
-__all__ = [
-    "LARGEST_CREST",
-    "band_limited",
-    "make_waveform",
-]
-
-
 #: A file's beginning is cut while it is this far below its peak.
 SILENCE_DB = -50.0
 #: Largest ratio of peak to RMS level that the loudspeaker gives.
@@ -51,7 +44,7 @@ def make_waveform(sound: SoundParameters, seed: int = 0) -> NDArray[np.float32]:
         raise InputError(
             field,
             f"{what} has nothing between {low:g} and {high:g} Hz, which the "
-            "microphones pass; choose another",
+            "microphones pass; choose another sound",
         )
     bursts = max(1, -(-len(endless) // burst))
     samples = np.resize(endless, bursts * burst)

@@ -9,11 +9,6 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.scalar_types import define_for_scalars
 from systems.world.paths import seconds
 
-__all__ = [
-    "Obstacles",
-    "Obstacles_",
-]
-
 
 @define_for_scalars("Obstacles_", __name__)
 def Obstacles_(T):

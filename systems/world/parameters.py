@@ -18,10 +18,6 @@ from systems.framework.parameters import (
 )
 from systems.world.paths import ACCELERATION_M_S2, AtEnd, WaypointPath
 
-__all__ = [
-    "ObstacleParameters",
-]
-
 
 class ObstacleParameters(Parameters):
     """One box, at rest or moving along waypoints."""
@@ -31,19 +27,19 @@ class ObstacleParameters(Parameters):
     size_m: Size = (0.1, 0.05)
     """Extents along its own x axis (its direction of travel) and y axis, m."""
     waypoints_m: Waypoints = ((2.0, 1.0),)
-    """Waypoints of its centre in W, m; one point is an obstacle at rest."""
+    """Waypoints of its center in W, m; one point is an obstacle at rest."""
     heading_deg: Angle = 0.0
     """Heading of an obstacle at rest, deg CCW from the x axis of W."""
     speed_m_s: NonNegativeSpeed = 0.3
     """Speed along the waypoints, m/s."""
     acceleration_m_s2: Acceleration = ACCELERATION_M_S2
-    """Of that speed where it starts and brakes, m/s^2."""
+    """Acceleration at start and braking, m/s^2."""
     start_time_s: Time = 0.0
     """It rests at its first waypoint until then, s."""
     at_end: AtEnd = "stop"
     """At the last waypoint: rest, or go back and forth."""
     known: bool = True
-    """Whether the map has it that robots plan their ways on; only what rests counts."""
+    """Whether the map for planned routes has it; only obstacles at rest count."""
     corner_radius_m: Length = 0.05
     """Largest radius of the rounded corners, m."""
 

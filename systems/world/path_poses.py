@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
-__all__ = ["poses_on"]
+from systems.framework.compiling import njit
 
 
 @njit(cache=True)

@@ -19,8 +19,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.input_error import InputError
 
-__all__ = ["ACCELERATION_M_S2", "AtEnd", "WaypointPath", "seconds"]
-
 AtEnd = Literal["stop", "shuttle"]
 
 #: How obstacles and master robot start and brake unless told otherwise, m/s^2. Not
@@ -94,7 +92,7 @@ class WaypointPath:
         top_yaw_rate: float = math.inf,
     ) -> None:
         if not waypoints:
-            raise InputError("waypoints_m", "none given; give at least one point")
+            raise InputError("waypoints_m", "no point is given; give at least one")
         if not corner_radius > 0.0:
             raise InputError(
                 "corner_radius_m",
@@ -182,6 +180,27 @@ class WaypointPath:
         rate = direction * (speed + acceleration * (elapsed - begin))
         return np.stack([rate, rate * curvature], axis=1)
 
+    def extreme_twists(self, until: float) -> NDArray[np.float64]:
+        """Speeds ahead and yaw rates at both ends of each piece of the path.
+
+        Within a piece the curvature is constant and the speed is linear in time, so
+        that every point of the body is fastest at one of the ends.
+
+        Args:
+            until: Pieces count up to this time, s.
+
+        Returns:
+            (n, 2) m/s and rad/s.
+        """
+        rows, last = [], until - self._start_time
+        for piece, end in zip(self._pieces, self._begins[1:], strict=False):
+            if piece.begin > last:
+                break
+            for elapsed in (piece.begin, min(end, last)):
+                rate = piece.speed + piece.acceleration * (elapsed - piece.begin)
+                rows.append((rate, rate * piece.curvature))
+        return np.reshape(rows, (-1, 2))
+
     def _elapsed(self, times: NDArray[np.float64]) -> tuple[Any, Any]:
         """Times since the first instant of a lap, s, and 1, or -1 on the way back."""
         elapsed = np.maximum(times - self._start_time, 0.0)
@@ -259,7 +278,8 @@ def _segments(
         length = math.hypot(x1 - x0, y1 - y0)
         if length < 1e-9:
             raise InputError(
-                "waypoints_m", f"({x0}, {y0}) stands twice in a row; remove one"
+                "waypoints_m",
+                f"({x0}, {y0}) is listed twice in a row; remove one of them",
             )
         legs.append((x0, y0, math.atan2(y1 - y0, x1 - x0), length))
 

@@ -16,18 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from systems.framework.elementary import cos, sin
 
-__all__ = [
-    "beyond",
-    "beyond_each",
-    "beyond_rectangle",
-    "control_point",
-    "nearest_corner",
-    "outside",
-    "rectangle_clearance",
-    "rotate",
-    "side_normals",
-]
-
 
 def rotate(theta: Any, x: Any, y: Any) -> tuple[Any, Any]:
     """Components in the outer frame of (x, y) given in a frame turned by theta.

@@ -6,8 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient, InitializeAutoDiff
 from pydrake.systems.analysis import (
     ApplySimulatorConfig,
@@ -23,6 +22,8 @@ from diagrams.scenario import Scenario
 from systems import DiffDrivePlant, WheelOdometry, WheelSpeedCommand
 from systems.framework.block_facts import block_facts
 from systems.laws.catalogue import FORCE_LAWS
+
+pytestmark = pytest.mark.drake
 
 T = 0.025
 IDEAL: dict[str, Any] = {

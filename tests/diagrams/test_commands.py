@@ -21,6 +21,8 @@ from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, control_point_velocity
 
+pytestmark = pytest.mark.drake
+
 MODULE = """
 from pydrake.systems.framework import LeafSystem
 
@@ -168,7 +170,8 @@ def test_our_laws_command_an_acceleration(law):
 
 def test_linear_models_are_refused(constants):
     from analysis.laws.law_curves import law_curves
-    from analysis.models.ideal_loop import ideal_loop, ideal_scenario
+    from analysis.models.ideal_loop import ideal_loop
+    from analysis.models.ideal_scenarios import ideal_scenario
 
     scenario = ideal_scenario(Scenario(law=f"{constants}:Twist"))
     with pytest.raises(InputError, match="no output port acceleration_W"):

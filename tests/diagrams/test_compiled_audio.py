@@ -109,7 +109,7 @@ def test_what_goes_wrong_in_a_frame_ends_the_run():
     )
     errors = []
     for engine in ("drake", "compiled"):
-        with pytest.raises(InputError, match="farther than the emission") as raised:
+        with pytest.raises(InputError, match="than the stored emission") as raised:
             simulate(scenario, follower=follower, engine=engine)
         errors.append(str(raised.value))
     assert errors[0] == errors[1]

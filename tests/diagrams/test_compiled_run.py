@@ -10,6 +10,8 @@ import pytest
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
+pytestmark = pytest.mark.drake
+
 TOUCHING = ("robots.second.attraction={follow_distance_m: 0.1}",)
 RK2 = "integrator.scheme=runge_kutta2", "integrator.step_s=0.01"
 

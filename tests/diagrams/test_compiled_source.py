@@ -9,6 +9,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 import pytest
 
@@ -46,8 +47,9 @@ def made(function=doubled):
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled_source, "cache_folder", lambda: tmp_path)
+    monkeypatch.setattr(numba.config, "CACHE_DIR", "")  # a developer's may be set
     compiled_source._loaded.cache_clear()
-    yield tmp_path / "phonotaxis_parts"
+    yield tmp_path / "parts"
     compiled_source._loaded.cache_clear()
 
 
@@ -91,7 +93,7 @@ def test_values_come_back_from_their_expression():
 
 @pytest.mark.parametrize("value", [b"text", np.zeros(2, dtype=complex), {1: 2}])
 def test_what_is_no_number_is_refused(value):
-    with pytest.raises(InputError, match="nothing that compiled loops take"):
+    with pytest.raises(InputError, match="cannot be used in compiled loops"):
         LoopPart().expression((1.0, value))
 
 
@@ -102,8 +104,8 @@ def test_arrays_stand_there_once():
 
 
 def test_parts_are_called_in_order_and_end_the_run():
-    """Before the log, the judge, and after: counted and logged."""
-    counts, seen = np.zeros(3), np.zeros(3)
+    """First, the judge, before the log and after it: counted and logged."""
+    counts, seen = np.zeros(3), np.array([2.0, 302.0, 302.0])
 
     def adding(to):
         part = LoopPart()
@@ -112,7 +114,8 @@ def test_parts_are_called_in_order_and_end_the_run():
 
     judge = LoopPart()
     ends = f"if {judge.expression(counts)}[0] > 3.5:"
-    parts = [adding(0), (judge, compiled(judge, ends, "    return 1")), adding(1)]
+    judging = judge, compiled(judge, ends, "    return 1")
+    parts = [adding(0), judging, adding(1), adding(2)]
     words = [part.words() for part, _ in parts]
     calls = np.array(
         [
@@ -122,13 +125,14 @@ def test_parts_are_called_in_order_and_end_the_run():
     )
     log = np.zeros((9, 3))
     logged = np.array([(counts.ctypes.data, 3)])
-    plan = np.array([2]), np.array([0]), 1, np.array([(2, 0), (2, 1)])
+    before, after = (np.array([(k, 0), (k, 1)]) for k in (2, 3))
+    plan = np.array([2, 3]), np.array([0]), 1, before, after
     assert run_parts(0, 2, log, logged, calls, plan) == (2, False)
-    seen[:] = 2.0, 302.0, 0.0
     assert counts.tolist() == seen.tolist()
     assert run_parts(2, 9, log, logged, calls, plan) == (4, True)
     assert log[:5, 0].tolist() == [1.0, 2.0, 3.0, 4.0, 0.0]
-    assert log[:4, 1].tolist() == [100.0, 201.0, 302.0, 403.0]
+    assert log[:4, 1].tolist() == [201.0, 302.0, 403.0, 504.0]
+    assert log[:4, 2].tolist() == [100.0, 201.0, 302.0, 403.0]
 
 
 def test_what_a_part_raises_ends_the_loop():
@@ -136,7 +140,8 @@ def test_what_a_part_raises_ends_the_loop():
     function, words = compiled(part, "1 // (tick - 1)"), part.words()
     calls = np.array([(address_of(function), words.ctypes.data)])
     none, logged = np.empty(0, dtype=np.int64), np.empty((0, 2), dtype=np.int64)
-    plan = none, np.array([0]), 0, np.empty((0, 2), dtype=np.int64)
+    pairs = np.empty((0, 2), dtype=np.int64)
+    plan = none, np.array([0]), 0, pairs, pairs
     with pytest.raises(ZeroDivisionError):
         run_parts(0, 3, np.zeros((3, 0)), logged, calls, plan)
 

@@ -16,6 +16,8 @@ from diagrams import build_sound_follower, load_scenario, make_simulator, simula
 from diagrams.builder import SoundFollower
 from systems.framework.signals import TICK_S, AudioFrame, Emission
 
+pytestmark = pytest.mark.drake
+
 BUILDS = {
     "audio": (),
     "ideal": ("hearing=ideal", "obstacle_sensing=ideal"),

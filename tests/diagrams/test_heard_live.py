@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
-from analysis.listening import HeardStep, LiveHearing, listen, open_pipe
-from analysis.recordings import load_geometry, locate
+from analysis.listening.live_hearing import HeardStep, LiveHearing, listen
+from analysis.listening.sound_pipe import open_pipe
+from analysis.recordings.array_geometry import load_geometry
+from analysis.recordings.locate import locate
 from diagrams import (
     RunAudio,
     build_sound_follower,
@@ -31,7 +33,7 @@ OVERRIDES = (
 
 
 class Listener(SourceListener):
-    """As docs/extending.md has it."""
+    """As docs/your_law.md has it."""
 
     def __init__(self, scenario):
         super().__init__(

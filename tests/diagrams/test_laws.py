@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from diagrams import build_sound_follower, load_scenario
-from diagrams.laws import LAWS, make_controller
+from diagrams.laws import make_controller
 from diagrams.scenario import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.catalogue import FORCE_LAWS
+from systems.laws.catalogue import FORCE_LAWS, LAWS
 
 OWN_LAWS = """
 from systems import ConventionalImpedanceController

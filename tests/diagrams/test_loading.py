@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any, get_args, get_origin
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from ruamel.yaml import YAML
 
 from diagrams import load_scenario, simulate
@@ -256,8 +255,8 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
             "obstacles.0.waypoints_m",
             "remove one",
         ),
-        ("obstacles.0.waypoints_m=[[0, 0]]", "obstacles.0", "stands on.*move"),
-        ("source.waypoints_m=[[0, 0]]", "source", "stands on.*move"),
+        ("obstacles.0.waypoints_m=[[0, 0]]", "obstacles.0", "is on.*move"),
+        ("source.waypoints_m=[[0, 0]]", "source", "is on.*move"),
         ("obstacles.0.name=source", "obstacles", "'source' is taken; give"),
         ("ultrasonic.minimum_range_m=4", "ultrasonic.minimum_range_m", "below"),
         (

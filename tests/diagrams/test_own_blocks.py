@@ -1,4 +1,4 @@
-"""docs/extending.md is true: a sensor and a block are a file each."""
+"""docs/your_law.md is true: a sensor and a block are a file each."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from diagrams import RunResult, build_sound_follower, load_scenario, simulate
 from diagrams.own_code import own_files
 from systems.framework.input_error import InputError
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
+pytestmark = pytest.mark.drake
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "your_law.md"
 #: A source that is nearer than the follow distance, and a box behind the robot.
 PUSHED_BACK = [
     "hearing=ideal",
@@ -78,11 +80,11 @@ def test_a_sweep_knows_the_files_of_blocks(folder):
     ("code", "message"),
     [
         ("Mine = 3", r"has no function or class 'Mine'"),
-        ("def Mine(): pass", r"is no LeafSystem; derive"),
-        ("class Mine(LeafSystem): pass", r"does not say what it is; give it .* FACTS"),
+        ("def Mine(): pass", r"is not a LeafSystem; derive"),
+        ("class Mine(LeafSystem): pass", r"does not state its part; give it .* FACTS"),
         (
             ASKS_FOR_WHEELS,
-            r"cannot be made \(TypeError: .*'wheels'.*\); it may ask for scenario, ro",
+            r"cannot be made \(TypeError: .*'wheels'.*\); it may take scenario, ro",
         ),
         ("1 / 0", r"cannot be imported: ZeroDivisionError"),
     ],

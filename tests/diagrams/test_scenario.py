@@ -53,12 +53,12 @@ def test_no_obstacle_may_stand_on_the_start(x, y, clear):
     if clear:
         assert len(Scenario.model_validate(data).obstacles) == 2
         return
-    with pytest.raises(ValidationError, match=r"obstacles\.1: 'box' stands on"):
+    with pytest.raises(ValidationError, match=r"obstacles\.1: 'box' is on"):
         Scenario.model_validate(data)
 
 
 def test_the_source_may_not_stand_on_the_start():
-    with pytest.raises(ValidationError, match="source: 'source' stands on the"):
+    with pytest.raises(ValidationError, match="source: 'source' is on the"):
         Scenario.model_validate({"source": {"waypoints_m": [[0.3, 0.0]]}})
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from time import sleep
 
 import numpy as np
+import pytest
 
 from diagrams import (
     build_sound_follower,
@@ -15,6 +16,8 @@ from diagrams import (
 )
 from diagrams.scenario import Scenario
 from systems.framework.signals import TICK_S
+
+pytestmark = pytest.mark.drake
 
 
 def test_code_is_loaded_aside_and_once_for_a_kind_of_build(monkeypatch):

@@ -356,6 +356,101 @@ def test_a_near_miss_is_no_collision():
     assert result.cause == "timeout"
 
 
+@pytest.mark.parametrize("engine", ["drake", "compiled"])
+def test_a_fast_robot_does_not_pass_through_a_film(engine):
+    """At 0.6 m a tick the film lies ahead of the body at one tick, and then behind."""
+    result = simulate(
+        Scenario.model_validate(
+            BASE
+            | {
+                "robot": {"mass_kg": 0.05, "top_speed_m_s": 25.0},
+                "attraction": {"stiffness_n_m": 100.0},
+                "ideal_hearing": {"burst_gaps": False, "maximum_range_m": 50.0},
+                "source": {"waypoints_m": [[18.0, 0.0]]},
+                "obstacles": [
+                    {
+                        "name": "film",
+                        "waypoints_m": [[9.0, 0.0]],
+                        "size_m": [0.001, 4.0],
+                    }
+                ],
+            }
+        ),
+        engine=engine,
+    )
+    assert result.cause == "collision"
+    assert result.collision is not None
+    assert (result.collision.object, result.collision.fault) == ("film", "robot")
+    x, face = result.columns["p_WB_x"], 9.0 - 0.0005 - 0.175
+    ahead = int(np.flatnonzero(x > face)[0])
+    part = (face - x[ahead - 1]) / (x[ahead] - x[ahead - 1])
+    touch = 0.025 * (ahead - 1 + part)
+    assert touch <= result.collision.time <= touch + 0.005
+    assert x[ahead] - x[ahead - 1] > 0.5
+
+
+@pytest.mark.parametrize("engine", ["drake", "compiled"])
+@pytest.mark.parametrize("speed", [20.0, 100.0])
+def test_a_shot_is_found_whatever_its_phase(engine, speed):
+    """A speck that crosses the waiting body, 0.35 m long, within a tick."""
+    hits = 0
+    for phase in range(12):
+        begin = 4.0 + speed * 0.025 * phase / 12.0
+        speck = {
+            "name": "speck",
+            "waypoints_m": [[begin, 0.4], [-9.0, 0.4]],
+            "size_m": [0.002, 0.002],
+            "speed_m_s": speed,
+            "acceleration_m_s2": 1e6,
+        }
+        scenario = Scenario.model_validate(
+            BASE | WAITING | {"obstacles": [speck], "duration_s": 0.5}
+        )
+        result = simulate(scenario, engine=engine)
+        assert result.collision is not None
+        assert result.collision.object == "speck"
+        assert result.collision.fault == "obstacle"
+        touch = (begin - 0.001 - 0.175) / speed + 0.5 * speed / 1e6
+        assert touch <= result.collision.time <= touch + 0.0051
+        hits += 1
+    assert hits == 12
+
+
+def test_corners_are_not_cut_however_fast():
+    """At 50 m/s a fifth of a tick is 0.25 m, and so is the corner's radius: the chord
+    between such instants would cut it by 36 mm, and pass the robot's corner."""
+    x, y = 0.175 - 0.03, 0.41 - 0.03
+    hits = 0
+    for outside in (False, True):
+        shift = 0.05 if outside else 0.0
+        # The arc's foremost point lies inside of the body's corner, or clear of it.
+        radius = 0.25
+        tip = (radius / math.cos(math.pi / 4) - radius) / math.sqrt(2)
+        corner = x + shift - tip, y + shift - tip
+        cart = {
+            "name": "cart",
+            "waypoints_m": [
+                [corner[0] + 3.0, corner[1]],
+                [*corner],
+                [corner[0], corner[1] + 3.0],
+            ],
+            "corner_radius_m": radius,
+            "size_m": [0.002, 0.002],
+            "speed_m_s": 50.0,
+            "acceleration_m_s2": 1e6,
+        }
+        result = run(**WAITING, obstacles=[cart], duration_s=0.3)
+        path = result.scenario.obstacles[0].path()
+        robot = robot_rectangle(result.scenario.start.pose, result.scenario.robot)
+        dense = [
+            rectangle_clearance(robot, np.array([*path.pose(t), 0.002, 0.002]))
+            for t in np.linspace(0.0, 0.2, 8001)
+        ]
+        assert (result.cause == "collision") == (min(dense) < 0.0) == (not outside)
+        hits += int(not outside)
+    assert hits == 1
+
+
 @pytest.mark.parametrize(
     ("searches", "ended", "place", "cause"),
     [

@@ -31,7 +31,7 @@ def test_plain_values(text, value):
     ("text", "message"),
     [
         (BOMB, "aliases .* stand for more than 1,000,000"),
-        ("&a [*a]", r"\*a stands within itself"),
+        ("&a [*a]", r"\*a contains itself"),
         ("[" * (DEEPEST + 1) + "]" * (DEEPEST + 1), "more than 20 deep"),
         ("[" * 90_000, "more than 20 deep"),
         ("x" * (LARGEST_BYTES + 1), "more than 100 kB"),

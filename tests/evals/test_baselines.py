@@ -36,7 +36,7 @@ def assert_same(drake, compiled):
 
 @pytest.mark.parametrize("law", ["dwa", "vfh_plus", "mppi"])
 def test_a_map_of_echoes_is_enough_for_two_boxes(law):
-    """What rests is not touched, and most runs arrive (docs/baselines.md)."""
+    """What rests is not touched, and most runs arrive (docs/results_laws.md)."""
     ended = runs("two_static_obstacles", law)
     assert all(run.collision is None for run in ended)
     assert sum(run.cause == "reached" for run in ended) >= LAYOUTS - 2

@@ -58,6 +58,7 @@ def digest(**environment):
     ).stdout
 
 
+@pytest.mark.long
 def test_neither_compiling_nor_the_processor_changes_a_digit(tmp_path):
     """Compiled by this run or an earlier one; anew, for any processor; from there."""
     here = digest()

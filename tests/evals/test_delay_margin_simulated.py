@@ -43,7 +43,7 @@ def test_simulation_across_the_line_agrees_too():
     assert run.growth_per_s == pytest.approx(growth, rel=0.02)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("at", DELAY_PLACES)
 def test_simulation_over_300_s_confirms_the_margin(at):
     """Decays at 0.95 of the margin, grows at 1.05."""

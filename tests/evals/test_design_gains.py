@@ -71,6 +71,7 @@ def test_a_fifth_less_does_not_stop_it(law):
     assert run.cause == "collision"
 
 
+@pytest.mark.long
 def test_command_derives_the_defaults(tmp_path, capsys):
     out = tmp_path / "design"
     assert main(["design", "--out", str(out)]) == 0

@@ -7,8 +7,8 @@ import math
 import pytest
 from scipy.stats import binomtest
 
-from analysis.hearing.detection import FalseAlarms, detection_curve, false_alarms
 from analysis.hearing.free_field import Loudspeaker
+from studies.support.detection import FalseAlarms, detection_curve, false_alarms
 from systems.base.robot import RobotParameters
 from systems.framework.signals import TICK_S
 from systems.hearing.parameters import TDOAParameters
@@ -24,7 +24,7 @@ FRAMES = round(600.0 / TICK_S)
 
 @pytest.fixture(scope="module")
 def alarms() -> dict[float, FalseAlarms]:
-    """In ten minutes of noise, by the rate that is set, as in docs/localization.md."""
+    """In ten minutes of noise, by the rate that is set, see docs/results_hearing.md."""
     found = false_alarms(
         (*RATES, TDOAParameters().false_alarm_rate), FRAMES, shape=SHAPE, c=C, seed=9
     )

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from analysis.runs.metrics import run_metrics
-from benchmarks.following_in_rooms import (
+from diagrams import load_scenario, simulate
+from studies.following_in_rooms import (
     BURST_ENDS_S,
     behind,
     in_a_room,
     on_the_right_side,
     write_ego_noise,
 )
-from diagrams import load_scenario, simulate
 
 pytestmark = pytest.mark.slow
 
@@ -24,7 +24,7 @@ def room(tmp_path_factory) -> list[str]:
 
 
 def test_the_robot_follows_as_in_the_free_field(room):
-    """One seed; docs/localization.md has more."""
+    """One seed; docs/results_hearing.md has more."""
     shares = []
     empty: list[str] = []
     for overrides in (empty, room):

@@ -35,26 +35,28 @@ def test_a_source_beside_or_behind_the_start_is_reached(bearing_deg):
 
 @pytest.mark.parametrize("bearing_deg", [80, 100, -120, 150, 180])
 def test_with_the_printed_pull_it_comes_to_the_source_too(bearing_deg):
-    """And swings there: from straight behind it hits the master robot."""
+    """And swings there."""
     result = run(resting_source(bearing_deg), "duration_s=60")
     came = run_metrics(result)["time_to_goal_s"]
     assert came is not None
     assert came < 4.0
-    assert result.cause in ("reached", "unsettled", "collision")
+    assert result.cause in ("reached", "unsettled")
     assert np.max(result.columns["source_range_true"]) < 2.5 + 2.0
 
 
-@pytest.mark.parametrize("bearing_deg", [-120, 150, 180])
-def test_motion_tells_within_two_bursts(bearing_deg):
+@pytest.mark.parametrize(
+    ("bearing_deg", "within"), [(-120, 0.1), (150, 0.1), (180, 0.3)]
+)
+def test_motion_tells_within_two_bursts(bearing_deg, within):
     """At the end of the second one, or where it was reached before, the target
-    is the source."""
+    is the source. From straight behind the robot turns by 130 deg/s past it then."""
     result = run(resting_source(bearing_deg), "duration_s=2.6")
     columns = result.columns
     error = np.hypot(
         columns["p_WS_estimated_x"] - columns["p_WS_x"],
         columns["p_WS_estimated_y"] - columns["p_WS_y"],
     )
-    assert error[-1] < 0.1
+    assert error[-1] < within
 
 
 def test_default_follow_distance_does_not_run_away():

@@ -1,8 +1,8 @@
-"""The assumptions of the guard's theorem (docs/safety.md), each held and each broken.
+"""The assumptions of the guard's theorem (docs/guard.md), each held and each broken.
 
-Trials are those of ``benchmarks/guard_drivers.py``: drivers that press a guarded robot
-against bodies at rest. Where all assumptions hold it touches nothing; where one does
-not, there are trials in which it does.
+Trials are those of ``analysis/safety/driver_trials.py``: drivers that press a guarded
+robot against bodies at rest. Where all assumptions hold it touches nothing; where one
+does not, there are trials in which it does.
 """
 
 from __future__ import annotations
@@ -14,24 +14,25 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from benchmarks.guard_drivers import (
+from analysis.safety.driver_trials import (
     contact_speeds,
     draw_crossing,
     draw_trial,
     make_trial,
     run_trial,
 )
-from diagrams import InputError, Scenario, load_scenario, simulate
-from systems.base.diff_drive_plant import DiffDrivePlant
+from diagrams import Scenario, load_scenario, simulate
+from systems.base.diff_drive_plant import DiffDrivePlant, body_twist
+from systems.base.lagged_motion import advance_pose, lagged_motion
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.wheel_odometry import advance_pose
+from systems.framework.input_error import InputError
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import measured_ranges
 from systems.safety.braking import braked, roll_on
 from systems.safety.free_space_map import FreeSpaceMap
 from systems.safety.motion_guard import MotionGuard
-from systems.safety.views import lasting
+from systems.safety.views import PlaceError, lasting
 from systems.world.geometry import fan_ranges, rectangle_clearance
 
 SEED = 7
@@ -44,11 +45,11 @@ def collides(number: int, changes: dict[str, Any] | None = None) -> bool:
 
 @pytest.mark.slow
 def test_with_all_assumptions_nothing_is_touched():
-    """Nor does the disc that holds the body come nearer than the least margin."""
+    """Nor does the disc come nearer than the theorem leaves of the least margin."""
     for number in (*range(20), 37):
         outcome = run_trial(draw_trial(SEED, number))
         assert not outcome.collided
-        assert outcome.clearance_m >= outcome.disc_m >= 0.009 - 3e-4
+        assert outcome.clearance_m >= outcome.disc_m >= 0.003 - 0.00157
 
 
 # A1: obstacles rest.
@@ -157,12 +158,20 @@ def moved_apart(
                 right = draw.choice([left, -left])
         turned = np.array([left, right]) * 0.005
         way += 0.06 * float(np.abs(turned).mean())
-        true = np.array(advance_pose(true, turned * (1.0 - np.array(slip)), robot))
-        believed = np.array(advance_pose(believed, turned, robot))
+        true = arc_on(true, turned * (1.0 - np.array(slip)), robot)
+        believed = arc_on(believed, turned, robot)
         seen = [_from_robot(pose, cells) for pose in (true, believed)]
         ways.append(way)
         errors.append(np.hypot(*(seen[0] - seen[1]).T).max())
     return np.array(ways), np.array(errors)
+
+
+def arc_on(
+    pose: NDArray[np.float64], turned: NDArray[np.float64], robot: RobotParameters
+) -> NDArray[np.float64]:
+    """Pose after both wheels have turned at constant speeds."""
+    twist = body_twist(turned, robot)
+    return np.array(advance_pose(pose, twist, twist, lagged_motion(0.005, 0.05)))
 
 
 def _from_robot(
@@ -172,15 +181,13 @@ def _from_robot(
     return (cells - pose[:2]) @ np.array([[c, -s], [s, c]])
 
 
-@pytest.mark.parametrize("error", [0.003, 0.02])
-@pytest.mark.parametrize("distance", [0.5, 3.0])
+@pytest.mark.parametrize(("error", "distance"), [(0.003, 0.5), (0.02, 3.0)])
 def test_a4_cells_are_off_by_less_than_allowed_as_long_as_they_last(error, distance):
     allowed, draw, most = 0.03, np.random.default_rng(2), 0.0
-    lasts = lasting(distance, (error, allowed, 0.41))
+    lasts = lasting(distance, PlaceError(error, 0.0, 0.41, allowed))
     for slip in ((error, error), (error, -error), (-error, error), (-error, 0.0)):
         for _ in range(5):
             ways, errors = moved_apart(slip, distance, draw)
-            # The arc of which the odometry takes the chord is as exact for both.
             assert errors[ways <= lasts].max(initial=0.0) <= allowed
             most = max(most, errors[ways <= lasts].max(initial=0.0))
     # And it is no bound that nothing comes near.
@@ -254,7 +261,7 @@ def foreseen_way(speed: float = 0.72) -> float:
     speeds, pose = commanded, (0.0, 0.0, 0.0)
     for _ in range(120):
         commanded = braked(commanded, braking)
-        pose, speeds = roll_on(pose, speeds, commanded, 0.025, braking)
+        pose, speeds = roll_on(pose, speeds, commanded, braking)
     return float(pose[0])
 
 
@@ -284,15 +291,15 @@ def test_in_a_ring_of_sensors_what_moves_finds_the_robot_at_rest_or_withdrawing(
     moving = {0.0: 0, 0.3: 0}
     contacts = dict(moving)
     for bound in moving:
-        for number in range(60):
+        for number in range(30):
             trial = draw_crossing(SEED, number, 1, 0.3)
             guard = {"guard": {"obstacle_speed_m_s": bound}}
             if speeds := contact_speeds(trial, guard):
                 contacts[bound] += 1
                 moving[bound] += speeds[0] > 0.005 or speeds[1] > 0.31
-    assert contacts[0.3] > 20
-    assert moving[0.0] > 20
-    assert moving[0.3] <= 2
+    assert contacts[0.3] > 10
+    assert moving[0.0] > 10
+    assert moving[0.3] <= 1
 
 
 def test_the_disc_holds_the_body_at_any_heading():

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.stats import binom
 
 from analysis.comparison.plans import comparison_plan
 from diagrams import load_scenario, simulate
@@ -41,17 +42,37 @@ def test_nothing_that_rests_is_touched(name):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["one_moving_obstacle", "two_moving_obstacles"])
-def test_what_moves_is_evaded(name):
-    """The papers' laws touch something in 7 and 11 of 24 (docs/safety.md)."""
-    hit = [run.collision for run in runs(name, 16) if run.collision is not None]
-    assert len(hit) <= 3
-    assert sum(contact.fault == "robot" for contact in hit) <= 1
+@pytest.mark.parametrize(
+    ("name", "documented", "layouts", "most", "caught"),
+    [
+        ("one_moving_obstacle", 0.004, 20, 1, 0.217),
+        ("two_moving_obstacles", 0.023, 20, 2, 0.284),
+        pytest.param(
+            *("one_moving_obstacle", 0.004, 100, 2, 0.062), marks=pytest.mark.long
+        ),
+        pytest.param(
+            *("two_moving_obstacles", 0.023, 100, 5, 0.103), marks=pytest.mark.long
+        ),
+    ],
+)
+def test_what_moves_is_evaded(name, documented, layouts, most, caught):
+    """By the rates of docs/guard.md, of 1000 layouts each: 0.4 % and 2.3 %.
+
+    A law that collides at the documented rate passes on 95 % of the seeds or more,
+    and one that collides at the rate ``caught`` fails on 95 % of them.
+    """
+    assert binom.cdf(most, layouts, documented) > 0.95
+    assert binom.cdf(most, layouts, caught) < 0.05
+    collisions = [run.collision for run in runs(name, layouts)]
+    assert len(collisions) == layouts
+    hit = [collision for collision in collisions if collision is not None]
+    assert len(hit) <= most
+    assert sum(contact.fault == "robot" for contact in hit) <= 2
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("name", "cause"), [("u_trap", "reached"), ("two_moving_obstacles", "completed")]
+    ("name", "cause"), [("u_trap", "reached"), ("two_moving_obstacles", "astray")]
 )
 def test_compiled_and_drake_agree(name, cause):
     scenario = load_scenario(name, ["hearing=ideal", "law=guarded"])

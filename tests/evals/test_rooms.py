@@ -1,4 +1,4 @@
-"""Bursts in reverberant rooms; docs/localization.md has more of them."""
+"""Bursts in reverberant rooms; docs/results_hearing.md has more of them."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from analysis.hearing import room_trials
-from benchmarks.rooms import ROOMS, SOUNDS, run_task
+from studies.rooms import ROOMS, SOUNDS, run_task
+from studies.support import room_trials
 from systems.sound.room import room_impulse_responses
 
 pytestmark = pytest.mark.slow

@@ -88,7 +88,9 @@ def test_margin_verdicts_are_the_least_of_every_cut_both_ways(document):
     assert len(delays) == 2
     assert verdicts["least delay margin"] == pytest.approx(min(delays))
     largest = {row["hold"]: row["largest"] for row in document["burst_cycle"]}
-    assert verdicts["left after a burst cycle"] == pytest.approx(largest["motion"])
+    assert verdicts["deviation remaining after a burst cycle"] == pytest.approx(
+        largest["motion"]
+    )
 
 
 def test_page_holds_everything_and_loads_nothing(report):

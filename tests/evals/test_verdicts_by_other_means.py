@@ -70,7 +70,7 @@ def studies():
 
 
 def push(scenario, c, s=0.0):
-    """f(c, s) in N, from docs/laws.md."""
+    """f(c, s) in N, from docs/results_laws.md."""
     gains = scenario.repulsion
     if scenario.law == "conventional":
         own = gains.conventional
@@ -373,7 +373,7 @@ def test_worst_cases_are_those_of_all_corners(studies, contact):
             }
         )
         stiffness = values["attraction.stiffness_n_m"]
-        # A range that is read with the wrong speed of sound: see docs/stability.md.
+        # A range that is read with the wrong speed of sound.
         speed = values.get("sound_speed_m_s")
         stiffness *= 1.0 if speed is None else stretch(scenario, speed)
         found.append(

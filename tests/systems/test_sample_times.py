@@ -12,6 +12,8 @@ import systems
 from systems.ranging.parameters import UltrasonicParameters
 from systems.sound.parameters import MicArrayParameters
 
+pytestmark = pytest.mark.drake
+
 IN_TURN = UltrasonicParameters(firing="sequential")
 SAMPLED: dict[str, dict[str, Any]] = {
     "CollisionVector": {"sensors": IN_TURN},

@@ -1,3 +1,1 @@
 """Commands that tell what there is: scenarios, laws, fields, and the installation."""
-
-__all__: list[str] = []

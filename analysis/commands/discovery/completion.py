@@ -13,8 +13,6 @@ from analysis.commands.arguments import (
 )
 from analysis.commands.command import Command, Job, Take
 
-__all__ = ["COMMAND"]
-
 #: A function of a shell that gives some words, and files.
 _FUNCTIONS = {
     "bash": '{name}() {{ compgen -W "{words}" -- "$1"; compgen -f -- "$1"; }}',
@@ -25,13 +23,15 @@ _FUNCTIONS = {
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
-    parser.add_argument("shell", choices=list(_FUNCTIONS), help="whose script it is")
+    parser.add_argument(
+        "shell", choices=list(_FUNCTIONS), help="shell that the script is for"
+    )
     take_json(parser)
 
 
 def _prepare(options: Namespace, take: Take) -> Job[str]:
     from diagrams import library_scenarios
-    from diagrams.fields import known_laws
+    from diagrams.fields.shipped import known_laws
 
     def script() -> str:
         import shtab

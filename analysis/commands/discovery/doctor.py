@@ -12,8 +12,6 @@ from analysis.commands.command import Command, Job, Take
 if TYPE_CHECKING:
     from analysis.installation import Diagnosis
 
-__all__ = ["COMMAND"]
-
 _SIGNS = {"ok": "ok  ", "note": "note", "bad": "BAD "}
 
 

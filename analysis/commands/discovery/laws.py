@@ -8,11 +8,9 @@ from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.discovery.listing import listing
 
-__all__ = ["COMMAND"]
-
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
-    from diagrams.fields import known_laws
+    from diagrams.fields.shipped import known_laws
 
     return listing("laws", "title", known_laws)
 

@@ -7,8 +7,6 @@ from typing import Any
 
 from analysis.commands.command import Job
 
-__all__ = ["listing"]
-
 
 def listing(
     plural: str, about: str, rows: Callable[[], dict[str, str]]

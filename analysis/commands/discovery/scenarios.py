@@ -8,8 +8,6 @@ from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
 from analysis.commands.discovery.listing import listing
 
-__all__ = ["COMMAND"]
-
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
     from diagrams import library_scenarios

@@ -1,3 +1,1 @@
 """Runs for other programs: MCAP, CSV, and what the columns mean."""
-
-__all__: list[str] = []

@@ -11,8 +11,6 @@ from analysis.commands.command import Command, Job, Take
 if TYPE_CHECKING:
     from analysis.exports.columns import Column
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
@@ -47,7 +45,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[Column]]:
 
 COMMAND = Command(
     "columns",
-    "units and meanings of a run's columns",
+    "list the units and meanings of a run's columns",
     _add_arguments,
     _prepare,
     examples=("columns", "columns p_WB", "columns --json"),

@@ -15,8 +15,6 @@ from analysis.commands.exporting.files import Exports, take_exports
 if TYPE_CHECKING:
     from analysis.exports.recorded_run import RecordedRun
 
-__all__ = ["COMMAND"]
-
 
 def _add_arguments(parser: ArgumentParser) -> None:
     parser.add_argument(
@@ -24,7 +22,9 @@ def _add_arguments(parser: ArgumentParser) -> None:
     )
     take_exports(parser)
     parser.add_argument(
-        "--out", metavar="DIR", help="new directory for them (default: beside the run)"
+        "--out",
+        metavar="DIR",
+        help="new directory for the files (default: the directory of the run)",
     )
     take_json(parser)
 
@@ -35,13 +35,14 @@ def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
 
     exports, result = Exports.chosen(options), Path(options.result)
     if not exports.names:
-        raise InputError("export", "nothing is asked for; give --mcap, --csv or both")
+        raise InputError("export", "no format is given; give --mcap, --csv or both")
     run = RecordedRun.load(result)
     if options.out is None:
         for name in exports.names:
             if (result / name).exists():
                 raise InputError(
-                    "out", f"{result / name} is there; remove it, or give --out DIR"
+                    "out",
+                    f"{result / name} already exists; remove it, or give --out DIR",
                 )
         if not os.access(result, os.W_OK | os.X_OK):
             raise InputError("out", f"{result} cannot be written; give --out DIR")
@@ -75,7 +76,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RecordedRun]:
 
 COMMAND = Command(
     "export",
-    "MCAP and CSV of a run that is done",
+    "write MCAP and CSV files of a finished run",
     _add_arguments,
     _prepare,
     examples=("export results/0001 --mcap", "export results/0001 --csv --out tables"),

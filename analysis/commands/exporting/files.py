@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING, NamedTuple
 if TYPE_CHECKING:
     from analysis.exports.recorded_run import RecordedRun
 
-__all__ = ["CSV_FILE", "MCAP_FILE", "Exports", "take_exports"]
-
 MCAP_FILE, CSV_FILE = "run.mcap", "trajectory.csv"
 
 

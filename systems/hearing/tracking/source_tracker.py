@@ -17,8 +17,6 @@ from systems.framework.signals import TICK_S, whole
 from systems.hearing.parameters import TrackerParameters
 from systems.hearing.tracking.tracker_model import Measurement, Track, TrackerModel
 
-__all__ = ["SourceTracker", "SourceTracker_"]
-
 #: An older estimate would be placed by a pose that nobody remembers, s.
 _OLDEST_S = 2.0
 
@@ -102,8 +100,8 @@ def SourceTracker_(T):
             if not whole(frame_s / tick_s):
                 raise InputError(
                     "SourceTracker",
-                    f"frame_s is {frame_s:g}, no multiple of tick_s {tick_s:g}; give "
-                    "one",
+                    f"frame_s is {frame_s:g}, not a multiple of tick_s "
+                    f"{tick_s:g}; give a multiple",
                 )
             self._config = {
                 "robot": robot or RobotParameters(),

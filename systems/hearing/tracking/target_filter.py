@@ -34,19 +34,10 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-__all__ = [
-    "NEVER_HEARD_S",
-    "FilterSettings",
-    "ages",
-    "blank_memory",
-    "chosen_track",
-    "expected",
-    "fold",
-]
+from systems.framework.compiling import njit
 
 #: Names of a track's elements.
 TRACK_NAMES = (
@@ -90,9 +81,9 @@ class FilterSettings(NamedTuple):
     floor: float
     """Standard deviation of what an estimate's covariance leaves out, m."""
     gate_floor: float
-    """Standard deviation that the gate allows for besides the covariances, m."""
+    """Standard deviation that the gate allows for in addition to the covariances, m."""
     believed_outliers: int
-    """The outlier of this number in a row is believed, if they agree."""
+    """Number of outliers in a row after which they are accepted, if they agree."""
     assumed_range: float
     """Range of a target of which only the bearing is known, m."""
     measurement_age: float

@@ -6,11 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step
 from systems.hearing.parameters import TrackerParameters
@@ -26,13 +26,6 @@ from systems.hearing.tracking.target_filter import (
 )
 from systems.sound.array_shape import ArrayShape
 from systems.world.geometry import rotate
-
-__all__ = [
-    "Measurement",
-    "Track",
-    "TrackerModel",
-    "past_pose",
-]
 
 
 class Measurement(NamedTuple):
@@ -232,7 +225,6 @@ class TrackerNumbers(NamedTuple):
     """By what the filter's memory grows in a tick."""
 
 
-# Not compiled by itself: a cached function does not notice changes in other files.
 def track_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrackerNumbers
 ) -> None:

@@ -30,14 +30,6 @@ from systems.hearing.voting.rank_one_bins import (
 from systems.hearing.voting.steered_votes import SteeredSearch
 from systems.sound.array_shape import ArrayShape
 
-__all__ = [
-    "DirectionVotes",
-    "VoteMemory",
-    "VotePlan",
-    "cast_votes",
-    "join_votes",
-]
-
 _FRAME_S = 0.032
 # At least so many times what sound takes along the array.
 _CROSSINGS = 6.0
@@ -142,8 +134,8 @@ class VotePlan:
         if "bearing" not in shape.angles:
             raise InputError(
                 "microphones",
-                "a row that is not level tells no bearings; give one in the plane z = "
-                "const, or microphones off the row",
+                "a row that is not level gives no bearings; give a row in the "
+                "plane z = const, or add microphones off the row",
             )
         _check(c, sample_rate_hz, band_hz, least_ratio)
         frame_s = max(_FRAME_S, _CROSSINGS * shape.max_delay(c))
@@ -255,7 +247,9 @@ def _check(
     c: float, sample_rate_hz: float, band_hz: tuple[float, float], least_ratio: float
 ) -> None:
     if not _SPEEDS_M_S[0] <= c <= _SPEEDS_M_S[1]:
-        raise InputError("c", f"{c:g} m/s is no speed of sound; it is about 343 in air")
+        raise InputError(
+            "c", f"{c:g} m/s is not a speed of sound; use about 343 m/s in air"
+        )
     if not 1_000.0 <= sample_rate_hz < math.inf:
         raise InputError(
             "sample_rate_hz", f"{sample_rate_hz:g} Hz; give at least 1000 Hz"

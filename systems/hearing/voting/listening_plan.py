@@ -5,8 +5,6 @@ from __future__ import annotations
 from systems.hearing.voting.direction_votes import VotePlan
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["vote_plan"]
-
 # Speech and most noises have what is told apart below this.
 _HIGHEST_HZ = 8_000.0
 

@@ -10,8 +10,6 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["PhasePlane", "PlaneFits"]
-
 # Short pairs span the array if their narrowest extent is this share of their widest.
 _LEAST_SPAN = 0.3
 

@@ -10,8 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["GROUP_FRAMES", "find_rank_one", "group_powers"]
-
 #: Frames of a covariance.
 GROUP_FRAMES = 4
 

@@ -25,14 +25,6 @@ from systems.hearing.voting.source_tracks import (
 )
 from systems.hearing.voting.vote_peaks import gather_sources
 
-__all__ = [
-    "ListenerMemory",
-    "ListenerParameters",
-    "TrackedSources",
-    "follow_sources",
-    "hear_sources",
-]
-
 # Bins that vote for a source in a window, for each second of it, and at least.
 _VOTES_S, _LEAST_VOTES = 20.0, 6.0
 

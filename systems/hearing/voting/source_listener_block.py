@@ -21,8 +21,6 @@ from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters
 
-__all__ = ["SourceListener"]
-
 
 class _Heard(NamedTuple):
     memory: ListenerMemory

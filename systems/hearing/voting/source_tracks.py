@@ -24,8 +24,6 @@ from scipy.optimize import linear_sum_assignment
 
 from systems.framework.parameters import Fraction, Parameters, Positive
 
-__all__ = ["Detection", "SourceTrack", "TrackMemory", "TrackParameters", "step_tracks"]
-
 # A detection farther from a track than so many deviations is not of it.
 _GATE = 3.5
 

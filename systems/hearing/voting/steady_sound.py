@@ -13,8 +13,6 @@ from numpy.typing import NDArray
 
 from systems.hearing.voting.direction_votes import DirectionVotes
 
-__all__ = ["is_steady", "level_scatter_db", "steered_only"]
-
 # Steady is what scatters by less; halfway, in dB, from noise to speech.
 _STEADY_DB = 4.4
 

@@ -16,8 +16,6 @@ from scipy import fft
 from systems.hearing.steered_response import LAG_DENSITY, SearchGrid, steered_response
 from systems.sound.array_shape import ArrayShape
 
-__all__ = ["SteeredSearch"]
-
 # A frame's peaks count above this share of its highest, and above so many deviations
 # of what noise gives.
 _LEAST_SHARE = 0.6

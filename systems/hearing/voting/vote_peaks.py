@@ -15,8 +15,6 @@ from numpy.typing import NDArray
 
 from systems.hearing.voting.direction_votes import DirectionVotes
 
-__all__ = ["VotedSource", "gather_sources"]
-
 _CELLS = 360
 
 # Deviation of the von Mises kernel: wider ones merge talkers, narrower ones split them.

@@ -14,14 +14,6 @@ from systems.laws.parameters import AttractionParameters
 from systems.planning.following import FollowNumbers
 from systems.planning.parameters import FollowingParameters
 
-__all__ = [
-    "BASELINE_INPUTS",
-    "BaselineController",
-    "follow_numbers",
-    "half_size",
-    "speed_limits",
-]
-
 #: Input ports of every baseline, and their sizes.
 BASELINE_INPUTS = (
     ("p_WS_estimated", 2),

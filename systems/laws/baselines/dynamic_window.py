@@ -6,11 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
@@ -26,14 +26,6 @@ from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters
-
-__all__ = [
-    "DynamicWindowController",
-    "WindowNumbers",
-    "choose_in_window",
-    "dynamic_window_step",
-    "time_to_contact",
-]
 
 #: Speeds and yaw rates that are tried in a window.
 _SPEEDS, _TURNS = 9, 17

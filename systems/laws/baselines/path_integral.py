@@ -6,11 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
 from systems.laws.baselines.baseline_controller import (
@@ -29,14 +29,6 @@ from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters
-
-__all__ = [
-    "PathIntegralController",
-    "PathIntegralNumbers",
-    "distance_field",
-    "path_integral_step",
-    "roll_out",
-]
 
 #: Half of the window of the distances, m; it holds what a horizon reaches.
 _WINDOW_M = 2.5

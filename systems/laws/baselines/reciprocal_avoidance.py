@@ -6,10 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters, body_radius
+from systems.base.wheel_speed_command import turned_off_back
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
@@ -22,14 +23,10 @@ from systems.planning.half_planes import nearest_velocity
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 
-__all__ = [
-    "ReciprocalAvoidanceController",
-    "avoid_body",
-    "reciprocal_avoidance_step",
-]
-
 #: A velocity that does not lead out of a contact at once does so in this time, s.
 _OUT_S = 0.1
+#: Slower rests, and by less a velocity is not changed, m/s.
+_RESTS_M_S, _UNCHANGED_M_S = 0.05, 1e-6
 
 
 class AvoidanceNumbers(NamedTuple):
@@ -194,7 +191,12 @@ def reciprocal_avoidance_step(
         planes[used, 0], planes[used, 1] = nx, ny
         planes[used, 2] = offset + nx * ux + ny * uy
         used += 1
-    preferred = wanted * math.cos(bearing), wanted * math.sin(bearing)
+    preferred = turned_off_back(
+        wanted * math.cos(bearing),
+        wanted * math.sin(bearing),
+        pose[2],
+        _RESTS_M_S,
+    )
     vx, vy, _ = nearest_velocity(
         planes[:used], preferred, numbers.follow.own.cruise_speed_m_s, 0
     )
@@ -202,7 +204,11 @@ def reciprocal_avoidance_step(
     turn = (c * vy - s * vx) / own.offset_m
     limit = numbers.follow.own.turn_rate_rad_s
     twist[0], twist[1] = c * vx + s * vy, min(max(turn, -limit), limit)
-    if inputs[2][0] > 0.5 and math.hypot(vx, vy) < 0.05:
+    # At rest, and where it backs off with nothing in the way, it faces the target. The
+    # twist above would turn it away, until it rests and turns back: it would chatter.
+    changed = math.hypot(vx - preferred[0], vy - preferred[1])
+    backs = wanted < 0.0 and changed < _UNCHANGED_M_S
+    if inputs[2][0] > 0.5 and (backs or math.hypot(vx, vy) < _RESTS_M_S):
         twist[1] = turn_towards(0.0, bearing, pose[2], numbers.follow.own)[1]
 
 

@@ -11,14 +11,6 @@ from systems.laws.baselines.parameters import (
 )
 from systems.laws.law import Equation, Law
 
-__all__ = [
-    "DWA",
-    "MPPI",
-    "ORCA",
-    "STOP_WHEN_NEAR",
-    "VFH_PLUS",
-]
-
 STOP_WHEN_NEAR = Law(
     name="stop_when_near",
     title="Stop when near",

@@ -19,11 +19,6 @@ from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards
 from systems.ranging.parameters import UltrasonicParameters
 
-__all__ = [
-    "StopWhenNearController",
-    "stop_when_near_step",
-]
-
 
 class StopNumbers(NamedTuple):
     """What the step of ``StopWhenNearController`` depends on."""
@@ -80,7 +75,7 @@ class StopWhenNearController(BaselineController):
         sensors: The range sensors.
         tick_s: Period of the controller, s.
 
-    Reference: ours; docs/baselines.md.
+    Reference: ours; docs/results_laws.md.
     """
 
     def __init__(

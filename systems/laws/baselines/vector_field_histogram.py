@@ -6,11 +6,11 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
+from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
@@ -26,14 +26,6 @@ from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
 from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters
-
-__all__ = [
-    "HistogramNumbers",
-    "VectorFieldHistogramController",
-    "choose_direction",
-    "polar_histogram",
-    "vector_field_histogram_step",
-]
 
 #: Sectors of 5 deg (the paper's), and from how many on a valley is wide.
 _SECTORS, _WIDE = 72, 16

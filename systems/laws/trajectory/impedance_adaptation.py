@@ -31,11 +31,6 @@ from systems.laws.trajectory.trajectory_impedance import (
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-__all__ = [
-    "ImpedanceAdaptation",
-    "adaptation_step",
-]
-
 #: Places in the state: what adapts, and sensitivities to each, four numbers.
 _GAINS, _SENSITIVITIES = 0, 3
 
@@ -158,7 +153,7 @@ class ImpedanceAdaptation(LeafSystem, StepBlock):
         robot: Mass and place of P.
         tick_s: Period, s.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 27 to 42; docs/trajectory.md
+    Reference: Engelbrecht, Steyn and Djouani (2021), eq. 27 to 42; docs/routes.md
     has the errata.
     """
 

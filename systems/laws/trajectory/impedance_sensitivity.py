@@ -8,15 +8,6 @@ from numba.extending import register_jitable
 
 from systems.laws.trajectory.trajectory_impedance import ContactNumbers
 
-__all__ = [
-    "Impedance",
-    "Sensitivities",
-    "SensitivityNumbers",
-    "advance_sensitivity",
-    "penalty_gradient",
-    "sensitivity_sources",
-]
-
 
 class Impedance(NamedTuple):
     """What may adapt."""
@@ -38,7 +29,9 @@ class Sensitivities(NamedTuple):
 
 
 @register_jitable
-def sensitivity_sources(p_WP, v_WP, target, contacts, mass):  # type: ignore[no-untyped-def]
+def sensitivity_sources(
+    p_WP: Any, v_WP: Any, target: Any, contacts: Any, mass: Any
+) -> Any:
     """The last terms of eq. 34: what dA/dp X + dB/dp u are (eq. 35 to 41).
 
     Args:
@@ -75,7 +68,9 @@ class SensitivityNumbers(NamedTuple):
 
 
 @register_jitable
-def advance_sensitivity(state, begin, source, contacts, loop):  # type: ignore[no-untyped-def]
+def advance_sensitivity(
+    state: Any, begin: Any, source: Any, contacts: Any, loop: Any
+) -> None:
     """A tick of d/dt S = A S + source (eq. 34 with its left side and A S restored).
 
     A is that of the exact linearisation: a contact with a point is stiff by K_e along n
@@ -113,8 +108,10 @@ def advance_sensitivity(state, begin, source, contacts, loop):  # type: ignore[n
 
 
 @register_jitable
-def penalty_gradient(contacts, security_m, penalty):  # type: ignore[no-untyped-def]
-    """-sum of lambda h(d) n, h = max(0, d_sec - d): a hinge in the place of eq. 27.
+def penalty_gradient(contacts: Any, security_m: Any, penalty: Any) -> Any:
+    """-sum of lambda h(d) n, the gradient of lambda/2 h(d)^2, h = max(0, d_sec - d).
+
+    The hinge stands for the safety term of eq. 27, lambda/2 (d_sec^2 - d^2).
 
     Args:
         contacts: From ``contacts_of_objects``.

@@ -15,12 +15,6 @@ from systems.framework.block_facts import BlockFacts
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import Step, StepBlock
 
-__all__ = [
-    "ReferenceModel",
-    "held_matrices",
-    "reference_step",
-]
-
 
 class ReferenceNumbers(NamedTuple):
     """Of x+ = A x + B u: rows of A, then of B."""

@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
-
-__all__ = [
-    "RATE_BOUNDS",
-    "SampledMass",
-    "damping_bound",
-    "pull_through_m",
-    "rate_bound",
-    "sampled_matrix",
-    "stiffness_bound",
-]
 
 #: gamma (a T/M)^2 of each rule below which K and D do not run away, with a the
 #: amplitude of P's target, m: rounded down from what ``critical_rate`` of
@@ -80,8 +71,11 @@ def sampled_matrix(
     return matrix
 
 
+@lru_cache(maxsize=64)
 def stiffness_bound(damping: float, of: SampledMass) -> float:
     """The stiffness at which an axis stops coming to rest, by bisection.
+
+    The runs of a sweep ask for the same ones.
 
     Args:
         damping: All dampers together, N s/m.

@@ -13,16 +13,6 @@ from systems.ranging.objects import THERE, VX, VY, X, Y
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import safe_norm
 
-__all__ = [
-    "Contact",
-    "ContactNumbers",
-    "contact_force",
-    "contact_numbers",
-    "contacts_of_objects",
-    "state_matrices",
-    "target_force",
-]
-
 
 class ContactNumbers(NamedTuple):
     """What the force of a contact depends on."""
@@ -76,7 +66,9 @@ def contact_numbers(own: TrajectoryImpedanceParameters) -> ContactNumbers:
 
 
 @register_jitable
-def target_force(p_WP, v_WP, target, stiffness, damping):  # type: ignore[no-untyped-def]
+def target_force(
+    p_WP: Any, v_WP: Any, target: Any, stiffness: Any, damping: Any
+) -> Any:
     """U = -K (p - p_d) - D (v - v_d), eq. 2.
 
     Args:
@@ -96,7 +88,7 @@ def target_force(p_WP, v_WP, target, stiffness, damping):  # type: ignore[no-unt
 
 
 @register_jitable
-def contacts_of_objects(objects, v_WP, numbers):  # type: ignore[no-untyped-def]
+def contacts_of_objects(objects: Any, v_WP: Any, numbers: Any) -> Any:
     """The objects whose zone P is in.
 
     Args:
@@ -129,7 +121,7 @@ def contacts_of_objects(objects, v_WP, numbers):  # type: ignore[no-untyped-def]
 
 
 @register_jitable
-def contact_force(contacts, stiffness, damping, numbers):  # type: ignore[no-untyped-def]
+def contact_force(contacts: Any, stiffness: Any, damping: Any, numbers: Any) -> Any:
     """V = sum of K_e overlap n - D_e (v - v_j), eq. 4 and 5 with the signs restored.
 
     Args:
@@ -148,6 +140,34 @@ def contact_force(contacts, stiffness, damping, numbers):  # type: ignore[no-unt
         fx = fx + spring * contact.n[0] - damper * contact.v_relative[0]
         fy = fy + spring * contact.n[1] - damper * contact.v_relative[1]
     return fx, fy
+
+
+@register_jitable
+def step_is_blocked(objects: Any, step: Any, block_m: Any) -> Any:
+    """Whether eq. 6 refuses a step of P.
+
+    Eq. 6 allows a new position if its distance d from every object is greater than
+    L_block, and leaves the robot where it is otherwise. A step that ends within
+    L_block but leads away from the object is allowed here: a robot with momentum
+    comes to rest up to v (T + motor lag) farther on, and would stay there for ever.
+
+    Args:
+        objects: As of the port ``objects_W``.
+        step: (x, y) from P to its next position, m; floats or AutoDiffXd.
+        block_m: L_block, m.
+
+    Returns:
+        True where it is refused. Objects count where they are now.
+    """
+    for slot in range(OBJECT_SLOTS):
+        at = slot * OBJECT_SIZE
+        if objects[at + THERE] < 0.5:
+            continue
+        x, y = objects[at + X], objects[at + Y]
+        after = safe_norm(x - step[0], y - step[1])
+        if after <= block_m and after <= safe_norm(x, y):
+            return True
+    return False
 
 
 def state_matrices(

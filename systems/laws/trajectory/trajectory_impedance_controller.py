@@ -8,7 +8,11 @@ from numba.extending import register_jitable
 from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
-from systems.base.wheel_speed_command import clamped_velocity
+from systems.base.wheel_speed_command import (
+    clamped_velocity,
+    integrate_velocity,
+    turned_off_back,
+)
 from systems.framework.block_facts import BlockFacts
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
@@ -19,16 +23,14 @@ from systems.laws.trajectory.trajectory_impedance import (
     contact_force,
     contact_numbers,
     contacts_of_objects,
+    step_is_blocked,
     target_force,
 )
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.world.geometry import control_point
 
-__all__ = [
-    "TrajectoryImpedanceController",
-    "TrajectoryImpedanceController_",
-    "trajectory_impedance_step",
-]
+#: A target that moves straight back faster than this drives P a little aside, m/s.
+_BACK_M_S = 0.05
 
 
 class TrajectoryNumbers(NamedTuple):
@@ -43,6 +45,11 @@ class TrajectoryNumbers(NamedTuple):
     acceleration_limit: float
     """m/s^2."""
     control_point_m: float
+    block_m: float
+    """L_block, m; 0: eq. 6 is off."""
+    top_speed: float
+    """Of P, m/s."""
+    tick_s: float
 
 
 @register_jitable
@@ -51,13 +58,23 @@ def _command(
 ) -> None:
     target, objects, pose, v_WP = inputs[0], inputs[1], inputs[2], inputs[3]
     p_WP = control_point(pose, numbers.control_point_m)
-    ux, uy = target_force(p_WP, v_WP, target, impedance[0], impedance[1])
+    vx, vy = turned_off_back(target[2], target[3], pose[2], _BACK_M_S)
+    moving = target[0], target[1], vx, vy
+    ux, uy = target_force(p_WP, v_WP, moving, impedance[0], impedance[1])
     found = contacts_of_objects(objects, v_WP, numbers.contacts)
     fx, fy = contact_force(
         found, impedance[2], numbers.contact_damping, numbers.contacts
     )
     ax, ay = (ux + fx) / numbers.mass, (uy + fy) / numbers.mass
     ax, ay = clamped_velocity(ax, ay, numbers.acceleration_limit)
+    if numbers.block_m > 0.0:
+        T = numbers.tick_s
+        vx, vy = integrate_velocity(v_WP, (ax, ay), T, numbers.top_speed)
+        if step_is_blocked(objects, (T * vx, T * vy), numbers.block_m):
+            # The wheel command integrates this to a velocity of zero. The limit of
+            # acceleration is not kept: P has to stay, and the motors' lag is limit
+            # enough.
+            ax, ay = -v_WP[0] / T, -v_WP[1] / T
     outputs[0][0], outputs[0][1] = ax, ay
     outputs[1][0], outputs[1][1] = ux, uy
     outputs[1][2], outputs[1][3] = fx, fy
@@ -117,6 +134,10 @@ def TrajectoryImpedanceController_(T):
         input port ``impedance``, K, D and K_e, which counts in the place of the
         parameters'. A function of the present input: no state, no latency.
 
+        With ``block_distance_m`` (eq. 6) the acceleration is -v/T, which stops the
+        virtual mass at once, where its next step would end within that distance of an
+        object and would not lead away from it.
+
         At most eight objects count. With D_e summed over contacts beyond 2M/T (80 N s/m
         for 1 kg) the sampled loop is unstable: a scan is reduced to objects first.
 
@@ -126,8 +147,8 @@ def TrajectoryImpedanceController_(T):
             adapts: Whether there is the port ``impedance``.
             tick_s: Period, s.
 
-        Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 5, with the signs
-        that their text asks for; docs/trajectory.md has the errata.
+        Reference: Engelbrecht, Steyn and Djouani (2021), eq. 1 to 6, with the signs
+        that their text asks for; docs/errata.md lists the differences.
         """
 
         FACTS = BlockFacts(
@@ -168,6 +189,9 @@ def TrajectoryImpedanceController_(T):
                 robot.mass_kg,
                 own.acceleration_limit_m_s2,
                 robot.control_point_m,
+                own.block_distance_m or 0.0,
+                robot.top_speed_m_s,
+                tick_s,
             )
             inputs = [
                 ("target_state", 4),

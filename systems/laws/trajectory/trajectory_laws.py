@@ -10,13 +10,6 @@ from systems.laws.trajectory.parameters import (
     TrajectoryImpedanceParameters,
 )
 
-__all__ = [
-    "TRAJECTORY_ADAPTIVE",
-    "TRAJECTORY_CONVENTIONAL",
-    "TRAJECTORY_FILTERED",
-]
-
-
 _IMPEDANCE = Equation(
     "Impedance to the target and to contacts",
     r"M\ddot{p}=-K(p-p_d)-D(v-v_d)+\sum_j K_e(S-d_j)\,n_j-D_e(v-v_j)",

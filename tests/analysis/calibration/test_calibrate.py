@@ -11,18 +11,14 @@ import pytest
 import soundfile
 
 import phonotaxis
-from analysis.calibration import (
-    calibrate,
-    calibration_run,
-    calibration_text,
-    load_calibration_sounds,
-)
+from analysis.calibration.calibrate import calibrate, calibration_run
 from analysis.calibration.calibrated_geometry import (
     calibrated_fields,
     write_calibration,
 )
-from analysis.calibration.calibration_text import calibration_document
-from analysis.recordings import ArrayGeometry, load_geometry
+from analysis.calibration.calibration_sounds import load_calibration_sounds
+from analysis.calibration.calibration_text import calibration_document, calibration_text
+from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
 from analysis.recordings.heard_sounds import heard_sound, sightings_of
 from analysis.recordings.recording_search import Sighting
 from systems.framework.input_error import InputError
@@ -149,7 +145,7 @@ def test_a_wrong_position_is_named_on_the_terminal(capsys, nine):
     words = ["calibrate", listing(folder, wrong), "--geometry", folder / "array.yaml"]
     status, printed, _ = call(capsys, *words)
     assert status == 0
-    assert "DO NOT AGREE; without sound 4 (3.wav) they do" in printed
+    assert "DO NOT AGREE; without sound 4 (3.wav) they agree" in printed
 
 
 def test_blind_calibration_says_that_it_gains_nothing(capsys, nine):
@@ -158,7 +154,7 @@ def test_blind_calibration_says_that_it_gains_nothing(capsys, nine):
     words = ["calibrate", listing(folder, blind), "--geometry", folder / "array.yaml"]
     status, printed, _ = call(capsys, *words)
     assert status == 0
-    assert "nothing gained" in printed
+    assert "no gain" in printed
     assert "3 delays for 3 unknowns" in printed
     assert "\nobservable" not in printed
 
@@ -283,8 +279,8 @@ def test_bad_entries(nine, entry, field, words):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "lists none"),
-        ("sounds: []", "lists none"),
+        ("", "lists no sounds"),
+        ("sounds: []", "lists no sounds"),
         ("sounds: [{recording: a.wav, place: [1, 2]}]", "is not a field"),
         ("sounds: [{recording: a.wav, position_std_m: -1}]", "greater than or equal"),
         ("sounds: [{recording: a.wav, from_s: 2, to_s: 1}]", "not after from_s"),
@@ -311,5 +307,5 @@ def test_silence_is_named(tmp_path):
     soundfile.write(tmp_path / "a.wav", noise, RATE)
     entry = {"recording": "a.wav", "position_m": [2, 1, 1]}
     sounds = load_calibration_sounds(listing(tmp_path, [entry]))
-    with pytest.raises(InputError, match="nothing is heard in any"):
+    with pytest.raises(InputError, match="no recording has a detectable sound"):
         calibrate(sounds, stated(SQUARE))

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from analysis.calibration import (
-    MeasuredSound,
-    calibrate_array,
+from analysis.calibration.calibration import calibrate_array
+from analysis.calibration.calibration_misfit import calibration_misfit
+from analysis.calibration.measured_sound import MeasuredSound
+from analysis.calibration.observability import (
     calibration_gains,
-    calibration_misfit,
     gain_ratios,
+    gains_nothing,
 )
-from analysis.calibration.observability import gains_nothing
 from analysis.calibration.wave_fronts import wave_front
 from systems.framework.input_error import InputError
 from systems.sound.array_budget import ArrayBudget

@@ -73,5 +73,5 @@ def test_too_many_starts_are_refused(two_boxes):
     certificate = certify_energy(two_boxes("conventional"), cell_m=0.05)
     with pytest.raises(ValueError, match="starts: 0 must be at least 1"):
         try_diagram(certificate, starts=0)
-    with pytest.raises(ValueError, match=r"starts: only .* ask for fewer than 50000"):
+    with pytest.raises(ValueError, match=r"starts: only .* use fewer than 50000"):
         try_diagram(certificate, starts=50_000)

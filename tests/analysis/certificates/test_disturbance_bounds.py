@@ -65,11 +65,29 @@ def test_bound_holds_for_a_source_in_the_plane(two_boxes):
     assert largest < bound
 
 
-@pytest.mark.parametrize("law", ["conventional", "active", "active2017"])
-def test_no_simulated_contact_before_its_certified_time(two_boxes, law):
-    for row in disturbance_bounds(two_boxes(law), runs=20).obstacle:
-        first = row.simulated_contact_s
-        assert first is None or first > row.certified_s
+@pytest.mark.parametrize(
+    ("law", "weak", "certified"),
+    [
+        ("conventional", ["conventional.stiffness_n_m=1"], 3),
+        (
+            "active",
+            ["active.reference_stiffness_n_m=4", "active.matched_stiffness_n_m=1"],
+            5,
+        ),
+        ("active2017", ["active2017.distance_gain_j=0.1"], 4),
+    ],
+)
+def test_no_simulated_contact_before_its_certified_time(
+    two_boxes, law, weak, certified
+):
+    """Laws so weak that bodies of all six speeds reach P, though not at once."""
+    scenario = two_boxes(law, *(f"repulsion.{field}" for field in weak))
+    rows = disturbance_bounds(scenario, runs=20).obstacle
+    assert len(rows) == 6
+    assert sum(row.certified_s > 0.0 for row in rows) == certified
+    for row in rows:
+        assert row.simulated_contact_s is not None
+        assert row.simulated_contact_s > row.certified_s
 
 
 def test_certified_time_against_the_differential_inequality(two_boxes):

@@ -12,6 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.certificates.certificate_trials import try_certificate
 from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
+from diagrams.scenario import Scenario
 from systems.world.geometry import rectangle_corners
 
 LAWS = ("conventional", "active", "active2017")
@@ -95,7 +96,7 @@ def test_speeds_and_shares_of_made_up_levels():
     other being safe at any speed, less than none, and less than none but safe.
     """
     certificate = EnergyCertificate(
-        scenario=made(),
+        scenario=Scenario(),
         model=made(
             mass_kg=2.0, top_speed_m_s=1.5, top_kinetic_energy_j=2.25,
             law=made(name="made up"), p_WP=(0.0, 0.0),
@@ -122,6 +123,15 @@ def test_speeds_and_shares_of_made_up_levels():
     assert document["certified_at_any_speed_share"] == pytest.approx(1 / 5)
     assert document["workspace_m"] == [0.0, 0.5, 1.0, 2.0]
     assert not document["start_certified"], "it is off the grid"
+
+
+def test_a_start_among_moving_bodies_is_not_judged():
+    """The certificate takes bodies to rest, and says nothing of others."""
+    moves = {"source": {"waypoints_m": [[2.0, 0.0], [5.0, 0.0]]}, "obstacles": []}
+    for changes, expected in (({}, False), (moves, True)):
+        scenario = Scenario.model_validate({"law": "active"} | changes)
+        found = certify_energy(scenario, cell_m=0.05).start_certified
+        assert (found is None) == expected
 
 
 def test_finer_cells_certify_more(two_boxes):
@@ -171,7 +181,7 @@ def test_a_law_that_pulls_is_refused(two_boxes, tmp_path, monkeypatch):
         "def pull(c, s, repulsion):\n    return -1.0 + 0.0 * c\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(ValueError, match=r"law: .* pulls towards obstacles"):
+    with pytest.raises(ValueError, match=r"law: .* pulls toward obstacles"):
         certify_energy(two_boxes("active", "law=pulling:pull"))
 
 

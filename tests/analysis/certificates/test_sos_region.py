@@ -11,6 +11,8 @@ from analysis.certificates.lag_model import lag_model
 from analysis.certificates.sos_program import feasibility, is_proved, solve
 from analysis.certificates.sos_region import sos_region
 
+pytestmark = pytest.mark.drake
+
 
 @pytest.fixture(scope="module")
 def region(two_boxes):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import time
 from argparse import Namespace
 from collections.abc import Callable
@@ -54,6 +55,30 @@ def test_result_text_and_place(tmp_path, capsys):
     assert capsys.readouterr().out == f"3 found\n\nresults in {out}\n"
 
 
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit, GeneratorExit])
+def test_what_is_no_exception_and_no_interrupt_has_failed(tmp_path, kind):
+    """As a user's block may raise it while it runs."""
+
+    def leave(_: Any) -> None:
+        raise kind
+
+    complaint = f"ended from within, by {kind.__name__} in .*test_carry_out.py"
+    with pytest.raises(RunError, match=complaint):
+        carried_out(in_directory(tmp_path / "out", run=leave))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_standard_output_is_for_the_result(tmp_path, capsys):
+    def talk(_: Any) -> int:
+        sys.stdout.write("a user's block\n")
+        return 3
+
+    carried_out(in_directory(tmp_path / "out", run=talk))
+    printed = capsys.readouterr()
+    assert printed.out == f"3 found\n\nresults in {tmp_path}/out\n"
+    assert printed.err == "a user's block\n"
+
+
 @pytest.mark.parametrize("step", ["run", "summary", "write"])
 def test_nothing_is_left_of_what_was_not_done(tmp_path, capsys, step):
     with pytest.raises(KeyboardInterrupt):
@@ -78,5 +103,5 @@ def test_runs_that_are_kept_are_told_of(tmp_path):
         total=7,
         kept=lambda: 2,
     )
-    with pytest.raises(RunError, match="interrupted; 2 of 7 runs are kept: go on with"):
+    with pytest.raises(RunError, match="interrupted; 2 of 7 runs are kept: continue"):
         carried_out(lambda _: job)

@@ -78,6 +78,7 @@ def test_mechanisms_are_counted_commonest_first():
     """Warned for 0.5 s: late; never: not heard; none of what cannot have cones."""
     cell = summarised(
         cause=["reached", "collision", "lost", "collision", "collision"],
+        tick_s=[0.025] * 5,
         contact_warning_s=[NAN, 0.5, NAN, NAN, 0.25],
         contact_unseen_s=[NAN, 0.0, NAN, NAN, 0.0],
         time_to_goal_s=[1.0, NAN, NAN, NAN, NAN],

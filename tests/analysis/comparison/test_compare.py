@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import html
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from analysis.comparison.compare import (
-    prepare_comparison,
-)
+from analysis.comparison import report
+from analysis.comparison.cells import EXAMPLES, ExampleRun, LawCell, Mean
+from analysis.comparison.compare import prepare_comparison
+from analysis.comparison.laws_in_pairs import Comparison
 from analysis.comparison.plans import (
     EXPERIMENTS,
     comparison_plan,
@@ -20,7 +22,7 @@ from analysis.comparison.plans import (
 )
 from analysis.comparison.report import compare_summary, write_comparison
 from analysis.comparison.report_text import compare_text
-from analysis.sweeps.plan import load_sweep
+from analysis.sweeps.plan import SweepPlan, load_sweep
 from diagrams import load_scenario, simulate
 from systems.framework.input_error import InputError
 
@@ -151,7 +153,7 @@ def test_what_cannot_be_prepared_leaves_nothing(tmp_path):
         "first": comparison_plan("default", runs=1),
         "bad": comparison_plan(str(bad), runs=20),
     }
-    with pytest.raises(InputError, match="stands on"):
+    with pytest.raises(InputError, match="is on the robot"):
         prepare_comparison(plans, tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
@@ -198,3 +200,60 @@ def test_a_comparison_from_end_to_end(tmp_path):
         "two_static_obstacles",
         "examples",
     }
+
+
+def called(names: list[str]) -> dict[str, SweepPlan]:
+    """A plan of one short run for each name."""
+    short = IDEAL | {"duration_s": 0.05}
+    return {
+        name: comparison_plan("wall", laws=("none",), runs=1, settings=short)
+        for name in names
+    }
+
+
+@pytest.mark.slow
+def test_scenarios_that_are_called_like_results(tmp_path):
+    """No run and no file is lost."""
+    names, out = ["summary.json", "rates"], tmp_path / "out"
+    prepared = prepare_comparison(called(names), out, workers=1)
+    comparisons, pooled = prepared.run()
+    summary = compare_summary(prepared, comparisons, pooled)
+    write_comparison(prepared, comparisons, pooled, summary)
+    assert summary == json.loads((out / "summary.json").read_text())
+    assert [cell["scenario"] for cell in summary["cells"]] == names
+    assert {path.name for path in out.iterdir()} == {
+        *("summary.json", "report.html", "rates.png", "examples"),
+        *("summary.json-2", "summary.json-2.png", "rates-2", "rates-2.png"),
+    }
+    again = prepare_comparison(called(names), out, workers=1, resume=True)
+    assert again.done == again.runs == 2
+    again.run()
+
+
+def test_no_scenario_gets_the_folder_of_another_or_one_outside(tmp_path):
+    names = ["summary.json", "rates.png", "rates", "examples", "..", "A", "a", "a.png"]
+    out = tmp_path / "all" / "out"
+    prepared = prepare_comparison(called([*names, "x" * 240, "c:1"]), out, workers=1)
+    for sweep in prepared.sweeps.values():
+        sweep.store.close()
+    assert [path.name for path in (tmp_path / "all").iterdir()] == ["out"]
+    assert {path.name for path in out.iterdir()} == {
+        *("summary.json-2", "rates.png-2", "rates-2", "examples-2", "unnamed", "A"),
+        *("a-2", "a.png-2", "x" * 200, "c-1"),
+    }
+
+
+def test_examples_of_laws_whose_names_are_alike_have_files_of_their_own():
+    runs = tuple(ExampleRun(kind, index, "goal") for index, kind in enumerate(EXAMPLES))
+    one = Mean(0.0, 0.0, 0.0)
+    cells = [
+        LawCell("s", law, {}, 3, {}, {}, one, one, None, {}, examples)
+        for law, examples in (
+            ("a.py:f", runs),
+            ("a.py-f", tuple(replace(run, index=run.index + 3) for run in runs)),
+        )
+    ]
+    files = report._example_files({"s": Comparison(cells, [])})
+    assert len(set(files.values())) == 6
+    assert files["s", 0, "worst"] == "examples/s-a.py-f-worst.yaml"
+    assert files["s", 3, "worst"] == "examples/s-a.py-f-worst-2.yaml"

@@ -182,6 +182,30 @@ def test_pooled_pairs_join_cells_that_differ_in_the_same_values():
         )
 
 
+#: Fields of a scenario with another tick.
+PERIODS = ("tick_s", "microphones.frame_s", "ultrasonic.period_s")
+
+
+@pytest.mark.parametrize(
+    ("plan", "swept", "out_of_sight"),
+    [
+        ({}, {}, 5),  # 0.06 s without an echo are two ticks and more of 25 ms
+        ({"set": dict.fromkeys(PERIODS, 0.05)}, {}, 0),  # one tick and more of 50 ms
+        ({}, {"tick_s": 0.05}, 0),  # as a field of a grid or a draw
+    ],
+)
+def test_mechanisms_go_by_the_tick_of_the_runs(plan, swept, out_of_sight):
+    rows = table().assign(
+        cause="collision",
+        contact_warning_s=5.0,
+        contact_unseen_s=0.06,
+        **swept,
+    )
+    plan = SweepPlan(grid={"law": tuple(RUNS)}, runs=5, **plan)
+    for cell in compare_runs(plan, rows, "here").cells:
+        assert cell.mechanisms.get("out of sight", 0) == out_of_sight
+
+
 def test_encounters_are_of_layouts_on_which_both_pushed():
     """Both succeed on layouts 2 and 3 of these; only on 3 do both push."""
     rows = table()

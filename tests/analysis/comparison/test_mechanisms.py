@@ -35,7 +35,11 @@ KINDS = [
 
 def test_a_robot_that_came_to_the_goal_is_in_no_jam():
     """It has passed all obstacles: the master robot's own push keeps it off."""
-    nothing = {"contact_warning_s": math.nan, "contact_unseen_s": math.nan}
+    nothing = {
+        "tick_s": 0.025,
+        "contact_warning_s": math.nan,
+        "contact_unseen_s": math.nan,
+    }
     rows = [
         {"cause": "stuck", "time_to_goal_s": 5.0, **nothing},
         {"cause": "stuck", "time_to_goal_s": math.nan, **nothing},
@@ -49,8 +53,25 @@ def test_a_robot_that_came_to_the_goal_is_in_no_jam():
 def test_each_kind():
     columns = ["cause", "contact_warning_s", "contact_unseen_s", "mechanism"]
     rows = pd.DataFrame(KINDS, columns=columns)
-    found = failure_mechanisms(rows)
+    found = failure_mechanisms(rows.assign(tick_s=0.025))
     assert [None if pd.isna(x) else x for x in found] == [kind[-1] for kind in KINDS]
+
+
+@pytest.mark.parametrize("tick_s", [0.01, 0.025, 0.05, 0.1])
+def test_a_body_is_out_of_sight_when_it_had_no_echo_at_the_last_tick(tick_s):
+    """Whatever the tick: 0, 1, 2 and 3 ticks without an echo."""
+    rows = pd.DataFrame(
+        {
+            "cause": "collision",
+            "contact_warning_s": 5.0,
+            "contact_unseen_s": [0.0, tick_s, 2 * tick_s, 3 * tick_s],
+            "tick_s": tick_s,
+        }
+    )
+    assert failure_mechanisms(rows).tolist() == [
+        *["pushed too little"] * 2,
+        *["out of sight"] * 2,
+    ]
 
 
 @pytest.mark.parametrize(
@@ -74,6 +95,6 @@ def test_runs_that_fail_so(obstacle, mechanism):
         f"obstacles=[{{name: box, acceleration_m_s2: 1e6, {obstacle}}}]",
     ]
     result = simulate(load_scenario("default", overrides))
-    row = {"cause": result.cause, **run_metrics(result)}
+    row = {"cause": result.cause, "tick_s": 0.025, **run_metrics(result)}
     rows = pd.DataFrame([row]).astype({"contact_warning_s": float})
     assert failure_mechanisms(rows).tolist() == [mechanism]

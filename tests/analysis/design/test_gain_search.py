@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import re
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +20,7 @@ from analysis.design.requirements import (
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from diagrams.scenario import Scenario
 from systems.laws.repulsion import RepulsionParameters
+from tests.results import documented, numbers
 
 SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
 
@@ -158,15 +157,12 @@ def test_an_attraction_that_no_push_can_limit_is_refused():
         search_gains(scenario, REQUIREMENTS)
 
 
-def test_document_quotes_the_figures():
-    """The table of docs/design.md."""
-    document = (Path(__file__).parents[3] / "docs/design.md").read_text("utf-8")
+def test_the_documented_figures():
     designs = [check_law(SCENARIO, law, REQUIREMENTS) for law in DESIGNED_LAWS]
+    quoted = {row[0]: row[1:] for row in documented("design", "gains")}
     for check in designs[0].checks:
-        row = re.search(rf"(?m)^\| {check.name} \|(.*)\|$", document)
-        assert row is not None
-        for design, cell in zip(designs, row[1].split("|"), strict=True):
+        for design, cell in zip(designs, quoted[check.name], strict=True):
             found = design.check(check.name)
-            number = float(re.findall(r"\d[\d.]*", cell)[0])
+            number = numbers(cell)[0]
             assert number == pytest.approx(found.value, rel=1e-3, abs=6e-4)
             assert ("**" in cell) == (not found.acceptable)

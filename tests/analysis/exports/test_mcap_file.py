@@ -274,6 +274,17 @@ def test_the_scenario_is_attached(run, file: Path, tmp_path: Path):
     assert phonotaxis.load_scenario(path) == run.full_scenario
 
 
+def test_warnings_are_among_the_metadata(tmp_path: Path):
+    settings = {"hearing": "ideal", "duration_s": 0.1, "guard": {}, "plant.friction": 1}
+    run = phonotaxis.simulate(phonotaxis.load_scenario("u_trap", settings))
+    with run.to_mcap(tmp_path / "run.mcap").open("rb") as stream:
+        (found,) = make_reader(stream).iter_metadata()
+    (warning,) = run.warnings
+    assert found.metadata["warnings"] == str(warning)
+    assert found.metadata["scenario"] == "u_trap"
+    assert warning.field == "plant.friction"
+
+
 def test_definitions_are_those_of_ros_2_jazzy():
     jazzy = get_typestore(Stores.ROS2_JAZZY)
     for name in DEFINITIONS:

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from scipy.stats import binomtest, chi2
 
 from analysis.hearing.estimation_errors import consistency, rms_ratio, stated_ratio

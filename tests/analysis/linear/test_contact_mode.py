@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import solve_ivp
 
 from analysis.linear.contact_mode import (
@@ -129,14 +128,14 @@ def test_no_damping_no_spring():
 def test_table_marks_today_and_falls_with_lag_and_latency():
     limits = contact_limits(SCENARIO)
     assert limits.today == (0.05, 0)
-    # The table of docs/linear_stability.md.
+    # The table of docs/results_stability.md.
     assert limits.motor_lags_s == (0.01, 0.02, 0.05, 0.1, 0.2)
     assert limits.latency_ticks == (0, 1, 2, 3, 4)
     for lag, noted in NOTED.items():
         row = limits.stiffness_n_m[limits.motor_lags_s.index(lag)]
         for found, own in zip(row[[0, 1, 2, 4]], noted, strict=True):
             assert found == pytest.approx(own, abs=0.6 if own > 10 else 0.06)
-    # Gains of docs/design.md.
+    # Gains of docs/avoidance.md.
     assert limits.stiffness_today_n_m == 12.3
     assert limits.reference_stiffness_today_n_m == 84.5
     assert (np.diff(limits.stiffness_n_m, axis=0) < 0).all()

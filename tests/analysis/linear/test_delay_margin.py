@@ -19,7 +19,8 @@ from analysis.linear.delayed_run import (
     simulate_delayed,
 )
 from analysis.models.equilibria import follow_equilibrium
-from analysis.models.ideal_loop import ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario import Scenario
 

@@ -7,8 +7,7 @@ import math
 import control
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from analysis.linear.loop_margins import DiskMargin, all_margins, loop_margins
 from analysis.models.equilibria import follow_equilibrium
@@ -64,12 +63,14 @@ def test_margins_are_those_of_control(stiffness, damping, at):
     assert ours.gain_increase_margin == math.inf
     assert ours.gain_reduction_margin == 0.0
     for disk in ours.disks:
-        omega = disk.frequency_rad_s * np.geomspace(0.8, 1.25, 401)
+        # control cannot evaluate a response at infinity, where the peak may be.
+        nearest = min(disk.frequency_rad_s, 1e12)
+        omega = nearest * np.geomspace(0.8, 1.25, 401)
         alpha = control.disk_margins(model.to_control(), omega, skew=disk.skew)[0]
         assert disk.alpha <= alpha * (1 + 1e-5)
         assert disk.alpha == pytest.approx(alpha, rel=1e-3)
         alpha, gain_db, phase_deg = control.disk_margins(
-            model.to_control(), np.array([disk.frequency_rad_s]), skew=disk.skew
+            model.to_control(), np.array([nearest]), skew=disk.skew
         )
         assert disk.alpha == pytest.approx(alpha, rel=1e-9)
         # Past a factor of 0, or of infinity, control's gain is no number and phase odd.

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from analysis.linear.contact_mode import contact_spectral_radius
 from analysis.linear.loop_uncertainty import (

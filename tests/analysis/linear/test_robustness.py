@@ -96,7 +96,7 @@ def test_damping_ratio_of_a_discrete_pole() -> None:
 
 @pytest.mark.parametrize("interval", [(2.0, 3.0), (0.0, 0.5), (1.0, 1.0)])
 def test_bad_interval_is_refused(interval: tuple[float, float]) -> None:
-    with pytest.raises(ValueError, match=r"mass: .*mend the interval"):
+    with pytest.raises(ValueError, match=r"mass: .*correct the interval"):
         UncertainParameter("mass", "M", "kg", 1.0, *interval, "a test")
 
 

@@ -18,7 +18,8 @@ from analysis.linear.sampled_stability import check_conditions, gain_delay_chart
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.linearisation import compare_routes, continuous_model
 from analysis.models.open_loops import open_loop
 from diagrams.laws import make_controller
@@ -101,7 +102,7 @@ def test_step_of_the_diagram_decays_as_predicted(tick_s):
     assert abs(found.damping_error) < 5e-3
 
 
-@pytest.mark.parametrize("tick_s", TICKS_S)
+@pytest.mark.parametrize("tick_s", [0.05, pytest.param(0.0125, marks=pytest.mark.long)])
 def test_delay_margin_is_where_the_diagram_begins_to_grow(tick_s):
     """A spring of 8 N/m leaves little damping, so that growth shows soon."""
     at = follow_equilibrium(scenario(tick_s, attraction={"stiffness_n_m": 8.0}))

@@ -8,7 +8,8 @@ from types import ModuleType, SimpleNamespace
 import numpy as np
 import pytest
 
-from analysis.listening import open_card, sound_card
+from analysis.listening import sound_card
+from analysis.listening.sound_card import open_card
 from analysis.listening.sound_stream import STOPPED, StreamBrokenError
 from systems.framework.input_error import InputError
 
@@ -98,7 +99,7 @@ def test_a_card_that_stops_is_named_once_and_one_that_is_gone_ends_it(plug_in):
     stopped = next(blocks)
     assert (stopped.samples.shape, stopped.faults) == ((4, 0), (STOPPED,))
     card.active = False
-    with pytest.raises(StreamBrokenError, match="the sound card has gone"):
+    with pytest.raises(StreamBrokenError, match="the sound card was disconnected"):
         next(blocks)
 
 
@@ -107,7 +108,7 @@ def test_what_the_package_raises_is_a_status(plug_in):
     card.open = lambda **_: (_ for _ in ()).throw(PortAudioError("Device unavailable"))
     plug_in(card)
     blocks = open_card(None, channels=4, sample_rate_hz=48_000).blocks
-    with pytest.raises(StreamBrokenError, match="the sound card broke off"):
+    with pytest.raises(StreamBrokenError, match="the sound card stopped recording"):
         next(blocks)
 
 

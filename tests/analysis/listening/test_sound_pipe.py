@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.listening import open_flac, open_pipe
+from analysis.listening.sound_pipe import open_flac, open_pipe
 from analysis.listening.sound_stream import STOPPED, Pace, StreamBrokenError
 from systems.framework.input_error import InputError
 from tests.analysis.listening.plane_waves import RATE, wav_bytes
@@ -148,11 +148,11 @@ def test_a_stop_is_named_while_it_lasts():
     ("data", "stated", "complaint"),
     [
         (b"", {}, "it is empty"),
-        (b"\0" * 64, {}, "it is no WAV; say what it is, as --rate 48000"),
+        (b"\0" * 64, {}, "it is not a WAV file; state its format, for example"),
         (b"OggS" + b"\0" * 64, {}, "it is Ogg; decode it: ffmpeg"),
-        (b"RIFF\0\0\0\0AVI \0\0\0\0", {}, "begins like a WAV and is none"),
+        (b"RIFF\0\0\0\0AVI \0\0\0\0", {}, "begins like a WAV file but is not one"),
         (wav_bytes(SAMPLES)[:30], {}, "ends within the WAV header"),
-        (wav_bytes(SAMPLES), {"sample_rate_hz": 8_000}, "8000 Hz, but the file says"),
+        (wav_bytes(SAMPLES), {"sample_rate_hz": 8_000}, "8000 Hz, but the file states"),
         (wav_bytes(SAMPLES), {"channels": 3}, "is 3, but the file has 4"),
     ],
 )

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from analysis.models.block_models import join_blocks, sampled_blocks
-from analysis.models.ideal_loop import ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.linear_models import simple_poles
 from diagrams.scenario import Scenario
 

@@ -7,17 +7,19 @@ import sys
 
 import numpy as np
 import pytest
-from pydrake.systems.analysis import Simulator
 
 from analysis.linear.contact_mode import motion_chain
-from analysis.models.ideal_loop import (
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import (
     frozen_scenario,
-    ideal_loop,
     ideal_scenario,
     require_ideal,
 )
+from diagrams import make_simulator
 from diagrams.scenario import Scenario
 from systems.framework.signals import TICK_S as T
+
+pytestmark = pytest.mark.drake
 
 
 def rest(law="conventional", **data):
@@ -35,10 +37,7 @@ def test_state_names_are_as_many_as_states_and_unique():
 def test_period_map_is_what_the_simulator_does():
     """Two periods from a moving start, against a simulator of its own."""
     loop = rest("active", start={"position_m": [0.3, 0.2], "heading_deg": 30.0})
-    diagram = loop.follower.diagram
-    simulator = Simulator(diagram)
-    simulator.get_mutable_integrator().set_fixed_step_mode(flag=True)
-    simulator.get_mutable_integrator().set_maximum_step_size(T)
+    simulator = make_simulator(loop.follower)
     simulator.Initialize()
     simulator.AdvanceTo(1.0)
     context = simulator.get_context()

@@ -7,8 +7,7 @@ import math
 import control
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from analysis.models.linear_models import LinearModel, simple_poles
 from analysis.models.model_reduction import minimal_model

@@ -23,6 +23,8 @@ from analysis.models.linearisation import (
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams.scenario import Scenario
 
+pytestmark = pytest.mark.drake
+
 LAWS = ["none", "conventional", "active", "conventional2017", "active2017"]
 
 
@@ -136,7 +138,7 @@ def test_sampled_poles_approach_the_continuous_ones(law):
             assert np.abs(continuous - pole).min() < 0.025 * abs(pole) ** 2 + 0.001
 
 
-def test_a_linearisation_takes_less_than_50_ms():
+def test_a_linearisation_takes_less_than_a_tenth_of_a_second():
     """The build and its twin are there already."""
     (point, _) = points("active")
     loop = ideal_loop(point.loop.scenario)
@@ -146,4 +148,4 @@ def test_a_linearisation_takes_less_than_50_ms():
         again = resting_equilibrium(loop, point.p_WP)
         sampled_model(again)
         spent.append(time.process_time() - start)
-    assert min(spent) < 0.05
+    assert min(spent) < 0.1

@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 import pandas as pd
-import pytest
 from scipy.io import loadmat
 
 from analysis.models.linear_models import LinearModel
@@ -49,6 +48,13 @@ def test_csv_files_are_exact_and_named(tmp_path):
     assert len(list(folder.iterdir())) == 4
 
 
-def test_models_of_one_name_are_refused(tmp_path):
-    with pytest.raises(ValueError, match=r"models: .* rename one"):
-        write_models([MODEL, MODEL], tmp_path)
+def test_models_whose_names_would_be_one_file(tmp_path):
+    """As of two laws, my_laws.py:Soft and my_laws:py_soft, or of one in Greek."""
+    names = ["laws.py:Soft loop", "laws_py:soft loop", "\u03bb.py:\u03bb", "x" * 300]
+    models = [dataclasses.replace(MODEL, name=name) for name in names]
+    write_models(models, tmp_path)
+    stems = ["laws_py_Soft_loop", "laws_py_soft_loop_2", "py", "x" * 200]
+    files = {path.name for path in (tmp_path / "models").iterdir()}
+    assert files == {f"{stem}_{matrix}.csv" for stem in stems for matrix in "ABCD"}
+    structs = loadmat(tmp_path / "models.mat")
+    assert set(stems) <= structs.keys()

@@ -6,12 +6,12 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.models.force_field import ForceField
-from analysis.models.ideal_loop import frozen_scenario, ideal_loop, ideal_scenario
+from analysis.models.ideal_loop import ideal_loop
+from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams import load_scenario
 from diagrams.scenario import Scenario
@@ -28,6 +28,9 @@ REPULSION = {
     },
 }
 POINT = {"length_m": 1e-3, "width_m": 1e-3}
+#: What lies before the source. About a source as small as this P rests nearly anywhere
+#: on a circle, more weakly than a search can tell from a true circle of equilibria.
+BEFORE = (-1.0, 2.1, -1.0, 1.0)
 
 
 def one_obstacle(law: str, behind: float, **data) -> Scenario:
@@ -54,8 +57,8 @@ def one_obstacle(law: str, behind: float, **data) -> Scenario:
 @pytest.mark.parametrize("behind", [1.5, 2.0, 2.5])
 def test_one_obstacle_makes_the_saddle_of_the_closed_form(behind):
     """K_r (L + c) = K_0 (rho_0 - c); radially K_r + K_0, tangentially -K_r L/c."""
-    search = find_equilibria(one_obstacle("conventional", behind))
-    assert search.complete, search.statement
+    search = find_equilibria(one_obstacle("conventional", behind), area_m=BEFORE)
+    assert not search.unresolved
     c = (K_0 * RHO_0 - K_R * behind) / (K_0 + K_R)
     place = [3.0 - behind - c, 0.0]
     (point,) = [p for p in search.points if np.allclose(p.p_WP, place, atol=1e-6)]
@@ -81,8 +84,9 @@ def test_one_small_obstacle_is_never_a_local_minimum(behind, law):
 def test_a_flat_face_across_the_line_is_a_trap_as_wide_as_the_face():
     """Its nearest point slides along with P: no push to the side, but K_r's pull."""
     box = {"name": "box", "waypoints_m": [[1.05, 0.0]], "size_m": [0.1, 0.05]}
-    search = find_equilibria(one_obstacle("conventional", 2.0, obstacles=[box]))
-    assert search.complete, search.statement
+    scene = one_obstacle("conventional", 2.0, obstacles=[box])
+    search = find_equilibria(scene, area_m=BEFORE)
+    assert not search.unresolved
     c = (K_0 * RHO_0 - K_R * 2.0) / (K_0 + K_R)
     before = [p for p in search.points if p.p_WP[0] < 1.0]
     assert sorted(p.kind for p in before) == ["saddle", "saddle", "sink"]
@@ -97,7 +101,8 @@ def test_a_flat_face_across_the_line_is_a_trap_as_wide_as_the_face():
 def test_a_stiff_obstacle_oscillates_and_is_a_source():
     """At K_0 = 30 the radial mode grows, past the contact limit of 18.2 N/m."""
     gains = {"conventional": {"stiffness_n_m": 30.0}}
-    search = find_equilibria(one_obstacle("conventional", 2.0, repulsion=gains))
+    scene = one_obstacle("conventional", 2.0, repulsion=gains)
+    search = find_equilibria(scene, area_m=BEFORE)
     (point,) = [p for p in search.points if p.p_WP[0] < 0.9]
     assert point.kind == "source"
 
@@ -150,16 +155,17 @@ def test_every_root_of_a_blind_search_is_found(law):
     source = field.p_WS
     rng = np.random.default_rng(1)
     x0, x1, y0, y1 = search.area_m
+    roots = 0
     for start in rng.uniform([x0, y0], [x1, y1], (200, 2)):
         found = root(field.force, start, tol=1e-12)
         at = found.x
         inside = x0 < at[0] < x1 and y0 < at[1] < y1
         if not found.success or not inside or np.linalg.norm(field.force(at)) > 1e-9:
             continue
+        roots += 1
         on_circle = abs(np.linalg.norm(at - source) - 1.2) < 1e-6
-        if np.linalg.norm(known - at, axis=1).min() > 1e-5 and not on_circle:
-            clearances = [p.clearance_m for p in (resting_equilibrium(field.loop, at),)]
-            assert min(clearances) < 2 * search.cell_m
+        assert on_circle or np.linalg.norm(known - at, axis=1).min() <= 1e-5
+    assert roots >= 10
 
 
 def test_following_lags_by_the_damping_over_the_stiffness():

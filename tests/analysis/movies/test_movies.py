@@ -14,7 +14,8 @@ import soundfile
 from matplotlib.colors import to_rgb
 from PIL import Image, ImageSequence
 
-from analysis.movies import MovieFile, RunFrames
+from analysis.movies.encoding import MovieFile
+from analysis.movies.run_frames import RunFrames
 from analysis.reporting.palette import COLOURS
 from analysis.run_error import RunError
 from systems.framework.input_error import InputError

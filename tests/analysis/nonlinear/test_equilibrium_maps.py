@@ -16,7 +16,7 @@ from analysis.nonlinear.equilibrium_maps import (
     offset_map,
 )
 from analysis.nonlinear.stiffness_ratio import stiffness_ratio_map
-from analysis.nonlinear.trap_stiffness import trap_stiffness
+from studies.support.trap_stiffness import trap_stiffness
 
 
 def stiff(law):
@@ -112,7 +112,7 @@ def test_no_equilibrium_where_the_pull_is_too_strong(two_boxes):
 
 
 def test_unknown_words_are_refused(two_boxes):
-    with pytest.raises(ValueError, match="sensing: 'sonar' is none of"):
+    with pytest.raises(ValueError, match="sensing: 'sonar' is unknown"):
         gap_map(two_boxes("active"), (1.0,), sensing="sonar")
     with pytest.raises(ValueError, match="sensing: 'sonar' is neither"):
         trap_stiffness(two_boxes("active"), "sonar")

@@ -7,13 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from analysis.plumes import (
-    concentration_map,
-    plume_history,
-    record_searches,
-    search_panels,
-)
-from analysis.plumes.search_panels import call_time
+from analysis.plumes.plume_history import concentration_map, plume_history
+from analysis.plumes.search_panels import call_time, search_panels
+from analysis.plumes.search_replay import record_searches
 from analysis.runs.metrics import run_metrics
 from analysis.runs.run_plots import plot_time_series, plot_trajectory
 from diagrams import RunResult, load_scenario, simulate
@@ -105,7 +101,7 @@ def test_the_map_shows_the_plume(mission):
     legend = plot_trajectory(mission).legends[0]
     texts = [text.get_text() for text in legend.get_texts()]
     assert "source of odour" in texts
-    assert any(text.startswith("odour at the end") for text in texts)
+    assert any(text.startswith("odor at the end") for text in texts)
 
 
 def test_metrics_count_steps_and_ways(mission):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.recordings import ArrayGeometry
+from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.array_match import chosen_microphones
 from systems.framework.input_error import InputError
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.recordings import ArrayGeometry, locate
+from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.clock_drift import clock_drift, common_lags, recording_drift
+from analysis.recordings.locate import locate
 from systems.framework.input_error import InputError
 from tests.analysis.listening.plane_waves import RATE, SOUND_SPEED, SQUARE, plane_waves
 

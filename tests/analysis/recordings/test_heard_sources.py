@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.hearing.synthetic_speech import speech_like
 from analysis.recordings.heard_sources import heard_sources
-from analysis.talkers import (
+from studies.support.moving_talkers import moving_sound, ring_scene
+from studies.support.talker_trials import (
     TALKER_ARRAYS,
     heard_from,
     impulse_responses,
-    moving_sound,
-    ring_scene,
-    speech_like,
     talker_sounds,
     with_noise,
 )

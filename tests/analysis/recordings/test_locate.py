@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.recordings.locate import ArrayGeometry, load_geometry, locate
+from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+from analysis.recordings.locate import locate
 from analysis.recordings.locate_text import locate_text
 
 C = 340.0
@@ -344,7 +345,7 @@ def test_channels_that_are_counted_from_one(tmp_path):
 
 def test_copied_channel_is_refused(tmp_path):
     path = record(tmp_path / "a.wav", ROBOT, polar(25.0, 1.5))
-    with pytest.raises(ValueError, match="channels 1 and 2: the same samples"):
+    with pytest.raises(ValueError, match="channels 1 and 2: their samples are equal"):
         locate(altered(path, lambda x: x[:, [0, 0, 2]]))
 
 
@@ -396,10 +397,8 @@ def test_far_source_has_no_range(tmp_path):
     assert summary["bearing_deg"] == pytest.approx(30.0, abs=0.5)
     assert summary["range_m"] is None
     assert summary["observable"] == ["bearing"]
-    for estimate in result.estimates:
-        if estimate.range_m is not None:
-            assert estimate.range_std_m is not None
-            assert estimate.range_std_m < estimate.range_m
+    assert len(result.estimates) >= 5
+    assert all(estimate.range_m is None for estimate in result.estimates)
 
 
 def test_noise_has_no_bearing(tmp_path):
@@ -511,5 +510,5 @@ def test_channel_copied_with_gain_or_delay_is_refused(tmp_path, gain, shift):
         samples[:, 1] = gain * np.roll(samples[:, 0], shift)
         return samples
 
-    with pytest.raises(ValueError, match="channels 1 and 2: the same samples"):
+    with pytest.raises(ValueError, match="channels 1 and 2: their samples are equal"):
         locate(altered(path, copied))

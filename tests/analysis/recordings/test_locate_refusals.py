@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import soundfile
 
-from analysis.recordings.locate import ArrayGeometry, load_geometry, locate
+from analysis.recordings.array_geometry import ArrayGeometry, load_geometry
+from analysis.recordings.locate import locate
 
 #: (samples, 3) noise in three channels.
 THREE = 0.1 * np.random.default_rng(0).standard_normal((9_600, 3))
@@ -62,9 +63,9 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        ("", "names no microphones"),
-        ("- 1\n- 2\n", "names no microphones"),
-        ("microphones: [[0, 1], [0, 0]\n", "is not YAML"),
+        ("", "lists no microphones"),
+        ("- 1\n- 2\n", "lists no microphones"),
+        ("microphones: [[0, 1], [0, 0]\n", "is not usable as YAML"),
         ("microphones: [[0, 1], [0, 0]]\n", "2 given.*at least 3"),
         ("microphones: [[0, 1], [0, 0], [0, 1]]\n", "1 and 3 are 0 mm apart"),
         ("microphones: [[0, .nan], [0, 0], [0, -0.4]]\n", "finite"),
@@ -87,7 +88,7 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
         (GOOD + "bandwidth: 3\n", "bandwidth: unknown key"),
         (GOOD + "position_std_m: -0.01\n", "position_std_m"),
         (GOOD + "position_std_m: 5\n", "position_std_m.*1"),
-        (GOOD + "position_std_m: [0.01, 0.01]\n", "2 given for 3 microphones"),
+        (GOOD + "position_std_m: [0.01, 0.01]\n", "has 2 values for 3 microphones"),
         (
             GOOD + "position_std_m: 0.01\n"
             "position_covariance_m2: [[1.0e-4, 0], [0, 1.0e-4]]\n",
@@ -110,11 +111,11 @@ GOOD = "microphones: [[0, 0.4], [0, 0], [0, -0.4]]\n"
             "sound_speed_std.*keep one",
         ),
         (GOOD + "largest_range_error: 0\n", "largest_range_error"),
-        (GOOD + "side: above\n", "side.*ahead from behind alone"),
+        (GOOD + "side: above\n", "side.*only ahead and behind"),
         (GOOD + "side: left\n", "side"),
         (
             "microphones: [[0, 0], [0, 1], [1, 0]]\nside: ahead\n",
-            "side.*tells all sides; remove",
+            "side.*distinguishes all sides; remove",
         ),
     ],
 )

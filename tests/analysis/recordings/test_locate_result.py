@@ -103,7 +103,10 @@ def test_range_of_few_estimates_is_none():
     few = [estimate(k, 10.0, range_m=2.0 if k < 4 else None) for k in range(10)]
     most = [estimate(k, 10.0, range_m=2.0 if k < 6 else None) for k in range(10)]
     assert result(ROW, few).summary()["range_m"] is None
-    assert "range not observable" in locate_text(result(ROW, few))
+    few_text = locate_text(result(ROW, few))
+    assert "no single range: 4 of 10 estimates have one, from 2.000 to 2" in few_text
+    none = [estimate(k, 10.0) for k in range(10)]
+    assert "range not observable (microphones" in locate_text(result(ROW, none))
     assert result(ROW, most).summary()["range_m"] == pytest.approx(2.0)
     assert result(ROW, most).summary()["observable"] == ["bearing", "range"]
 
@@ -119,9 +122,13 @@ def test_range_that_scatters_by_more_than_is_allowed_is_none():
         None,
     )
     assert found["observable"] == ["bearing"]
+    text = locate_text(result(ROW, far))
+    assert "no single range: 8 of 8 estimates have one, from 1.300 to 2.700" in text
+    assert "not observable (microphones" not in text
+    assert "no single range" in plot_locate(result(ROW, far)).get_suptitle()
     near = [estimate(k, 10.0, range_m=2.0 + 0.1 * r) for k, r in enumerate(ranges)]
     assert result(ROW, near).summary()["range_systematic_m"] == 0.05
-    assert "(std 0.104, of which 0.050 by errors of array and air" in locate_text(
+    assert "(std 0.104, of which 0.050 from errors of array and air" in locate_text(
         result(ROW, near)
     )
 
@@ -187,7 +194,7 @@ def test_the_number_of_sources_of_a_steady_sound_is_not_told():
     heard = talkers(10.0, steady=True)
     found = LocateResult({}, ArrayShape.of(SQUARE), estimates, 20, heard=heard)
     assert found.summary()["number_of_sources"] is None
-    assert "steady: one source, or several, is not told" in locate_text(found)
+    assert "steady: the number of sources is unknown" in locate_text(found)
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,8 @@ import pytest
 import soundfile
 from scipy import signal
 
-from analysis.recordings.locate import ArrayGeometry, locate
+from analysis.recordings.array_geometry import ArrayGeometry
+from analysis.recordings.locate import locate
 
 RATE = 16_000
 ROOM_M = (6.0, 5.0, 2.8)

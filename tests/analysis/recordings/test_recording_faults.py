@@ -37,15 +37,13 @@ def test_nothing_to_locate_with(kind):
 
 def test_all_channels_that_are_of_no_use_are_named():
     found = [fault("dead", 1), fault("clipped", 0), fault("copied", 0, 2)]
-    with pytest.raises(ValueError, match=r"dead \(1,\); see to channels 1, 3 as well"):
+    with pytest.raises(ValueError, match=r"dead \(1,\); check channels 1, 3 as well"):
         channels_without_faults(SAMPLES, found, AS_GIVEN, "")
 
 
 def test_a_message_names_a_few_of_many_channels():
     found = [fault("copied", 0, k) for k in range(1, 64)]
-    with pytest.raises(
-        ValueError, match=r"see to channels 1, 3, 4, .*\.\.\."
-    ) as caught:
+    with pytest.raises(ValueError, match=r"check channels 1, 3, 4, .*\.\.\.") as caught:
         channels_without_faults(SAMPLES, found, AS_GIVEN, "")
     assert len(str(caught.value)) < 100
 

@@ -9,7 +9,8 @@ import pyroomacoustics
 import pytest
 import soundfile
 
-from analysis.recordings.locate import ArrayGeometry, locate
+from analysis.recordings.array_geometry import ArrayGeometry
+from analysis.recordings.locate import locate
 from analysis.recordings.onset_spectra import OnsetSpectra
 from systems.delays.consistent_lags import consistent_lags
 from systems.sound.array_shape import ArrayShape

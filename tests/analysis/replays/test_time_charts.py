@@ -85,16 +85,16 @@ def planned_run():
 
 
 def test_what_a_guard_did_is_a_curve_of_its_column(planned_run):
-    """At every tick, however short: a row of the table tells of the tick before it."""
+    """At every tick, however short: a row of the table tells of the tick from it on."""
     charts = {chart.title: chart for chart in time_charts(planned_run, {})}
     chart = charts["command, by the guard"]
     did = _series(chart, "what it did")
     assert did["style"] == "steps"
     actions = planned_run.columns["guard_action"]
     assert len(np.unique(actions)) > 1
-    middles = planned_run.time[1:] - 0.5 * planned_run.scenario.tick_s
+    middles = planned_run.time[:-1] + 0.5 * planned_run.scenario.tick_s
     at = np.searchsorted(did["t"], middles) - 1
-    np.testing.assert_array_equal(np.array(did["values"])[at], actions[1:])
+    np.testing.assert_array_equal(np.array(did["values"])[at], actions[:-1])
     assert chart.ticks is not None
     assert dict(chart.ticks) == {
         0: "passed", 1: "slowed", 2: "turned", 3: "braked", 4: "halted"

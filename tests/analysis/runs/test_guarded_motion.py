@@ -40,7 +40,7 @@ def test_the_way_to_rest_is_that_of_the_commands_and_of_the_lag(guarded_run, mot
     """What lags by T behind u goes on for the sum of u and T times its speed now."""
     columns = guarded_run.columns
     tick = round(0.7 / 0.025)
-    rims = [0.06 * columns[f"wheel_speed_{s}"][tick] for s in ("left", "right")]
+    rims = [0.06 * columns[f"wheel_speed_{s}"][tick - 1] for s in ("left", "right")]
     assert rims == pytest.approx([0.6, 0.6])
     braking = np.arange(0.6 - 1.5 * 0.025, 0.0, -1.5 * 0.025)
     way = 0.025 * np.sum(braking) + 0.05 * columns["v_WB_x"][tick]

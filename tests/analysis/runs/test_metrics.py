@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from numpy.typing import NDArray
 
 from analysis.runs.collision_warning import collision_warning
@@ -289,14 +288,13 @@ def burst_frames(distance: float, **scenario: Any) -> NDArray[np.int64]:
 def test_frames_with_sound(hearing, distance):
     """20 frames of 25 ms in each of the bursts of 0.5 s in 2 s.
 
-    The last of 21 bursts began at 40 s. A frame's estimate comes a tick after its
-    end: of the frame [0, 25 ms) at tick 2. Of sound that is half a frame late, from
-    12.5 ms x c = 4.3 m on, the first frame holds less than half, and one more at
-    the end holds more.
+    The last of 21 bursts began at 40 s. The frame [0, 25 ms) ends at tick 1. Of sound
+    that is half a frame late, from 12.5 ms x c = 4.3 m on, the first frame holds less
+    than half, and one more at the end holds more.
     """
     ticks = burst_frames(distance, hearing=hearing)
     late = int(hearing == "audio" and distance > 4.3)
-    first = 2 + late + 80 * np.arange(21)
+    first = 1 + late + 80 * np.arange(21)
     np.testing.assert_array_equal(ticks, (first[:, None] + np.arange(20)).ravel())
 
 
@@ -305,7 +303,7 @@ def test_frames_with_sound_of_other_gates():
     sound = {"start_s": 1.0, "on_s": 0.1}
     assert len(burst_frames(1.0, sound=sound)) == 20 * 4
     endless = {"on_s": 2.0}
-    assert len(burst_frames(1.0, sound=endless)) == 1639
+    assert len(burst_frames(1.0, sound=endless)) == 1640
     always = {"burst_gaps": False}
     assert len(burst_frames(1.0, hearing="ideal", ideal_hearing=always)) == 1640
 
@@ -316,8 +314,8 @@ def test_what_is_heard_and_what_sounds_agree(hearing):
     overrides = ["law=none", f"hearing={hearing}", "duration_s=4.3"]
     result = simulate(load_scenario("default", overrides))
     metrics = run_metrics(result)
-    assert metrics["frames_with_sound"] == 20 + 20 + 11
-    assert metrics["frames_with_sound_heard"] == metrics["detections"] == 51
+    assert metrics["frames_with_sound"] == 20 + 20 + 12
+    assert metrics["frames_with_sound_heard"] == metrics["detections"] == 52
     np.testing.assert_array_equal(
         frames_with_sound(result), result.columns["detected"] > 0.5
     )
@@ -374,8 +372,8 @@ def test_effort_and_saturation():
     }
     metrics = run_metrics(straight(ticks=ticks, columns=columns))
     assert metrics["control_effort_rms_n"] == pytest.approx(5.0)
-    # 1 N x 0.2 m/s - 3 N x 0.1 m/s at 81 ticks.
-    assert metrics["push_work_j"] == pytest.approx(-0.1 * 81 * TICK)
+    # 1 N x 0.2 m/s - 3 N x 0.1 m/s at 81 ticks, at the first of them from rest.
+    assert metrics["push_work_j"] == pytest.approx(-0.1 * 80.5 * TICK)
     # One wheel's rim changes by 4 rad/s x 0.06 m a tick, the other's never.
     assert metrics["wheel_variation_m_s2"] == pytest.approx(0.5 * 0.24 / TICK)
     assert metrics["saturated_fraction"] == 1.0
@@ -402,14 +400,15 @@ def test_errors_of_hearing_are_of_fresh_estimates_with_range():
     """Off by 0.1, 0.2, 0.3, 0.48 and 0.6 m; the rest has no range, or is old."""
     tick = np.arange(161)
     off = np.zeros(161)
-    off[10:15] = [0.6, 0.1, 0.3, 0.48, 0.2]
+    # The target goes by an estimate from the tick after it on.
+    off[11:16] = [0.6, 0.1, 0.3, 0.48, 0.2]
     columns = {
         "detected": (tick >= 10) & (tick < 20),
         "range_valid": (tick < 15) | (tick > 40),
         "p_WS_estimated_x": 3.675 + 0.6 * off,
         "p_WS_estimated_y": -0.8 * off,
     }
-    columns["p_WS_estimated_x"][15:] = 9.0
+    columns["p_WS_estimated_x"][16:] = 9.0
     metrics = run_metrics(straight(source=RESTING, columns=columns))
     assert (metrics["detections"], metrics["detections_with_range"]) == (10, 5)
     assert metrics["source_error_median_m"] == pytest.approx(0.3)

@@ -66,7 +66,7 @@ def test_each_robot_has_its_own_colour_and_label(convoy):
     (axes,) = plot_trajectory(convoy).axes
     _, labels = axes.get_legend_handles_labels()
     for name, own in convoy.robots.items():
-        (line,) = (k for k in axes.lines if k.get_label() == f"path of {name}'s P")
+        (line,) = (k for k in axes.lines if k.get_label() == f"path of P of {name}")
         np.testing.assert_array_equal(line.get_xdata(), own.columns["p_WP_x"])
         assert f"{name} with its microphones" in labels
 

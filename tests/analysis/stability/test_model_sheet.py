@@ -7,7 +7,7 @@ import pytest
 from analysis.reporting.html_page import equation
 from analysis.stability.model_sheet import model_sheet
 from diagrams import load_scenario
-from diagrams.laws import LAWS
+from systems.laws.catalogue import LAWS
 
 
 def test_parameters_are_the_scenarios() -> None:

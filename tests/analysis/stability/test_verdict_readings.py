@@ -67,6 +67,7 @@ def study(**parts):
             search=Made(
                 points=[place(0.0), place(3.0), place(3.0, stable=False), place(-2.0),
                         place(1.1), place(0.9)],
+                switching=[],
             ),
         ),
         "margins": Made(implemented=[cut(*values) for values in CUTS]),
@@ -117,16 +118,16 @@ EXPECTED = {
     "largest sensitivity peak": (4.0, "fail"),
     "least disk margin": (0.3, "fail"),
     "least delay margin": (0.2, "pass"),
-    "left after a burst cycle": (0.7, "pass"),
-    "worst case at rest": (-0.3, "pass"),
-    "worst case before an obstacle": (0.6, "fail"),
-    "places to jam": (2.0, "fail"),
-    "offset at rest": (0.07, "pass"),
+    "deviation remaining after a burst cycle": (0.7, "pass"),
+    "growth at rest, worst parameters": (-0.3, "pass"),
+    "growth before an obstacle, worst parameters": (0.6, "fail"),
+    "places where the robot can jam": (2.0, "fail"),
+    "offset from the follow point at rest": (0.07, "pass"),
     "start certified": (1.0, "pass"),
-    "power that the velocity term gives": (0.4, "pass"),
+    "largest power of the velocity term": (0.4, "pass"),
     "collisions from certified starts": (3.0, "fail"),
-    "linear prediction of a small step": (3.0, "fail"),
-    "difference of two routes to the model": (3e-12, "pass"),
+    "error of the linear prediction of a small step": (3.0, "fail"),
+    "difference between two computations of the model": (3e-12, "pass"),
 }
 
 
@@ -138,7 +139,10 @@ def verdicts(made):
 def test_every_verdict_reads_what_its_name_says():
     """The contact's two are of the scenario itself: see the independent evals."""
     found = verdicts(study())
-    contact = {"growth where the law is stiffest", "the same with echoes a tick late"}
+    contact = {
+        "growth where the law is stiffest",
+        "growth where the law is stiffest, echoes one tick late",
+    }
     assert set(found) == set(EXPECTED) | contact
     for name, (value, verdict) in EXPECTED.items():
         assert found[name].value == pytest.approx(value, rel=1e-9), name
@@ -164,7 +168,10 @@ def test_contact_growth_is_a_root_of_the_difference_equation(ticks):
     assert read_contact(Study(scenario), ticks) == pytest.approx(growth, abs=2e-3)
     assert growth > 0.05
     named = verdicts(Study(scenario, study().found))
-    name = ("growth where the law is stiffest", "the same with echoes a tick late")
+    name = (
+        "growth where the law is stiffest",
+        "growth where the law is stiffest, echoes one tick late",
+    )
     assert named[name[ticks]].value == read_contact(Study(scenario), ticks)
 
 
@@ -175,8 +182,13 @@ def test_a_jam_is_a_sink_where_a_run_is_not_in_its_goal(waypoints, margin):
     """0.3 m beyond the follow distance of a resting source, 0.8 m of a moving one."""
     places = [place(sign * margin + step) for sign in (-1, 1) for step in (-0.01, 0.01)]
     source = {"source": {"waypoints_m": waypoints}}
-    found = {"equilibria": Made(search=Made(points=places))}
-    assert read_jams(Study(Scenario.model_validate(source), found)) == 1.0
+    switching = [
+        Made(p_WP=[2.0 + 1.2 + margin + step, 0.0], attractive=attractive)
+        for step, attractive in ((-0.01, True), (0.01, True), (0.01, False))
+    ]
+    search = Made(points=places, switching=switching)
+    found = {"equilibria": Made(search=search)}
+    assert read_jams(Study(Scenario.model_validate(source), found)) == 2.0
 
 
 def test_signs_and_sides_do_not_hide():
@@ -188,6 +200,8 @@ def test_signs_and_sides_do_not_hide():
     assert read_damping(study(equilibria=growing)) == pytest.approx(-0.1 / 2.0025, 1e-4)
     crept = Made(at=Made(eigenvalues=np.array([-3.0, -0.4])))
     assert read_damping(study(equilibria=crept)) == 1.0
+    moves = (Made(certificate=Made(start_certified=None)),)
+    assert "bodies move" in str(read_start(study(certificates=moves)))
     no = (Made(certificate=Made(start_certified=False)),)
     assert read_start(study(certificates=no)) == 0.0
     one = Made(margins=[Made(delay_s=math.inf)])

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -21,12 +22,14 @@ from analysis.sweeps.processes import WorkerError, WorkerProcess
 from analysis.sweeps.store import StoreError, load_results
 from analysis.sweeps.sweep import PreparedSweep, prepare_sweep, run_sweep
 from diagrams import simulate
+from systems.framework.input_error import InputError
 
 SPEED = "source.speed_m_s"
 QUICK = {"hearing": "ideal", "obstacle_sensing": "ideal", "duration_s": 0.5}
 LAWS = """
 import os, signal
 from pathlib import Path
+from typing import Any
 
 # A law is tried before the run: what fails later is another matter.
 CALLS = {"nan": 0, "deadly": 0, "mortal": 0}
@@ -177,6 +180,53 @@ def test_half_a_line_is_run_again(tmp_path, undisturbed, torn):
     pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
 
 
+def changed(row: dict[str, Any], **changes: Any) -> bytes:
+    return json.dumps({**row, **changes}).encode() + b"\n"
+
+
+def test_lines_that_are_no_runs_of_the_plan_are_dropped(tmp_path, undisturbed, caplog):
+    """Line 6 on: an index outside, a negative one, other draws, another kind of row."""
+    out = tmp_path / "out"
+    stopped(out, after=5)
+    journal = out / "runs.jsonl"
+    rows = [json.loads(line) for line in journal.read_bytes().splitlines()]
+    left = next(index for index in range(12) if index not in {r["index"] for r in rows})
+    foreign = [
+        changed(rows[0], index=999),
+        changed(rows[0], index=-1),
+        changed(rows[0], index=left),
+        changed(rows[1], seed=rows[1]["seed"] + 1),
+        changed(rows[1], fields=rows[2]["fields"] | {SPEED: 9.0}),
+        changed(rows[1], metrics={"path_length_m": "far"}),
+        b'{"index": 3}\n',
+        b"[" * 100_000 + b"\n",
+        changed(rows[2], cause="goal"),
+        changed(rows[3]),
+    ]
+    with journal.open("ab") as file:
+        file.write(b"".join(foreign))
+    counts: list[int] = []
+    table = prepared(out, resume=True).run(counts.append)
+    assert counts[0] == 4
+    pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
+    (said,) = caplog.messages
+    assert said.startswith(f"{journal}: 10 lines do not belong to this sweep")
+    assert "(line 3, 6, 7, 8, 9, 10, 11, 12, 13, 14)" in said
+
+
+@pytest.mark.parametrize("column", ["index", "seed"])
+def test_a_table_of_other_runs_is_refused(tmp_path, column):
+    out = tmp_path / "out"
+    table = prepared(out).run()
+    for other in (table.assign(**{column: table[column] + 1}), table[:-1]):
+        other.to_parquet(out / "runs.parquet", index=False)
+        with pytest.raises(InputError, match="does not hold the runs of this sweep"):
+            prepared(out, resume=True)
+    (out / "runs.parquet").unlink()
+    again = prepared(out, resume=True).run()
+    pd.testing.assert_frame_equal(without_times(again), without_times(table))
+
+
 def test_a_sweep_can_be_resumed_from_nothing(tmp_path, undisturbed):
     table = prepared(tmp_path / "out", resume=True).run()
     pd.testing.assert_frame_equal(without_times(table), without_times(undisturbed))
@@ -198,7 +248,7 @@ def test_full_disk_keeps_what_is_done(tmp_path, undisturbed):
     sweep = prepared(out)
     with (
         files_of_at_most(6000),
-        pytest.raises(StoreError, match="runs that are done are kept"),
+        pytest.raises(StoreError, match="finished runs are kept"),
     ):
         sweep.run()
     kept = load_results(out)
@@ -290,14 +340,14 @@ def test_other_versions_are_refused(tmp_path):
     manifest = json.loads((out / "sweep.json").read_text())
     manifest["versions"]["drake"] = "1.0"
     (out / "sweep.json").write_text(json.dumps(manifest))
-    with pytest.raises(ValueError, match=r"made with drake 1\.0; install that"):
+    with pytest.raises(ValueError, match=r"made with drake 1\.0; install these"):
         prepared(out, resume=True)
 
 
 def test_used_directories_are_refused(tmp_path):
     out = tmp_path / "out"
     first = prepared(out)
-    with pytest.raises(ValueError, match="out: another process works in"):
+    with pytest.raises(ValueError, match="out: another process uses"):
         prepared(out, resume=True)
     first.store.close()
     with pytest.raises(ValueError, match="not empty"):

@@ -13,6 +13,8 @@ from analysis.wiring.block_diagram import block_svg, write_block_diagram
 from analysis.wiring.wires import Wire, wires
 from diagrams import build_sound_follower, load_scenario
 
+pytestmark = pytest.mark.drake
+
 SVG = "{http://www.w3.org/2000/svg}"
 
 

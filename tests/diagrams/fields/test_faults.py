@@ -6,8 +6,9 @@ from typing import Any
 
 import pytest
 
-from diagrams import InputError, load_scenario
+from diagrams import load_scenario
 from diagrams.loading import scenario_from_mapping
+from systems.framework.input_error import InputError
 
 
 def test_all_faults_of_a_file_are_told_at_once(tmp_path) -> None:

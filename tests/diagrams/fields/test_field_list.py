@@ -7,9 +7,11 @@ from typing import Any
 
 import pytest
 
-from diagrams import InputError, load_scenario
-from diagrams.fields import find_fields, list_fields, scenario_schema
+from diagrams import load_scenario
+from diagrams.fields.field_list import find_fields, list_fields
+from diagrams.fields.shipped import scenario_schema
 from diagrams.scenario import Scenario
+from systems.framework.input_error import InputError
 from systems.sound.parameters import RoomParameters
 from systems.world.parameters import ObstacleParameters
 

@@ -10,10 +10,10 @@ import jsonschema
 import pytest
 
 from analysis.sweeps.sweep_file import SWEEP_SCHEMA_FILE
-from analysis.sweeps.sweep_schema import make_sweep_schema
 from diagrams.fields.shipped import SCHEMA_FILE
 from diagrams.loading import read_mapping
-from diagrams.scenario_schema import make_schema
+from tools.scenario_schema import make_schema
+from tools.sweep_schema import make_sweep_schema
 
 ROOT = Path(__file__).parents[3]
 MADE = {SCHEMA_FILE: make_schema, SWEEP_SCHEMA_FILE: make_sweep_schema}
@@ -30,7 +30,7 @@ def shipped(path: Path) -> Any:
 
 @pytest.mark.parametrize("path", MADE, ids=lambda path: path.name)
 def test_shipped_schema_is_that_of_the_models(path: Path) -> None:
-    """If they differ: python -m docs.tables.schemas."""
+    """If they differ: make schemas."""
     assert shipped(path) == MADE[path]()
     jsonschema.Draft202012Validator.check_schema(shipped(path))
 

@@ -12,6 +12,8 @@ from pydrake.autodiffutils import AutoDiffXd
 from systems.base.carrier_parameters import SourceRobotParameters
 from systems.base.source_robot import SourceRobot
 
+pytestmark = pytest.mark.drake
+
 STRAIGHT = SourceRobotParameters(
     waypoints_m=((1.0, 2.0), (1.0, 5.0)), speed_m_s=0.2, start_time_s=1.0
 )

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
+from pydrake.autodiffutils import AutoDiffXd
 
 from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_derivatives
 from systems.base.parameters import PlantParameters
@@ -21,8 +22,11 @@ from systems.base.wheel_speed_command import (
     hand_position_velocity,
     integrate_velocity,
     limited_wheel_speeds,
+    turned_off_back,
 )
 from systems.world.geometry import control_point
+
+pytestmark = pytest.mark.drake
 
 ROBOT = RobotParameters()
 angle = st.floats(-math.pi, math.pi)
@@ -215,3 +219,34 @@ def test_gradient_of_other_commands(bench, check_gradient, block, port, point):
         return at.updated()
 
     check_gradient(block(robot=RobotParameters(top_speed_m_s=0.7)), respond, point)
+
+
+def test_a_vector_straight_back_is_turned_aside():
+    """By hand: by tan 5 deg of what exceeds 0.1, to the side that it has, or left."""
+    aside = math.tan(math.radians(5.0)) * 0.5
+    for across, expected in ((0.0, aside), (1e-9, aside), (-1e-9, -aside)):
+        found = turned_off_back(-0.6, across, 0.0, 0.1)
+        assert found == pytest.approx((-0.6, expected))
+    found = turned_off_back(-1e-9, -0.6, math.pi / 2, 0.1)  # left of B is -x of W
+    assert found == pytest.approx((-aside, -0.6))
+
+
+@given(angle, angle, st.floats(0.0, 3.0))
+def test_no_other_vector_is_turned(theta, off, length):
+    """Neither ahead, nor beside, nor 5 deg off straight back, nor a short one."""
+    x, y = length * math.cos(theta + off), length * math.sin(theta + off)
+    found = turned_off_back(x, y, theta, 0.3)
+    if abs(off) < math.radians(174.9) or length < 0.3:
+        assert found == (x, y)
+    turned = math.remainder(math.atan2(found[1], found[0]) - theta - off, math.tau)
+    assert abs(turned) <= math.radians(5.0) + 1e-9 or length < 1e-9
+
+
+def test_derivatives_of_what_is_not_turned_stay():
+    """Of what pulls ahead, and of a short vector back: those of a linear model."""
+    units: Any = np.eye(2)
+    for along in (-0.2, 0.0, 1.2):
+        x, y = AutoDiffXd(along, units[0]), AutoDiffXd(0.0, units[1])
+        found = turned_off_back(x, y, 0.0, 0.3)
+        for each, unit in zip(found, units, strict=True):
+            np.testing.assert_array_equal(each.derivatives(), unit)

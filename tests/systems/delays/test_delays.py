@@ -139,18 +139,19 @@ def test_silent_channels_give_nothing(method, silent):
 def test_single_impulse_at_the_edge_is_no_crash(method):
     rows = np.zeros((3, N), dtype=np.float32)
     rows[0, 0] = rows[1, N - 1] = rows[2, 3] = 1.0
-    found = estimate_delays(rows, PLAN, method)
-    assert found is None or found.ambiguity > 0.9 or found.closure > 5e-6
+    assert estimate_delays(rows, PLAN, method) is None
+    # The same impulses within the time that sound takes across the row.
+    rows[1] = np.roll(rows[1], 61)
+    delays = measured(rows, method).tau * FS
+    assert delays == pytest.approx([60.0, 3.0], abs=0.01)
 
 
 @pytest.mark.parametrize("method", METHODS)
 def test_tone_is_ambiguous(method):
     """Its correlation has a peak every period, 12.2 samples at 8.19 kHz."""
     tone = np.sin(2 * np.pi * 8_190.0 * np.arange(5000) / FS)
-    found = estimate_delays(
-        noisy(shifted(tone, (0, 17.3, 30.1)), 30.0, 2), PLAN, method
-    )
-    assert found is None or found.ambiguity > 0.9
+    found = measured(noisy(shifted(tone, (0, 17.3, 30.1)), 30.0, 2), method)
+    assert found.ambiguity > 0.9
 
 
 def test_scatter_is_at_the_cramer_rao_bound():

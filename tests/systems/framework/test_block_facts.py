@@ -10,6 +10,8 @@ from pydrake.systems.primitives import Gain
 from diagrams import build_sound_follower, load_scenario
 from systems.framework.block_facts import BlockFacts, block_facts
 
+pytestmark = pytest.mark.drake
+
 BUILDS = (
     ["hearing=audio", "loudspeaker={}"],
     ["hearing=ideal", "ultrasonic.firing=sequential"],

@@ -32,6 +32,8 @@ from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters, SoundParameters
 from systems.sound.sound_emitter import make_emission
 
+pytestmark = pytest.mark.drake
+
 NOT_FINITE = (math.nan, math.inf, -math.inf)
 # Each once as it is, and in each way that reads its ports differently.
 BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
@@ -130,22 +132,28 @@ def injections(block: Any, level: float) -> Iterator[tuple[Any, str, Any]]:
                 yield context, f"{port.get_name()}{element}", bad
 
 
-def exercise(block: Any, context: Any) -> None:
-    """All that a block ever computes: outputs, updates, derivatives."""
+def exercise(block: Any, context: Any) -> int:
+    """All that a block ever computes: outputs, updates, derivatives.
+
+    Returns:
+        How many outputs there are.
+    """
     for k in range(block.num_output_ports()):
         block.get_output_port(k).Eval(context)
     if context.num_continuous_states():
         block.EvalTimeDerivatives(context)
-        return
+        return block.num_output_ports()
     scalar = AutoDiffXd if isinstance(block, LeafSystem_[AutoDiffXd]) else float
     Simulator_[scalar](block, context).AdvanceTo(1e-3)
+    return block.num_output_ports()
 
 
 def swallowed(block: Any, name: str) -> list[str]:
     """What the block takes without a word, or with words that do not say what."""
-    silent = []
+    silent, tried = [], 0
     for level in (0.0, 1.0):
         for context, place, bad in injections(block, level):
+            tried += 1
             start = f"{name}: {place} is {bad} at 0 s, "
             try:
                 exercise(block, context)
@@ -153,6 +161,9 @@ def swallowed(block: Any, name: str) -> list[str]:
                 if str(error).startswith(start) and len(str(error)) <= 300:
                     continue
             silent.append(f"{place} = {bad} among {level}")
+    ports = [block.get_input_port(i) for i in range(block.num_input_ports())]
+    numbers = [port for port in ports if port.get_name() != "free_space"]
+    assert tried >= 2 * len(NOT_FINITE) * len(numbers)
     return silent
 
 
@@ -184,7 +195,7 @@ def test_what_is_finite_passes(name: str, config: Any) -> None:
         for i in range(block.num_input_ports()):
             port = block.get_input_port(i)
             fix(block, context, port, good_value(port, level))
-        exercise(block, context)
+        assert exercise(block, context) > 0
 
 
 @pytest.mark.parametrize("read", [read_lists, read_arrays])

@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pydrake.math
 import pytest
-from hypothesis import example, given
-from hypothesis import strategies as st
+from hypothesis import example, given, strategies as st
 from pydrake.autodiffutils import AutoDiffXd
 
 from systems.framework import scalar_math
+
+pytestmark = pytest.mark.drake
 
 NAMES = ("cos", "sin", "exp", "sqrt")
 

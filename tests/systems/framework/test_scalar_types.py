@@ -11,6 +11,8 @@ from pydrake.systems.framework import LeafSystem_
 
 from systems.framework.scalar_types import define_for_scalars
 
+pytestmark = pytest.mark.drake
+
 
 def test_classes_are_made_without_a_search_and_convert(monkeypatch):
     def search(*_, **__):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from analysis.searching.bearing_trials import BearingTrial, hear_once
+from studies.support.bearing_trials import BearingTrial, hear_once
 from systems.base.robot import RobotParameters
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame

@@ -6,13 +6,14 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from systems.base.robot import RobotParameters
 from systems.hearing.ideal_source_sensor import IdealSourceSensor, relative_position
 from systems.hearing.parameters import IdealHearingParameters
 from systems.sound.parameters import SoundParameters
+
+pytestmark = pytest.mark.drake
 
 ALWAYS = IdealHearingParameters(burst_gaps=False)
 place = st.floats(-5.0, 5.0)

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from numpy.random import Generator, Philox
 
 from systems.delays.delay_search import weakest_sound
@@ -155,6 +154,7 @@ def test_the_louder_image_in_a_wall_is_not_the_source():
     """
     place, image = polar(30.0, 1.5), np.array([1.3, -2.25])
     localiser, unaware = listener(), listener(suppress_echoes=False)
+    places_of_the_unaware = 0
     for seed in range(20):
         frame = heard(
             ROW, [place, image], gains=(1.0, 2.0), seed=seed, snr_db=30.0, begin=N + 100
@@ -163,7 +163,10 @@ def test_the_louder_image_in_a_wall_is_not_the_source():
         assert fix is not None
         assert fix.bearing == pytest.approx(math.radians(30.0), abs=math.radians(1.0))
         other, _ = unaware.localise(frame, unaware.blank())
-        assert other is None or abs(math.degrees(other.bearing) - 30.0) > 30.0
+        if other is not None:
+            places_of_the_unaware += 1
+            assert abs(math.degrees(other.bearing) - 30.0) > 30.0
+    assert places_of_the_unaware == 1
 
 
 def test_a_sound_that_two_of_three_hear_yet_is_no_place():
@@ -327,7 +330,7 @@ def test_a_silent_or_foreign_channel_gives_no_place(name, method):
             frame[k] = channel
             fix, memory = localiser.localise(frame, localiser.blank())
             assert fix is None
-            assert memory.echoes is None or np.isfinite(memory.echoes).all()
+            assert memory.echoes is None
             assert math.isfinite(memory.noise_energy)
 
 
@@ -339,9 +342,11 @@ def test_an_inverted_channel_gives_no_wrong_place(name):
         place = polar(-60.0 + 25.0 * seed, 1.5)
         for k in range(shape.count):
             frame = heard(shape, [place], seed=seed)
+            right, _ = localiser.localise(frame, localiser.blank())
+            assert right is not None
             frame[k] *= -1.0
-            fix, _ = localiser.localise(frame, localiser.blank())
-            assert fix is None or off(fix, place) < 29.0
+            inverted, _ = localiser.localise(frame, localiser.blank())
+            assert inverted is None
 
 
 @pytest.mark.parametrize("name", SHAPES)
@@ -358,10 +363,33 @@ def test_clipping_costs_little(name, limit):
         assert fix.bearing == pytest.approx(math.radians(25.0), abs=math.radians(0.2))
 
 
-@pytest.mark.parametrize("pair", [(0, 1), (0, 3), (1, 2), (2, 3)])
-def test_exchanged_neighbours_of_four_give_no_wrong_place(pair):
+@pytest.mark.parametrize(
+    ("pair", "taken_for_places"), [((0, 1), 0), ((0, 3), 0), ((1, 2), 1), ((2, 3), 0)]
+)
+def test_exchanged_neighbours_of_four_give_no_wrong_place(pair, taken_for_places):
     """Opposite ones mirror the array, which nothing tells."""
     localiser = listener(SQUARE)
+    errors = []
+    for seed in range(12):
+        place = polar(-165.0 + 30.0 * seed, 1.5)
+        frame = heard(SQUARE, [place], seed=seed)
+        right, _ = localiser.localise(frame, localiser.blank())
+        assert right is not None
+        frame[list(pair)] = frame[list(pair[::-1])]
+        fix, _ = localiser.localise(frame, localiser.blank())
+        if fix is not None:
+            errors.append(
+                math.remainder(fix.bearing - math.atan2(*place[::-1]), math.tau)
+            )
+    assert len(errors) == taken_for_places
+    assert max(map(abs, errors), default=0.0) < math.radians(5.0)
+
+
+@pytest.mark.parametrize("pair", [(0, 3), (1, 2)])
+def test_delays_that_do_not_fit_together_betray_exchanged_neighbours(pair):
+    """Without that check the frames of the test above give bearings that are off."""
+    localiser = listener(SQUARE, maximum_closure_s=1.0, maximum_misfit=1.0)
+    wrong = 0
     for seed in range(12):
         place = polar(-165.0 + 30.0 * seed, 1.5)
         frame = heard(SQUARE, [place], seed=seed)
@@ -369,7 +397,8 @@ def test_exchanged_neighbours_of_four_give_no_wrong_place(pair):
         fix, _ = localiser.localise(frame, localiser.blank())
         if fix is not None:
             error = math.remainder(fix.bearing - math.atan2(*place[::-1]), math.tau)
-            assert abs(error) < math.radians(5.0)
+            wrong += abs(error) > math.radians(5.0)
+    assert wrong >= 3
 
 
 def test_noise_puts_no_source_at_a_tiny_array():

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from systems.hearing.near_field import locate_in_row, source_from_delays
 from systems.sound.array_shape import EqualRow

@@ -1,4 +1,4 @@
-"""docs/extending.md is true: a law is its own file, a place in the list, and a schema.
+"""docs/your_law.md is true: a law is its own file, a place in the list, and a schema.
 
 A tree of links to ours, in which the page's law is added, answers for every list.
 """
@@ -37,9 +37,9 @@ from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_page import stability_page
 from diagrams import build_sound_follower, load_scenario
 from diagrams.fields.shipped import SCHEMA_FILE
-from diagrams.scenario_schema import make_schema, schema_file_text
+from tools.scenario_schema import make_schema, schema_file_text
 
-# As docs.tables.schemas does.
+# As tools.schemas does.
 SCHEMA_FILE.write_text(schema_file_text(make_schema()), "utf-8")
 
 
@@ -77,16 +77,16 @@ print(json.dumps({
 
 def page_code() -> str:
     """The file that the page shows."""
-    page = (ROOT / "docs/extending.md").read_text("utf-8")
-    found = re.search(r"(?ms)^```python\n(.*?)^```$", page)
-    assert found
-    return found[1]
+    page = (ROOT / "docs/your_law.md").read_text("utf-8")
+    codes = re.findall(r"(?ms)^```python\n(.*?)^```$", page)
+    (code,) = (code for code in codes if "GAUSSIAN" in code)
+    return code
 
 
 def add_law(tree: Path) -> None:
     """Ours by links, but for the room of the laws: that is a copy with one more."""
     tree.mkdir()
-    for name in ("analysis", "phonotaxis"):
+    for name in ("analysis", "phonotaxis", "tools"):
         (tree / name).symlink_to(ROOT / name)
     own = {"laws", "__pycache__", "scenario.schema.json"}
     for package in ("systems", "diagrams"):

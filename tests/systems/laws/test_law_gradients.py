@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from pydrake.autodiffutils import ExtractGradient, InitializeAutoDiff
 
 from systems import (
@@ -29,6 +28,8 @@ from systems.laws.parameters import (
     ConventionalParameters,
 )
 from systems.laws.repulsion import RepulsionParameters
+
+pytestmark = pytest.mark.drake
 
 #: Nearer than this to a kink a law has two derivatives, m or m/s.
 KINK = 1e-6

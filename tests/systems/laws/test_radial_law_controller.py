@@ -14,6 +14,8 @@ from systems.laws.parameters import ConventionalParameters
 from systems.laws.radial_law_controller import RadialLawController
 from systems.laws.repulsion import RepulsionParameters
 
+pytestmark = pytest.mark.drake
+
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]
 REPULSION = RepulsionParameters(conventional=ConventionalParameters(stiffness_n_m=7.0))
 

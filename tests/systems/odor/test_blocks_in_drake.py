@@ -22,6 +22,8 @@ from systems.odor.parameters import (
 )
 from systems.odor.wind import WIND_SIZE, WindField
 
+pytestmark = pytest.mark.drake
+
 POSE = (1.5, 0.1, 3.0)
 TICK_S = 0.025
 NOTHING = np.empty(0)

@@ -65,6 +65,7 @@ def test_their_mean_over_fifty_minutes_is_equation_6():
     np.testing.assert_allclose(got, expected, rtol=0.15)
 
 
+@pytest.mark.long
 def test_half_the_period_changes_no_mean_by_a_twentieth():
     """Every 0.1 s and every 0.05 s, with other random numbers, over four runs each."""
     runs = [

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from numba import njit
 
-from systems.radio import Frame, RadioChannel, RadioParameters, RadioRange, SinkMonitor
-from systems.radio.codec import FRAMES_SIZE, encode_frame
-from systems.radio.radio_channel import AIR_SIZE
-from systems.radio.radio_range import radio_distance, radio_level
+from systems.radio.codec import FRAMES_SIZE, Frame, encode_frame
+from systems.radio.parameters import RadioParameters
+from systems.radio.radio_channel import AIR_SIZE, RadioChannel
+from systems.radio.radio_range import RadioRange, radio_distance, radio_level
+from systems.radio.sink_monitor import SinkMonitor
 from systems.radio.stream import StreamParser
 
 

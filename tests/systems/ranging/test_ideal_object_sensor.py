@@ -112,7 +112,7 @@ def test_late_by_the_latency():
     at_once, late = seen(bodies, 8), seen(bodies, 8, latency_s=0.075)
     np.testing.assert_array_equal(late[3:], at_once[:-3])
     assert not late[:3].any()
-    with pytest.raises(InputError, match=r"latency_s: 0\.03 s is no multiple"):
+    with pytest.raises(InputError, match=r"latency_s: 0\.03 s is not a multiple"):
         seen(bodies, latency_s=0.03)
 
 

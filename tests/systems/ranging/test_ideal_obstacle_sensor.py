@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from systems.base.robot import RobotParameters
 from systems.ranging.ideal_obstacle_sensor import IdealObstacleSensor, nearest_vectors

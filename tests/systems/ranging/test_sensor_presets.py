@@ -176,7 +176,7 @@ def test_a_sweep_goes_through_presets(tmp_path):
 )
 def test_a_sweep_whose_preset_would_drop_what_is_set_is_refused(fixed):
     plan = {"set": fixed, "grid": {"ultrasonic.preset": ["three", "six"]}}
-    what = r"grid\.ultrasonic\.preset: begins ultrasonic anew"
+    what = r"grid\.ultrasonic\.preset: replaces all of ultrasonic"
     with pytest.raises(ValidationError, match=what):
         SweepPlan.model_validate(plan)
 

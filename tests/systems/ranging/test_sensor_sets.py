@@ -127,15 +127,15 @@ def test_a_ring_runs(firing):
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
-        ({"axes_deg": 0}, "0 sensors; take 1 to 360"),
+        ({"axes_deg": 0}, "0 sensors; use 1 to 360"),
         ({"axes_deg": 361}, "361 sensors"),
         ({"axes_deg": ()}, "at least 1 item"),
         ({"axes_deg": (30.0, 30.0)}, "must fall from left to right"),
         ({"axes_deg": (180.0, 0.0, -180.0)}, "is a turn or more"),
-        ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 places for 2"),
+        ({"axes_deg": (10.0, -10.0), "positions_m": ((0, 0),) * 3}, "3 positions for"),
         ({"preset": "five"}, "'ring_8', 'ring_12', 'lidar' or 'scan_7'"),
         ({"preset": ["six"]}, "'three', 'six'"),
-        ({"preset": "six", "axes_deg": 8}, "6 places for 8 sensors"),
+        ({"preset": "six", "axes_deg": 8}, "6 positions for 8 sensors"),
     ],
 )
 def test_bad_sets(fields, message):

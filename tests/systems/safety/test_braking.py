@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from systems.base.diff_drive_plant import PlantNumbers, plant_derivatives
+from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.safety.braking import (
@@ -27,6 +28,7 @@ from systems.safety.braking import (
     roll_on,
 )
 from systems.safety.free_space import clear_disc, make_free_space
+from systems.safety.views import IN_PLACE_M, REST_M, tick_parts, unseen_approach
 
 RADIUS = 0.5 * math.hypot(0.35, 0.82)
 WHEEL_M, AXLE_M, LAG_S, TICK_S = 0.06, 0.41, 0.05, 0.025
@@ -37,6 +39,7 @@ NUMBERS = BrakingNumbers(
     braking_m_s2=1.5,
     tick_s=TICK_S,
     parts=1,
+    part=lagged_motion(TICK_S, LAG_S),
     top_wheel_speed=12.0,
     keep_m=RADIUS + 0.012,
     least_m=RADIUS + 0.009,
@@ -80,7 +83,7 @@ def wall_at(distance: float) -> Danger:
 
 
 def test_the_foreseen_tick_is_that_of_the_plant():
-    """Speeds to rounding; places to 0.07 mm a tick at full turns, headings exactly."""
+    """Speeds, places and headings, to the accuracy of the integration by SciPy."""
     draw = np.random.default_rng(0)
     worst = 0.0
     for _ in range(200):
@@ -90,14 +93,14 @@ def test_the_foreseen_tick_is_that_of_the_plant():
             draw.uniform(-12, 12, 2),
         )
         end = by_the_plant(np.array([*pose, 0.0, 0.0, *speeds]), commanded)[:, -1]
-        moved, after = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
+        moved, after = roll_on(pose, speeds, commanded, NUMBERS)
         np.testing.assert_allclose(after, end[5:], atol=1e-8)
         assert moved[2] == pytest.approx(end[2], abs=1e-8)
         worst = max(worst, math.dist(moved[:2], end[:2]))
-    assert worst < 7e-5
+    assert worst < 1e-9
 
 
-def test_a_whole_braking_is_foreseen_to_a_fifth_of_a_millimetre():
+def test_a_whole_braking_is_foreseen_to_rounding():
     """From speeds that a guard lets be: as commanded a tick ago."""
     draw = np.random.default_rng(1)
     worst = 0.0
@@ -108,11 +111,11 @@ def test_a_whole_braking_is_foreseen_to_a_fifth_of_a_millimetre():
         pose: Any = (0.0, 0.0, 0.0)
         for _ in range(30):
             state = by_the_plant(state, commanded)[:, -1]
-            pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
+            pose, speeds = roll_on(pose, speeds, commanded, NUMBERS)
             worst = max(worst, math.dist(pose[:2], state[:2]))
             commanded = braked(commanded, NUMBERS)
         assert commanded == (0.0, 0.0)
-    assert worst < 2e-4
+    assert worst < 1e-8
 
 
 @pytest.mark.parametrize("speed", [0.05, 0.3, 0.6, 0.72])
@@ -124,10 +127,10 @@ def test_braking_takes_the_closed_form_way(speed, braking):
     ticks = 0
     while commanded != (0.0, 0.0):
         commanded = braked(commanded, numbers)
-        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, numbers)
         ticks += 1
     for _ in range(100):
-        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, numbers)
     assert abs(ticks - speed / (braking * TICK_S)) < 1.001
     steps = np.arange(1, 100)
     sums = np.maximum(speed - steps * braking * TICK_S, 0.0).sum() * TICK_S
@@ -167,7 +170,7 @@ def nearest_on_the_way(
 def test_what_can_be_braked_is_what_a_finer_simulation_brakes():
     """Cells at random; decisions that hang on half a millimetre are left out."""
     draw, judged = np.random.default_rng(4), {True: 0, False: 0}
-    for _ in range(250):
+    for _ in range(120):
         speeds, commanded = draw.uniform(-12, 12, (2, 2))
         angle, far = draw.uniform(0, math.tau, 6), draw.uniform(0.5, 1.0, 6)
         cells = np.column_stack([far * np.cos(angle), far * np.sin(angle)]) - 0.025
@@ -182,7 +185,7 @@ def test_what_can_be_braked_is_what_a_finer_simulation_brakes():
         )
         assert found == (least >= NUMBERS.keep_m)
         judged[found] += 1
-    assert min(judged.values()) > 30, judged
+    assert min(judged.values()) > 10, judged
 
 
 @pytest.mark.parametrize(
@@ -253,7 +256,7 @@ def test_where_cells_are_too_near_no_point_of_one_comes_nearer():
         points = (corners[:, None, None] + grid).reshape(-1, 2)
         pose, speeds, commanded = (0.0, 0.0, 0.0), rest, tuple(wish)
         for _ in range(60):
-            pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
+            pose, speeds = roll_on(pose, speeds, commanded, NUMBERS)
             commanded = braked(commanded, NUMBERS)
             now = np.hypot(*(points - pose[:2]).T)
             nearer = now < np.hypot(*points.T) - 2e-4
@@ -287,10 +290,50 @@ def test_a_long_tick_is_looked_at_in_parts():
     assert not can_be_braked(*args, numbers._replace(parts=40))
 
 
+@pytest.mark.parametrize(
+    ("tick_s", "lag"), [(0.025, 0.05), (0.05, 0.05), (0.025, 0.02)]
+)
+def test_between_two_looks_the_axle_comes_nearer_by_less_than_the_bound(tick_s, lag):
+    """Any wheel speeds and commands, and points that both ends are far enough from.
+
+    The bound also has 0.25 mm of coasting after the last look.
+    """
+    bound = unseen_approach(RobotParameters(), PlantParameters(motor_lag_s=lag), tick_s)
+    bound -= REST_M + IN_PLACE_M
+    part_s, steps, draw, worst = (
+        tick_s / tick_parts(tick_s),
+        25,
+        np.random.default_rng(4),
+        0.0,
+    )
+    turns = np.linspace(0.0, math.tau, 720, endpoint=False)
+    ring = RADIUS * np.column_stack([np.cos(turns), np.sin(turns)])
+    short = NUMBERS._replace(motor_lag_s=lag, part=lagged_motion(part_s / steps, lag))
+    trials = draw.uniform(-12.0, 12.0, (400, 4))
+    # Straight on and reversed, from speeds around the one that just comes back.
+    trials[:100, 1], trials[:100, 2:] = (
+        trials[:100, 0],
+        -12.0 * np.sign(trials[:100, :1]),
+    )
+    for left, right, *commanded in trials:
+        pose, speeds, places = (0.0, 0.0, 0.0), (left, right), [(0.0, 0.0)]
+        for _ in range(steps):
+            pose, speeds = roll_on(pose, speeds, tuple(commanded), short)
+            places.append(pose[:2])
+        path = np.array(places)
+        points = np.concatenate([ring, ring + path[-1]])
+        ends = np.minimum(np.hypot(*points.T), np.hypot(*(points - path[-1]).T))
+        points = points[ends >= RADIUS - 1e-12]
+        nearest = np.hypot(*np.moveaxis(points[:, None] - path, -1, 0)).min()
+        worst = max(worst, RADIUS - nearest)
+    assert worst <= bound
+    assert worst > 0.7 * bound
+
+
 @pytest.mark.parametrize("lag", [0.05, 1.0])
 def test_at_rest_no_way_is_left(lag):
     """What is cut off after the last look is a fifth of a millimetre, at any lag."""
-    numbers = NUMBERS._replace(motor_lag_s=lag)
+    numbers = NUMBERS._replace(motor_lag_s=lag, part=lagged_motion(TICK_S, lag))
     way = 0.1 * (TICK_S + 2.0 * lag)
     for ahead in np.arange(0.0, way, 5e-4):
         at_hand = wall_at(NUMBERS.keep_m + ahead)
@@ -299,7 +342,7 @@ def test_at_rest_no_way_is_left(lag):
             break
     commanded, speeds, pose = straight(0.1), straight(0.1), (0.0, 0.0, 0.0)
     for _ in range(int(20.0 * lag / TICK_S) + 100):
-        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, numbers)
+        pose, speeds = roll_on(pose, speeds, commanded, numbers)
         commanded = braked(commanded, numbers)
     assert pose[0] <= ahead + 2.1e-4
 
@@ -322,7 +365,7 @@ def press(wish: Any, ticks: int, error_m: float = 0.0, seed: int = 0) -> float:
         _, commanded = chosen(
             pose, speeds, wish(tick, pose), commanded, at_hand, NUMBERS
         )
-        pose, speeds = roll_on(pose, speeds, commanded, TICK_S, NUMBERS)
+        pose, speeds = roll_on(pose, speeds, commanded, NUMBERS)
         off = draw.uniform(-error_m, error_m, 2)
         pose = pose[0] + off[0], pose[1] + off[1], pose[2]
     return least - RADIUS

@@ -26,12 +26,12 @@ from systems.safety.free_space import (
     nearest_cell,
     see,
 )
-from systems.safety.views import lasting, sensor_sectors
+from systems.safety.views import PlaceError, lasting, place_error, sensor_sectors
 from systems.world.geometry import fan_ranges
 
 CONTROL_POINT_M = 0.175
 CELL_M = 0.05
-NO_DRIFT = (0.0, 0.0, 0.41)
+EXACT = PlaceError(0.0, 0.0, 0.41, 0.0)
 BEHIND = ((0, 0), (0, 0), (0, 0), (-0.35, 0), (-0.35, 0), (-0.35, 0))
 SETS: dict[str, dict[str, Any]] = {
     "the papers' three": {},
@@ -70,7 +70,7 @@ def seen_space(
     readings = np.column_stack([free, np.full(sensors.count, np.inf)])
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
     for tick in range(4):
-        see(space, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+        see(space, 0.0, tick, pose, sectors, readings, EXACT)
     return space
 
 
@@ -212,10 +212,10 @@ def test_every_fourth_row_at_a_tick():
     whole = make_free_space(160, CELL_M, 3, 17)
     for tick in range(4):
         space = make_free_space(160, CELL_M, 3, 17)
-        see(space, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+        see(space, 0.0, tick, pose, sectors, readings, EXACT)
         cells = free_cells(space)
         assert {(i - tick) % 4 for i, _ in cells} == {0}
-        see(whole, 0.0, tick, pose, sectors, readings, NO_DRIFT)
+        see(whole, 0.0, tick, pose, sectors, readings, EXACT)
         assert free_cells(whole) >= cells
 
 
@@ -226,13 +226,13 @@ def test_an_echo_is_counted_where_it_came_from_until_the_cell_is_seen_free():
     pose = np.zeros(3)
     readings = np.array([[0.0, np.inf], [1.18, 1.2], [0.0, np.inf]])
     for tick in range(8):
-        see(space, 0.1 * tick, tick, pose, sectors, readings, NO_DRIFT)
+        see(space, 0.1 * tick, tick, pose, sectors, readings, EXACT)
     i = math.floor((CONTROL_POINT_M + 1.2) / CELL_M)
     assert 0.9 < space.hits[i, 0] <= 2.0
     assert not cell_is_free(space, i, 0, 0.0)
     readings[1] = 2.0, np.inf
     for tick in range(4):
-        see(space, 1.0, tick, pose, sectors, readings, NO_DRIFT)
+        see(space, 1.0, tick, pose, sectors, readings, EXACT)
     assert space.hits[i, 0] == 0.0
     assert space.seen_s[i, 0] == 1.0
     assert cell_is_free(space, i, 0, 1e9)
@@ -325,38 +325,47 @@ def test_an_edge_that_is_longer_than_the_list_is_counted_all_the_same():
     np.testing.assert_array_equal(short, whole[:5])
 
 
-@pytest.mark.parametrize("error", [1e-3, 0.01, 0.1])
+@pytest.mark.parametrize("pulse_m", [0.0, 1.45e-4])
+@pytest.mark.parametrize("error", [0.0, 1e-3, 0.01, 0.1])
 @pytest.mark.parametrize("distance", [0.1, 1.0, 3.0])
-def test_a_place_lasts_as_long_as_its_error_is_small_enough(error, distance):
-    """e s + 2 e s/L (d + s) reaches what is allowed, found by bisection."""
-    allowed, separation = 0.03, 0.41
+def test_a_place_lasts_as_long_as_its_error_is_small_enough(error, distance, pulse_m):
+    """The way at which the largest error is what is allowed, found by bisection."""
+    allowed = PlaceError(error, pulse_m, 0.41, allowed_m=0.03)
 
     def excess(way: float) -> float:
-        turned = 2.0 * error * way / separation
-        return error * way + turned * (distance + way) - allowed
+        by_wheels = error * way + 2.0 * error * way / 0.41 * (distance + way)
+        by_pulses = pulse_m * (way + distance) / 0.41 + pulse_m
+        assert place_error(distance, way, allowed) == pytest.approx(
+            by_wheels + by_pulses, rel=1e-12
+        )
+        return by_wheels + by_pulses - 0.03
 
-    expected = brentq(excess, 0.0, 100.0, xtol=1e-13)
-    found = lasting(distance, (error, allowed, separation))
-    assert found == pytest.approx(expected, rel=1e-9)
+    found = lasting(distance, allowed)
+    if error == pulse_m == 0.0:
+        assert found == math.inf
+    else:
+        expected = brentq(excess, 0.0, 200.0, xtol=1e-13)
+        assert found == pytest.approx(expected, rel=1e-9)
 
 
-def test_without_wheel_errors_a_place_lasts_for_ever():
-    assert lasting(2.0, (0.0, 0.0, 0.41)) == math.inf
+def test_what_is_known_too_badly_from_the_start_does_not_last():
+    assert lasting(2.0, PlaceError(0.0, 1.45e-4, 0.41, allowed_m=8e-4)) == -math.inf
 
 
 def test_cells_count_as_long_as_their_distance_from_the_axle_allows():
     sensors = sensors_of("the papers' three")
     sectors = sensor_sectors(sensors, CONTROL_POINT_M)
-    space, drift = make_free_space(160, CELL_M, 3, 17), (0.01, 0.03, 0.41)
+    space = make_free_space(160, CELL_M, 3, 17)
+    error = PlaceError(0.01, 0.0, 0.41, allowed_m=0.03)
     space.facts[0, ROLLED] = 5.0
     readings = np.array([[2.0, np.inf]] * 3)
     for tick in range(4):
-        see(space, 0.0, tick, np.zeros(3), sectors, readings, drift)
+        see(space, 0.0, tick, np.zeros(3), sectors, readings, error)
     for i, j in free_cells(space):
         far = math.hypot((i + 0.5) * CELL_M, (j + 0.5) * CELL_M)
-        until = 5.0 + lasting(far, drift)
+        until = 5.0 + lasting(far, error)
         assert space.free_until[i % 160, j % 160] <= until + 1e-12
-        later = 5.0 + lasting(far + 2.0 * CONTROL_POINT_M, drift)
+        later = 5.0 + lasting(far + 2.0 * CONTROL_POINT_M, error)
         assert space.free_until[i % 160, j % 160] >= later - 1e-12
 
 

@@ -9,14 +9,19 @@ from typing import Any
 import numpy as np
 import pytest
 
-from diagrams import InputError, Scenario, load_scenario, simulate
+from diagrams import Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelSpeedCommand
+from systems.base.parameters import OdometryParameters
 from systems.base.robot import body_radius
+from systems.framework.input_error import InputError
 from systems.framework.step_block import RunFacts
 from systems.safety.braking import HALTED
 from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
 from systems.safety.free_space_map import map_step
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.safety.views import PlaceError, lasting
+
+pytestmark = pytest.mark.drake
 
 OWN_LAWS = """
 import math
@@ -134,7 +139,6 @@ def test_a_least_margin_above_the_margin_is_refused():
         ({"cell_m": 0.005, "window_m": 30.0}, "window_m"),
         ({"start_bubble_m": 0.5}, "start_bubble_m"),
         ({"window_m": 3.9}, "window_m"),
-        ({"wheel_error": 0.01}, "place_error_m"),
     ],
 )
 def test_a_memory_that_cannot_serve_is_refused(fields, field):
@@ -155,6 +159,8 @@ def test_a_memory_that_cannot_serve_is_refused(fields, field):
             ["free_space.wheel_error=0.02", "free_space.place_error_m=0.02"],
             "free_space.place_error_m",
         ),
+        (["free_space.place_error_m=0"], "free_space.place_error_m"),
+        (["odometry.pulses_per_revolution=30"], "free_space.place_error_m"),
     ],
 )
 def test_a_guard_that_could_not_serve_is_refused(overrides, field):
@@ -163,17 +169,26 @@ def test_a_guard_that_could_not_serve_is_refused(overrides, field):
     assert error.value.field == field
 
 
+EXACT = OdometryParameters(rounding=False)
+BLIND = [0.03] * 3, [1.0] * 3, [0.0] * 3
+STILL = (0.0, 0.0)
+
+
+def space_map(**given: Any) -> Any:
+    """The numbers of a map whose steps are called by hand."""
+    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta5", 0.0125, len, {})
+    return FreeSpaceMap(**given).step_for(run).numbers
+
+
 def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     """Of the bubble, 1 m: 0.02 s + 0.04 s (1 + s)/0.41 = 0.03, solved by hand."""
     known = FreeSpaceParameters(wheel_error=0.02, place_error_m=0.03)
-    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta3", 0.025, len, {})
-    numbers = FreeSpaceMap(parameters=known).step_for(run).numbers
-    blind = [0.03] * 3, [1.0] * 3, [0.0] * 3
+    numbers = space_map(parameters=known, odometry=EXACT)
     b = 0.02 + 0.04 / 0.41
     lasts = (math.sqrt(b * b + 4.0 * 0.03 * 0.04 / 0.41) - b) / (2.0 * 0.04 / 0.41)
     for tick in range(100):
         way = 0.004 * tick
-        map_step(tick, (), (*blind, (way, 0.0, 0.0)), (), numbers)
+        map_step(tick, (), (*BLIND, (way, 0.0, 0.0), STILL), (), numbers)
         assert numbers.space.facts[0, ROLLED] == pytest.approx(way)
         behind = cell_is_free(numbers.space, -14, 0, way)
         assert behind == (way <= lasts)
@@ -188,14 +203,43 @@ def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     [((0.1, 0.0, 0.0), 0.1), ((0.0, 0.0, -0.4), 0.4 * 0.205), ((0.1, 0, 0.4), 0.1)],
 )
 def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
-    """(|v + w| + |v - w|)/2 = max(|v|, |w|), with w of half the turn's rim."""
-    run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta3", 0.025, len, {})
-    numbers = FreeSpaceMap().step_for(run).numbers
-    blind = [0.03] * 3, [1.0] * 3, [0.0] * 3
+    """(|v + w| + |v - w|)/2 = max(|v|, |w|), with w of half the turn's rim.
+
+    A way is counted as an arc's whose chord is given, and 5 % more at most.
+    """
+    numbers = space_map(odometry=EXACT)
+    arc = 1.0 if motion[2] == 0.0 else 0.2 / math.sin(0.2)
+    longer = arc if rolled == 0.1 else 1.0
     for tick in range(4):
         pose = tuple(tick * each for each in motion)
-        map_step(tick, (), (*blind, pose), (), numbers)
-    assert numbers.space.facts[0, ROLLED] == pytest.approx(3.0 * rolled)
+        map_step(tick, (), (*BLIND, pose, STILL), (), numbers)
+    found = numbers.space.facts[0, ROLLED]
+    assert 3.0 * rolled * longer - 1e-12 <= found <= 3.0 * rolled * longer * 1.05
+
+
+def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command():
+    """q = 0.145 mm; at least 0.083 of 25 ms at the faster wheel's command."""
+    numbers, pulse = space_map(), 0.06 * math.tau / 2600
+    least = (2.0 / (1.0 - math.exp(-0.5)) - 4.0 - 1.0) * 0.06 * 0.025
+    ways = [(0.01, 0.01, 5.0), (0.01, 0.01, -12.0), (0.0, 0.0, 0.0)]
+    ways += [(0.0, 12.0 * least, 12.0), (0.0, 6.0 * least, -6.0)]
+    x, tick = 0.0, 0
+    map_step(tick, (), (*BLIND, (x, 0.0, 0.0), STILL), (), numbers)
+    for moved, counted, command in ways:
+        before, x, tick = numbers.space.facts[0, ROLLED], x + moved, tick + 1
+        commanded = (command, -0.5 * command)
+        map_step(tick, (), (*BLIND, (x, 0.0, 0.0), commanded), (), numbers)
+        found = numbers.space.facts[0, ROLLED] - before
+        assert found == pytest.approx(counted + 0.5 * pulse, abs=1e-12)
+
+
+def test_by_the_encoders_of_the_papers_robot_a_cell_is_known_for_14_m():
+    """(q/L) (s + d) + q = 6 mm at d = 2 m, with pulses of q = 0.145 mm at the rim."""
+    pulse = 0.06 * math.tau / 2600
+    error = PlaceError.of(FreeSpaceParameters(), Scenario().robot, OdometryParameters())
+    expected = (0.006 - pulse) * 0.41 / pulse - 2.0
+    assert lasting(2.0, error) == pytest.approx(expected)
+    assert 14.0 < expected < 15.0
 
 
 GUARD = "guard={}"

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from systems.radio import StreamParser
-from systems.search import PlumeSearch, PlumeSearchParameters
+from systems.radio.stream import StreamParser
+from systems.search.parameters import PlumeSearchParameters
+from systems.search.plume_search import PlumeSearch
 from systems.search.search_ending import (
     FOUND,
     NO_NOSE,

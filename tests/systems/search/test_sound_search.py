@@ -7,10 +7,11 @@ from typing import Any
 
 import pytest
 
-from systems.radio import Frame, StreamParser, encode_frame
+from systems.radio.codec import Frame, encode_frame
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.radio_range import radio_level
-from systems.search import SoundSearch, SoundSearchParameters
+from systems.radio.stream import StreamParser
+from systems.search.parameters import SoundSearchParameters
 from systems.search.search_ending import (
     AMBIGUOUS,
     CALLER_LOST,
@@ -22,6 +23,7 @@ from systems.search.search_ending import (
     UNDECIDED,
     fault_names,
 )
+from systems.search.sound_search import SoundSearch
 
 OWN = {"noise_s": 0.1, "listen_s": 0.2, "compute_s": 0.3, "move_s": 0.5}
 CALL, LOST = Frame(1, 12, 1.0), Frame(1, 12, 0.0)

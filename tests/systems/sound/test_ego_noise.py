@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 import scipy.signal
 import soundfile
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from pydrake.common.value import Value
 
 from systems.base.robot import RobotParameters

@@ -8,8 +8,7 @@ import numpy as np
 import pyroomacoustics as pra
 import pytest
 import scipy.signal
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
 from systems.framework.input_error import InputError

@@ -22,6 +22,8 @@ from systems.sound.sound_emitter import (
 )
 from systems.sound.waveforms import make_waveform
 
+pytestmark = pytest.mark.drake
+
 FS = 100_000
 
 

@@ -196,3 +196,9 @@ def test_rate_below_twice_the_band_is_refused(tmp_path):
 def test_bad_parameters(fields, complaint):
     with pytest.raises(ValidationError, match=complaint):
         SoundParameters(**fields)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_file_that_would_not_be_played_is_refused(kind):
+    with pytest.raises(ValidationError, match=f"'bell.wav' is not used by .* {kind}"):
+        SoundParameters(kind=kind, file="bell.wav")

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, given, strategies as st
 from numpy.typing import NDArray
 from pydrake.autodiffutils import AutoDiffXd
 
@@ -17,6 +16,7 @@ from systems.world.geometry import (
     contact_time,
     control_point,
     control_point_velocity,
+    first_overlap,
     nearest_point_on_rectangle,
     rectangle_clearance,
     rectangle_corners,
@@ -288,3 +288,67 @@ def test_contact_time_in_numbers():
     a[2] = math.pi / 4
     assert contact_time(a, b, 0.5, 0.0) == pytest.approx((3.5 - math.sqrt(0.5)) / 0.5)
     assert contact_time(b, b, 0.5, 0.0) == 0.0
+
+
+def depths(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(n,) how deep (n, 5) rectangles overlap, by the shadows of all corners."""
+    signs = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) / 2.0
+    corners = []
+    for each in (a, b):
+        turn = np.exp(1j * each[:, 2])[:, None]
+        local = each[:, None, 3] * signs[:, 0] + 1j * each[:, None, 4] * signs[:, 1]
+        corners.append((each[:, 0] + 1j * each[:, 1])[:, None] + turn * local)
+    depth = np.full(len(a), np.inf)
+    for each in (a, b):
+        for quarter in (0.0, math.pi / 2):
+            back = np.exp(-1j * (each[:, 2] + quarter))[:, None]
+            one, other = ((back * corner).real for corner in corners)
+            shadow = np.minimum(one.max(1) - other.min(1), other.max(1) - one.min(1))
+            depth = np.minimum(depth, shadow)
+    return depth
+
+
+def test_first_overlap_against_a_dense_search():
+    """Bodies of 3 mm to 1 m that go up to 3 m and turn up to 2 rad within a step."""
+    rng = np.random.default_rng(5)
+    hits = passes = misses = 0
+    dense = np.linspace(0.0, 1.0, 4_001)
+    for _ in range(300):
+        sizes = 10.0 ** rng.uniform(-2.5, 0.0, (2, 2))
+        before, now = rng.uniform(-1.0, 1.0, (2, 3))
+        parts = int(rng.choice([1, 5]))
+        poses = rng.uniform(-1.0, 1.0, (1, 3)) + np.cumsum(
+            rng.uniform(-1.0, 1.0, (parts + 1, 3)) / parts, axis=0
+        )
+        at = np.linspace(0.0, 1.0, parts + 1)
+        mine = before + dense[:, None] * (now - before)
+        other = np.column_stack([np.interp(dense, at, column) for column in poses.T])
+        deep = depths(
+            np.column_stack([mine, np.tile(sizes[0], (len(dense), 1))]),
+            np.column_stack([other, np.tile(sizes[1], (len(dense), 1))]),
+        )
+        found = first_overlap(before, now, sizes[0], poses, sizes[1])
+        if deep[0] > 0.0:
+            continue
+        if math.isinf(found):
+            assert deep.max() < 1e-4
+            misses += 1
+            continue
+        hits += 1
+        # From one dense instant to the next no point goes farther than 2 mm.
+        assert deep[round(found * 4_000)] > -2e-3
+        first = dense[deep > 1e-4][0] if deep.max() > 1e-4 else found
+        assert found <= math.ceil(parts * first) / parts
+        passes += int(np.all(deep[::800] <= 0.0))
+    assert hits > 40
+    assert passes > 15, "found between fifths"
+    assert misses > 100
+
+
+def test_first_overlap_of_what_turns_by_a_whole_number_of_turns():
+    """The heading of a path jumps by 2 pi from one of its legs to the next."""
+    poses = np.array([[1.0, 0.0, math.pi], [1.0, 0.0, -math.pi]])
+    still = np.zeros(3)
+    assert math.isinf(first_overlap(still, still, (1.0, 1.0), poses, (0.2, 2.0)))
+    poses[1, 0] = 0.55
+    assert first_overlap(still, still, (1.0, 1.0), poses, (0.2, 2.0)) == 1.0

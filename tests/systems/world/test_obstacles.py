@@ -11,6 +11,8 @@ from pydantic import ValidationError
 from systems.world.obstacles import Obstacles
 from systems.world.parameters import ObstacleParameters
 
+pytestmark = pytest.mark.drake
+
 RESTING = ObstacleParameters(
     name="box", waypoints_m=((3.0, -1.0),), heading_deg=30.0, size_m=(0.4, 0.1)
 )

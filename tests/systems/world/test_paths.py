@@ -11,8 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
-from hypothesis import strategies as st
+from hypothesis import assume, example, given, strategies as st
 
 from systems.world.paths import WaypointPath
 
@@ -95,6 +94,7 @@ def test_velocity_is_the_derivative_of_the_pose(points, radius, part):
 
 
 @given(waypoint_lists, st.floats(0.01, 1.0))
+@example([(0.0, 0.0), (0.1, 0.0)], 0.1)  # too short to reach its speed
 def test_it_takes_the_time_of_a_trapezoid_and_the_path_has_no_gap(points, radius):
     path = make_path(points, corner_radius=radius, acceleration=0.5)
     ramps = 0.3**2 / 0.5
@@ -135,6 +135,23 @@ def test_velocity_has_no_step(points, at_end, start):
         turning = 0.3 * np.abs(velocities[:, 2])
         most = np.hypot(1.0, np.maximum(turning[1:], turning[:-1]))
         assert np.all(steps <= 1e-3 * most + 1e-9)
+
+
+@given(
+    points=waypoint_lists,
+    at_end=st.sampled_from(["stop", "shuttle"]),
+    until=st.floats(0.0, 30.0),
+)
+def test_speeds_and_yaw_rates_are_greatest_where_pieces_begin_or_end(
+    points, at_end, until
+):
+    path = make_path(points, at_end=at_end, start_time=0.5, top_yaw_rate=1.0)
+    found = np.abs(path.extreme_twists(until)).max(axis=0, initial=0.0)
+    times = np.linspace(0.0, until, 3001)
+    seen = np.abs(path.twists(times)).max(axis=0)
+    assert np.all(seen <= found + 1e-9)
+    # A hundredth of a second gains 0.01 m/s; a yaw rate may last for less than that.
+    assert found[0] <= seen[0] + 0.02
 
 
 @given(waypoint_lists)
@@ -192,8 +209,8 @@ def test_no_speed_no_motion():
 @pytest.mark.parametrize(
     ("points", "message"),
     [
-        ([], "none given; give at least one point"),
-        ([(0, 0), (1, 1), (1, 1)], r"\(1, 1\) stands twice in a row; remove one"),
+        ([], "no point is given"),
+        ([(0, 0), (1, 1), (1, 1)], r"\(1, 1\) is listed twice in a row; remove one"),
         ([(0, 0), (2, 0), (1, 0)], "doubles back at waypoint 1; move a waypoint"),
     ],
 )

@@ -6,8 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 from pydrake.autodiffutils import AutoDiffXd, ExtractGradient
 
 from systems.base.robot import RobotParameters
@@ -19,6 +18,8 @@ from systems.hearing.tracking.tracker_model import (
     TrackerModel,
     past_pose,
 )
+
+pytestmark = pytest.mark.drake
 
 #: Ideal hearing's setting: every source is where it is heard.
 PLAIN = TrackerParameters(

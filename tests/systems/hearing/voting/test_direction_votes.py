@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from analysis.talkers.synthetic_speech import speech_like
-from systems.hearing.voting import VotePlan, cast_votes, gather_sources, join_votes
+from analysis.hearing.synthetic_speech import speech_like
+from systems.hearing.voting.direction_votes import VotePlan, cast_votes, join_votes
+from systems.hearing.voting.vote_peaks import gather_sources
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0
@@ -143,5 +144,5 @@ def test_plans_that_make_no_sense(settings, says):
 
 def test_an_upright_row_has_no_bearings_to_vote_for():
     upright = [[0.0, 0.0, 0.0], [0.0, 0.0, 0.1], [0.0, 0.0, 0.2]]
-    with pytest.raises(ValueError, match=r"microphones: .* tells no bearings"):
+    with pytest.raises(ValueError, match=r"microphones: .* gives no bearings"):
         VotePlan.of(ArrayShape.of(upright), C, RATE)

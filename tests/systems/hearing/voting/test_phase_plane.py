@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.talkers import TALKER_ARRAYS
+from studies.support.talker_trials import TALKER_ARRAYS
 from systems.hearing.voting.phase_plane import PhasePlane
 from systems.sound.array_shape import ArrayShape
 

@@ -12,7 +12,7 @@ from systems import SourceListener
 from systems.base.robot import RobotParameters, microphones_B
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.hearing.voting import vote_plan
+from systems.hearing.voting.listening_plan import vote_plan
 from systems.hearing.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,

@@ -6,9 +6,13 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from analysis.talkers import speech_like
-from systems.hearing.voting import VotePlan, cast_votes, is_steady, steered_only
-from systems.hearing.voting.steady_sound import level_scatter_db
+from analysis.hearing.synthetic_speech import speech_like
+from systems.hearing.voting.direction_votes import VotePlan, cast_votes
+from systems.hearing.voting.steady_sound import (
+    is_steady,
+    level_scatter_db,
+    steered_only,
+)
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0

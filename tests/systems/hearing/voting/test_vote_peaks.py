@@ -7,7 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from systems.hearing.voting import DirectionVotes, gather_sources
+from systems.hearing.voting.direction_votes import DirectionVotes
+from systems.hearing.voting.vote_peaks import gather_sources
 
 
 def votes_at(single_deg, steered_deg):

@@ -13,6 +13,7 @@ from systems.laws.trajectory.trajectory_impedance import (
     contact_numbers,
     contacts_of_objects,
     state_matrices,
+    step_is_blocked,
     target_force,
 )
 from systems.laws.trajectory.trajectory_impedance_controller import (
@@ -166,6 +167,48 @@ def test_the_block_adds_both_and_limits_the_acceleration():
     wanted = np.add(pull, off)
     assert np.linalg.norm(wanted) > 2.5
     np.testing.assert_allclose(command, 2.5 * wanted / np.linalg.norm(wanted))
+
+
+def test_eq_6_refuses_steps_that_end_near_and_lead_nearer():
+    """Against plain geometry: 2000 cases, both answers often."""
+    draw, refused = np.random.default_rng(6), 0
+    for _ in range(2000):
+        places = draw.uniform(-0.5, 0.5, (int(draw.integers(1, 9)), 2))
+        step, block = draw.uniform(-0.1, 0.1, 2), draw.uniform(0.05, 0.4)
+        found = step_is_blocked(objects_of(*([1, *p] for p in places)), step, block)
+        before, after = (np.linalg.norm(places - s, axis=1) for s in (0.0, step))
+        assert found == bool(np.any((after <= block) & (after <= before)))
+        refused += found
+    assert 500 < refused < 1500
+
+
+@pytest.mark.parametrize(
+    ("distance", "speed", "stops"),
+    [(0.203, 0.1, False), (0.203, 0.2, True), (0.19, 0.2, True), (0.19, -0.2, False)],
+)
+def test_eq_6_stops_the_virtual_mass_at_once(distance, speed, stops):
+    """A step of T v; -v/T is what the wheel command makes a velocity of zero of."""
+    accelerations = []
+    for block_m in (None, 0.2):
+        own = CONVENTIONAL.model_copy(update={"block_distance_m": block_m})
+        block = TrajectoryImpedanceController(parameters=own, robot=ROBOT)
+        context = block.CreateDefaultContext()
+        values = {
+            "target_state": [0.08 + (1.0 - distance), 0.0, speed, 0.0],
+            "objects_W": objects_of([1, distance, 0.0, speed, 0.0, 1.0]),
+            # A target that moves straight back would drive it aside.
+            "pose_WB_estimated": [0.08, -0.08, math.pi / 2.0],
+            "v_WP": [speed, 0.0],
+        }
+        for name, value in values.items():
+            block.GetInputPort(name).FixValue(context, np.array(value))
+        accelerations.append(block.GetOutputPort("acceleration_W").Eval(context))
+    free, held = accelerations
+    # Spring and target balance.
+    np.testing.assert_allclose(free, 0.0, atol=1e-12)
+    np.testing.assert_allclose(
+        held, [-speed / TICK_S if stops else 0.0, 0.0], atol=1e-9
+    )
 
 
 def test_summed_damping_is_stable_up_to_2M_over_T():

@@ -1,0 +1,605 @@
+"""Layouts and drivers that try to make a guarded robot touch what rests."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+from pydrake.systems.framework import LeafSystem
+
+from diagrams import RunResult, Scenario, simulate
+from systems.base.robot import body_radius
+from systems.framework.block_facts import BlockFacts
+from systems.framework.compiling import njit
+from systems.framework.signals import TICK_S
+from systems.framework.step_block import RunFacts, Step, StepBlock
+from systems.world.geometry import beyond_rectangle, rectangle_clearance
+
+#: How long a run lasts, s.
+DURATION_S = 10.0
+#: A body nearer than this at the start is refused, m.
+BUBBLE_M = 1.0
+#: Bodies of every layout; those that it has no use for stand far away.
+_BODIES = 6
+#: Modes of a row of a driver's table.
+TWIST, AHEAD, BACK, AIM = range(4)
+
+
+class Row(NamedTuple):
+    """A row of a driver's table: what the driver does until a given time.
+
+    The command is the sum of a mode and a swing. The forward speed swings with
+    ``swing_v * wave(rate * t)``, the yaw rate with
+    ``swing_omega * wave(rate * t + phase)``.
+    """
+
+    end_s: float
+    """End of the row, s; ``make_trial`` converts it to ticks."""
+    mode: float = TWIST
+    """``TWIST``: command ``v`` and ``omega``. ``AHEAD``: drive to the goal with ``v``,
+    and turn by ``omega`` in addition. ``BACK``: the same in reverse. ``AIM``: turn in
+    place until the goal is at the bearing ``omega``."""
+    v: float = 0.0
+    """Forward speed, m/s."""
+    omega: float = 0.0
+    """Yaw rate, rad/s; in the mode ``AIM`` a bearing, rad."""
+    x: float = 0.0
+    """x of the goal, m."""
+    y: float = 0.0
+    """y of the goal, m."""
+    by_truth: float = 0.0
+    """1: the driver steers by the true pose; 0: by the pose of the odometry."""
+    swing_v: float = 0.0
+    """Amplitude of the forward speed, m/s."""
+    swing_omega: float = 0.0
+    """Amplitude of the yaw rate, rad/s."""
+    rate: float = 0.0
+    """Angular frequency of the swing, rad/s; ``make_trial`` converts it to rad per
+    tick."""
+    phase: float = 0.0
+    """Phase by which the turn leads the forward speed, rad."""
+    edge: float = 1.0
+    """Shape of the swing, see ``wave``."""
+    skew: float = 0.0
+    """Shape of the swing, see ``wave``."""
+
+
+_FIELDS = len(Row._fields)
+#: The table of the run that is made next.
+_NEXT: list[NDArray[np.float64]] = [np.array(Row(0.0))]
+
+
+@register_jitable
+def wave(angle: float, edge: float, skew: float) -> float:
+    """A periodic function between -1 and 1: a sine, a square wave or a sawtooth.
+
+    Args:
+        angle: Phase angle, rad.
+        edge: Gain before the value is clipped to [-1, 1]; 1 keeps the sine, a large
+            gain makes a square wave.
+        skew: 0 keeps the sine; values towards 1 or -1 make it a sawtooth.
+
+    Returns:
+        The value at this angle.
+    """
+    value = edge * math.sin(angle + skew * math.sin(angle))
+    return min(max(value, -1.0), 1.0)
+
+
+def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
+    """Obeys a table of ``Row``.
+
+    Args:
+        tick: Number of the tick.
+        state: None.
+        inputs: Pose by the odometry, and the true pose.
+        outputs: Forward speed and yaw rate.
+        numbers: The table, row after row.
+    """
+    (believed, true), (twist,), (table,) = inputs, outputs, numbers
+    row = 0
+    while row + _FIELDS < len(table) and tick > table[row]:
+        row += _FIELDS
+    mode, v, omega, x, y, by_truth = table[row + 1 : row + 7]
+    swing_v, swing_omega, rate, phase, edge, skew = table[row + 7 : row + 13]
+    if mode > 0.5:
+        pose = true if by_truth > 0.5 else believed
+        towards = math.atan2(y - pose[1], x - pose[0])
+        if mode > 2.5:
+            towards, v, omega = towards - omega, 0.0, 0.0
+        elif mode > 1.5:
+            towards, v = towards + math.pi, -v
+        off = (towards - pose[2] + math.pi) % math.tau - math.pi
+        omega += min(max(4.0 * off, -3.0), 3.0)
+        v *= max(math.cos(off), 0.0)
+    angle = rate * tick
+    twist[0] = v + swing_v * wave(angle, edge, skew)
+    twist[1] = omega + swing_omega * wave(angle + phase, edge, skew)
+
+
+class Driver(LeafSystem, StepBlock):
+    """Drives by a table and does not react to obstacles.
+
+    .. pydrake_system::
+
+        name: Driver
+        input_ports:
+        - pose_WB_estimated [m, m, rad]
+        - pose_WB [m, m, rad]
+        output_ports:
+        - twist_B [m/s, rad/s]
+
+    Unlike a law, it may know the true pose: rows with ``by_truth`` steer by it.
+    """
+
+    FACTS = BlockFacts("controller", "control")
+
+    def __init__(self, tick_s: float) -> None:
+        super().__init__()
+        self.set_name("driver")
+        step = Step(drive_step, (_NEXT[0],))
+        inputs = [("pose_WB_estimated", 3), ("pose_WB", 3)]
+        self.declare_step(float, step, inputs, [("twist_B", 2)], tick_s)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """With the table of this run, whatever run the block was made for."""
+        return Step(drive_step, (_NEXT[0],))
+
+
+class Trial(NamedTuple):
+    """A run that may go wrong."""
+
+    layout: str
+    driver: str
+    variant: str
+    fields: dict[str, Any]
+    """Of the scenario."""
+    table: NDArray[np.float64]
+    """Of the driver; unused by laws."""
+
+
+class Outcome(NamedTuple):
+    """How it went."""
+
+    collided: bool
+    clearance_m: float
+    """Least one of the body."""
+    disc_m: float
+    """Least one of the disc about the axle that holds the body."""
+
+
+#: Settings of the robot, by name.
+VARIANTS: dict[str, dict[str, Any]] = {
+    "plain": {},
+    "no noise": {"ultrasonic": {"noise_m": 0.0}},
+    "noise of 1 cm": {"ultrasonic": {"noise_m": 0.01}},
+    "ring of 12": {"ultrasonic": {"axes_deg": 12}},
+    "36 narrow beams": {"ultrasonic": {"axes_deg": 36, "beam_half_angle_deg": 5.0}},
+    "in turn": {"ultrasonic": {"firing": "sequential"}},
+    "tick of 12.5 ms": {"tick_s": 0.0125},
+    "tick of 50 ms": {
+        "tick_s": 0.05,
+        "microphones": {"frame_s": 0.05},
+        "ultrasonic": {"period_s": 0.05},
+    },
+    "lag of 150 ms": {"plant": {"motor_lag_s": 0.15}},
+    "braking of 0.6": {"guard": {"braking_m_s2": 0.6}},
+    "slip apart": {
+        "plant": {"slip": (0.005, -0.005)},
+        "free_space": {"wheel_error": 0.005, "place_error_m": 0.03},
+    },
+    "slip alike": {
+        "plant": {"slip": (-0.005, -0.005)},
+        "free_space": {"wheel_error": 0.005, "place_error_m": 0.03},
+    },
+    "cells of 2 cm": {"free_space": {"cell_m": 0.02}},
+}
+#: All settings. ``draw_trial`` chooses the added ones only when it is asked to.
+SETTINGS = {
+    **VARIANTS,
+    "encoders not rounded": {"odometry": {"rounding": False}},
+    "slip apart, known to 10 cm": {
+        "plant": {"slip": (0.005, -0.005)},
+        "free_space": {"wheel_error": 0.005, "place_error_m": 0.1},
+    },
+    "encoders of 650 pulses": {"odometry": {"pulses_per_revolution": 650}},
+}
+
+
+def _box(
+    x: float, y: float, theta: float, length: float, width: float
+) -> tuple[float, ...]:
+    return x, y, theta, length, width
+
+
+def _posts(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    angle = draw.uniform(-math.pi, math.pi, _BODIES)
+    far = BUBBLE_M + 0.015 + draw.exponential(0.5, _BODIES)
+    return [
+        _box(r * math.cos(a), r * math.sin(a), 0.0, 0.02, 0.02)
+        for r, a in zip(far, angle, strict=True)
+    ]
+
+
+def _slit(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    gap, thick = draw.uniform(0.78, 1.05), draw.uniform(0.02, 0.4)
+    angle, tilt = draw.uniform(-math.pi, math.pi), draw.normal(0.0, 0.3)
+    far, aside = BUBBLE_M + draw.uniform(0.1, 0.8), draw.normal(0.0, 0.1)
+    boxes = []
+    for side in (1.0, -1.0):
+        along = aside + side * (0.5 * gap + 0.75)
+        c, s = math.cos(angle + tilt), math.sin(angle + tilt)
+        x, y = far * math.cos(angle) - along * s, far * math.sin(angle) + along * c
+        boxes.append(_box(x, y, angle + tilt, thick, 1.5))
+    return boxes
+
+
+def _wedge(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    angle, half = draw.uniform(-math.pi, math.pi), draw.uniform(0.3, 1.1)
+    far, boxes = BUBBLE_M + draw.uniform(0.2, 1.2), []
+    for side in (half, -half):
+        towards = angle + math.pi + side
+        x = far * math.cos(angle) + 1.0 * math.cos(towards)
+        y = far * math.sin(angle) + 1.0 * math.sin(towards)
+        boxes.append(_box(x, y, towards, 2.0, 0.05))
+    return boxes
+
+
+def _walls(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    boxes = []
+    for angle in draw.uniform(-math.pi, math.pi, int(draw.integers(1, 4))):
+        far = BUBBLE_M + 0.0505 + abs(draw.normal(0.0, 0.2))
+        boxes.append(_box(far * math.cos(angle), far * math.sin(angle), angle, 0.1, 3))
+    return boxes
+
+
+def _bubble(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    """Boxes against the bubble's edge, corners or faces first."""
+    boxes = []
+    for angle in draw.uniform(-math.pi, math.pi, _BODIES):
+        length, width = draw.uniform(0.02, 0.3, 2)
+        boxes.append(
+            _box(
+                (BUBBLE_M + length) * math.cos(angle),
+                (BUBBLE_M + length) * math.sin(angle),
+                angle + draw.choice([0.0, math.pi / 4.0]),
+                length,
+                width,
+            )
+        )
+    return boxes
+
+
+def _corner(draw: np.random.Generator) -> list[tuple[float, ...]]:
+    """Two walls that meet ahead of a way past them."""
+    angle, far = draw.uniform(-math.pi, math.pi), BUBBLE_M + draw.uniform(0.05, 0.6)
+    turn = draw.uniform(-math.pi, math.pi)
+    x, y = far * math.cos(angle), far * math.sin(angle)
+    return [
+        _box(x + 0.75 * math.cos(way), y + 0.75 * math.sin(way), way, 1.5, 0.03)
+        for way in (turn, turn + math.pi / 2.0)
+    ]
+
+
+LAYOUTS = {
+    "posts": _posts,
+    "slit": _slit,
+    "wedge": _wedge,
+    "walls": _walls,
+    "against the bubble": _bubble,
+    "corner": _corner,
+}
+
+
+def _random(draw: np.random.Generator, boxes: Any, seconds: float) -> list[list[float]]:
+    """Commands held for random times."""
+    rows, end = [], 0.0
+    while end < seconds:
+        end += draw.exponential(1.5)
+        v, omega = draw.uniform(-0.72, 0.72), draw.normal(0.0, 1.5)
+        rows.append([end, TWIST, v, omega, 0.0, 0.0])
+    return rows
+
+
+def _pressing(
+    draw: np.random.Generator, boxes: Any, seconds: float
+) -> list[list[float]]:
+    """At a body or past it, ahead or back, for 5 s and more."""
+    rows, end = [], 0.0
+    while end < seconds:
+        x, y = boxes[int(draw.integers(len(boxes)))][:2]
+        way, off = draw.uniform(0.5, 1.0), draw.normal(0.0, 0.3, 2)
+        end += draw.uniform(5.0, DURATION_S)
+        doing = draw.choice([AHEAD, BACK])
+        v, omega = draw.uniform(0.02, 0.72), draw.choice([0.0, draw.normal(0.0, 0.7)])
+        rows.append([end, doing, v, omega, way * x + off[0], way * y + off[1]])
+    return rows
+
+
+def _looking(
+    draw: np.random.Generator, boxes: Any, seconds: float
+) -> list[list[float]]:
+    """Turns first, so that much is known, and then presses."""
+    turn = draw.choice([-1.0, 1.0]) * draw.uniform(1.0, 3.0)
+    rows = [[draw.uniform(1.0, 4.0), TWIST, 0.0, turn, 0.0, 0.0]]
+    return [*rows, *_pressing(draw, boxes, seconds)]
+
+
+DRIVERS = {"random": _random, "pressing": _pressing, "looking": _looking}
+_LAWS = ("active", "conventional")
+
+
+def outside(boxes: Sequence[Sequence[float]]) -> list[tuple[float, ...]]:
+    """Boxes, moved outwards until none stands in the bubble.
+
+    Args:
+        boxes: (x, y, theta, length, width) each, m and rad.
+
+    Returns:
+        As many, each beyond the bubble by 0.1 mm or more.
+    """
+    moved = []
+    for x, y, *rest in boxes:
+        far, step = math.hypot(x, y), 0
+        while True:
+            stretch = 1.0 + 0.002 * step / far
+            box = x * stretch, y * stretch, *rest
+            if math.hypot(*beyond_rectangle((0.0, 0.0), box)) >= BUBBLE_M + 1e-4:
+                break
+            step += 1
+        moved.append(box)
+    return moved
+
+
+def _merged(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    result = dict(base)
+    for key, value in changes.items():
+        nested = isinstance(value, dict) and isinstance(result.get(key), dict)
+        result[key] = _merged(result[key], value) if nested else value
+    return result
+
+
+def make_trial(
+    names: tuple[str, str, str],
+    boxes: Sequence[Sequence[float]],
+    rows: Sequence[Sequence[float]],
+    heading: float,
+    source: tuple[float, float],
+    seed: int,
+    duration_s: float = DURATION_S,
+) -> Trial:
+    """A trial of given boxes and commands.
+
+    Args:
+        names: Of layout, driver and variant.
+        boxes: (x, y, theta, length, width) each, m and rad.
+        rows: Of the driver, fields of ``Row``; none: the driver is a law.
+        heading: Of the robot at the start, rad.
+        source: Where the source stands, m.
+        seed: Of the noise.
+        duration_s: Duration of the run, s.
+
+    Returns:
+        The trial.
+    """
+    layout, driver, variant = names
+    boxes = outside(boxes)
+    boxes += [(30.0 + k, 30.0, 0.0, 0.1, 0.1) for k in range(_BODIES - len(boxes))]
+    fields = {
+        "name": "falsification",
+        "law": "analysis.safety.driver_trials:Driver" if rows else driver,
+        "hearing": "ideal",
+        "seed": seed,
+        "duration_s": duration_s,
+        "start": {"heading_deg": math.degrees(heading)},
+        "source": {"waypoints_m": [source]},
+        "obstacles": [
+            {
+                "name": f"box {k}",
+                "waypoints_m": [(x, y)],
+                "heading_deg": math.degrees(theta),
+                "size_m": (length, width),
+            }
+            for k, (x, y, theta, length, width) in enumerate(boxes)
+        ],
+        "stop": {
+            "stuck_after_s": 1e4,
+            "lost_after_s": 1e4,
+            "rest_time_s": 1e4,
+            "diverged_range_m": 1e3,
+        },
+        "guard": {},
+        "free_space": {"start_bubble_m": BUBBLE_M},
+    }
+    fields = _merged(fields, SETTINGS[variant])
+    table = np.array([Row(*row) for row in rows] or [Row(0.0)], dtype=float)
+    tick_s = fields.get("tick_s", TICK_S)
+    table[:, Row._fields.index("end_s")] /= tick_s
+    table[:, Row._fields.index("rate")] *= tick_s
+    return Trial(layout, driver, variant, fields, table.ravel())
+
+
+#: What drives, and how often: those by a table twice as often as a law.
+USUAL = (*DRIVERS, *DRIVERS, *_LAWS)
+
+
+def draw_trial(
+    seed: int,
+    number: int,
+    drivers: Sequence[str] = USUAL,
+    setting: str | None = None,
+    duration_s: float = DURATION_S,
+) -> Trial:
+    """A trial by chance.
+
+    Args:
+        seed: Of all trials.
+        number: Of this one.
+        drivers: Names of ``DRIVERS``, or laws, of which one is drawn.
+        setting: Name of the robot's settings in ``SETTINGS``; with None, the number
+            chooses one of ``VARIANTS``.
+        duration_s: Duration of the run, s.
+
+    Returns:
+        The same trial for the same numbers.
+    """
+    draw = np.random.default_rng([seed, number])
+    layout = str(draw.choice([*LAYOUTS]))
+    driver = str(draw.choice([*drivers]))
+    # Few settings at a time: each takes blocks of its own, which Drake never frees.
+    variant = setting or [*VARIANTS][number // 200 % len(VARIANTS)]
+    boxes = LAYOUTS[layout](draw)
+    angle = math.atan2(boxes[0][1], boxes[0][0]) + draw.normal(0.0, 0.3)
+    far = 8.0 if driver in DRIVERS else draw.uniform(2.5, 3.5)
+    source = far * math.cos(angle), far * math.sin(angle)
+    rows = DRIVERS[driver](draw, boxes, duration_s) if driver in DRIVERS else []
+    heading = angle + draw.choice([0.0, draw.uniform(-math.pi, math.pi)])
+    names = layout, driver, variant
+    noise = int(draw.integers(1 << 30))
+    return make_trial(names, boxes, rows, heading, source, noise, duration_s)
+
+
+def draw_crossing(seed: int, number: int, bodies: int, speed: float) -> Trial:
+    """A trial by chance with bodies that cross near the start.
+
+    Args:
+        seed: Of all trials.
+        number: Of this one.
+        bodies: How many move; six at most.
+        speed: Of theirs, m/s.
+
+    Returns:
+        The same trial for the same arguments.
+    """
+    draw = np.random.default_rng([seed, number])
+    angle = draw.uniform(-math.pi, math.pi, bodies)
+    far, goals = draw.uniform(1.5, 3.0, bodies), draw.normal(0.0, 0.7, (bodies, 2))
+    boxes = [
+        _box(r * math.cos(a), r * math.sin(a), 0.0, 0.3, 0.3)
+        for r, a in zip(far, angle, strict=True)
+    ]
+    driver = str(draw.choice([*DRIVERS]))
+    names = "crossing", driver, "ring of 12"
+    rows = DRIVERS[driver](draw, boxes, DURATION_S)
+    heading = draw.uniform(-math.pi, math.pi)
+    trial = make_trial(names, boxes, rows, heading, (8.0, 0.0), number)
+    # The others stand far away.
+    moving = trial.fields["obstacles"][:bodies]
+    for body, goal in zip(moving, goals, strict=True):
+        begin = np.array(body["waypoints_m"][0])
+        end = begin + 3.5 * (goal - begin) / math.dist(goal, begin)
+        body["waypoints_m"] = [tuple(begin.tolist()), tuple(end.tolist())]
+        body["speed_m_s"] = speed
+    return trial
+
+
+def drive_at_a_wall(speed: float, body_speed: float) -> tuple[RunResult, float]:
+    """Drives at a wall straight ahead.
+
+    Args:
+        speed: That is commanded, m/s.
+        body_speed: Up to which the robot is guarded against bodies, m/s.
+
+    Returns:
+        The run, and where the wall's face is, x in m.
+    """
+    names, rows = ("wall", "straight", "no noise"), [[1e3, TWIST, speed, 0.0, 0, 0]]
+    wall_m = 2.9
+    boxes = [_box(wall_m + 0.05, 0.0, 0.0, 0.1, 3.0)]
+    trial = make_trial(names, boxes, rows, 0.0, (8.0, 0.0), 1)
+    changes = {"guard": {"obstacle_speed_m_s": body_speed}, "duration_s": 20.0}
+    return run_result(trial, changes), wall_m
+
+
+def contact_speeds(trial: Trial, changes: dict[str, Any]) -> tuple[float, float] | None:
+    """How fast a robot is when it touches something.
+
+    Args:
+        trial: What to run.
+        changes: As of ``run_trial``.
+
+    Returns:
+        Speed of the axle, m/s, and of the turn, rad/s, the larger of the last two
+        ticks; none without a contact.
+    """
+    result = run_result(trial, changes)
+    if result.collision is None:
+        return None
+    columns = {name: values[-2:] for name, values in result.columns.items()}
+    speeds = np.hypot(columns["v_WB_x"], columns["v_WB_y"])
+    return float(speeds.max()), float(np.abs(columns["omega_WB"]).max())
+
+
+def run_trial(trial: Trial, changes: dict[str, Any] | None = None) -> Outcome:
+    """Runs a trial.
+
+    Args:
+        trial: What to run.
+        changes: Fields of the scenario that are other than the trial's.
+
+    Returns:
+        How it went.
+    """
+    result = run_result(trial, changes)
+    return Outcome(result.collision is not None, *least_clearances(result))
+
+
+def run_result(trial: Trial, changes: dict[str, Any] | None = None) -> RunResult:
+    """Runs a trial and returns the whole run.
+
+    Args:
+        trial: The trial to run.
+        changes: Fields of the scenario that replace those of the trial.
+
+    Returns:
+        The run.
+    """
+    _NEXT[0] = trial.table
+    fields = _merged(trial.fields, changes or {})
+    return simulate(Scenario.model_validate(fields), engine="compiled")
+
+
+def least_clearances(result: RunResult) -> tuple[float, float]:
+    """Least clearance of the body, and of its disc, from bodies that rest.
+
+    Args:
+        result: A run.
+
+    Returns:
+        m each, by true poses, at ticks and half-way between; below 0 they overlap.
+    """
+    robot = result.scenario.robot
+    others = result.surroundings.bodies.values()
+    boxes = np.array([body.rectangle(0.0) for body in others])
+    size = np.array([robot.length_m, robot.width_m])
+    poses = np.ascontiguousarray(result.poses("WB"))
+    body, disc = _least(poses, boxes, size)
+    return float(body), float(disc) - body_radius(robot)
+
+
+@njit(cache=True)
+def _least(
+    poses: Any, boxes: Any, size: Any
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    mine, body, disc = np.empty(5), np.inf, np.inf
+    mine[3:] = size
+    for box in boxes:
+        reach = 0.5 * math.hypot(box[3], box[4]) + 1.0
+        for k in range(len(poses)):
+            if math.hypot(poses[k, 0] - box[0], poses[k, 1] - box[1]) > reach:
+                continue
+            for half in range(2):
+                mine[:3] = poses[k]
+                if half == 1 and k > 0:
+                    mine[:3] = 0.5 * (poses[k] + poses[k - 1])
+                body = min(body, rectangle_clearance(mine, box))
+                c, s = math.cos(box[2]), math.sin(box[2])
+                dx, dy = mine[0] - box[0], mine[1] - box[1]
+                u = max(abs(c * dx + s * dy) - 0.5 * box[3], 0.0)
+                v = max(abs(c * dy - s * dx) - 0.5 * box[4], 0.0)
+                disc = min(disc, math.hypot(u, v))
+    return body, disc

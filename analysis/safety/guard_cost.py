@@ -1,0 +1,59 @@
+"""What the guard and the guarded law take of a tick."""
+
+from __future__ import annotations
+
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams import load_scenario, simulate
+from diagrams.simulation import prepared_loop
+
+
+class TickCost(NamedTuple):
+    """Time of a tick."""
+
+    what: str
+    """What was run."""
+    mean_ms: float
+    """Time of a tick on average, ms."""
+    p99_ms: float | None
+    """99 % of the ticks take less, ms; None where the run was timed as a whole."""
+    worst_ms: float | None
+    """The longest tick, ms."""
+
+
+def tick_costs() -> list[TickCost]:
+    """Measures ``corridor`` with and without a guard, and the guarded law in four."""
+    costs = []
+    for engine in ("compiled", "drake"):
+        for guard in ("{}", "null"):
+            fields = ["hearing=ideal", "duration_s=20", f"guard={guard}"]
+            scenario = load_scenario("corridor", fields)
+            runs = [simulate(scenario, engine=engine) for _ in range(3)]
+            tick_s = min(run.wall_s / len(run.time) for run in runs)
+            what = f"{engine}, {'no guard' if guard == 'null' else 'guard'}"
+            costs.append(TickCost(what, 1e3 * tick_s, None, None))
+    for name in ("clutter", "rooms", "two_moving_obstacles", "crowd"):
+        for preset in ("three", "ring_12"):
+            each = 1e3 * _tick_times(name, preset)
+            what = f"guarded law, {name}, {preset}"
+            p99, worst = float(np.quantile(each, 0.99)), float(each.max())
+            costs.append(TickCost(what, float(each.mean()), p99, worst))
+    return costs
+
+
+def _tick_times(name: str, preset: str) -> NDArray[np.float64]:
+    """(ticks,) s of a compiled run of the guarded law; of each the least of three."""
+    fields = ["hearing=ideal", "law=guarded", f"ultrasonic.preset={preset}"]
+    scenario, times = load_scenario(name, fields), []
+    for _ in range(3):
+        loop, spent = prepared_loop(scenario), []
+        while not loop.over:
+            start = perf_counter()
+            loop.advance(1)
+            spent.append(perf_counter() - start)
+        times.append(spent)
+    return np.min(times, axis=0)

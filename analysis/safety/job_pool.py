@@ -1,0 +1,42 @@
+"""Jobs in worker processes that are replaced from time to time.
+
+Drake never frees blocks that are written in Python, so that a process grows with each
+scenario that it builds.
+"""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+def run_jobs(
+    jobs: Sequence[Callable[[], Result]], workers: int, *, jobs_a_worker: int
+) -> Iterator[Result]:
+    """Does jobs in worker processes.
+
+    Args:
+        jobs: Functions that can be pickled.
+        workers: Number of processes.
+        jobs_a_worker: After so many jobs a process is replaced.
+
+    Yields:
+        What each job returns, in the order of the jobs.
+    """
+    with ProcessPoolExecutor(
+        workers, max_tasks_per_child=jobs_a_worker, initializer=_end_at_interrupt
+    ) as pool:
+        try:
+            for each in [pool.submit(job) for job in jobs]:
+                yield each.result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _end_at_interrupt() -> None:
+    """Ctrl-C ends a worker at once, and without a traceback."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

@@ -1,0 +1,259 @@
+"""Runs of minutes to an hour in which drivers try to make a guarded robot collide.
+
+``jobs`` lists the drivers and settings; ``phonotaxis falsify --long`` runs them and
+prints the results.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from functools import partial
+from itertools import chain
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from analysis.reporting.markdown import markdown_table
+from analysis.safety.driver_trials import (
+    DRIVERS,
+    LAYOUTS,
+    SETTINGS,
+    Trial,
+    draw_trial,
+    least_clearances,
+    run_result,
+)
+from analysis.safety.swinging_drivers import (
+    BY_HAND,
+    Swing,
+    draw_swing,
+    four_boxes,
+    odometry_error,
+    search_contact,
+    search_drift,
+    swing_at_boxes,
+    swing_once,
+)
+from diagrams import RunResult
+from systems.framework.input_error import InputError
+
+#: Boxes around drivers whose swing is given or was found by the search for drift.
+FOUR_BOXES = four_boxes(1.63)
+#: Settings that get the most simulated time.
+_MAIN = "plain", "encoders not rounded", "cells of 2 cm", "tick of 50 ms"
+#: Frequencies of the swing that was found by hand, Hz.
+_FREQUENCIES_HZ = 0.1, 0.3, 1.0, 2.0, 3.18, 5.0, 10.0
+_HOUR_S = 3600.0
+#: Number of runs of each search.
+_DRIFT_RUNS = _CONTACT_RUNS = 96
+#: A worker process is replaced after so many jobs.
+JOBS_A_WORKER = 30
+#: Settings for which a contact is searched.
+_SEARCHED = "plain", "tick of 50 ms"
+
+
+class LongRun(NamedTuple):
+    """Result of a run."""
+
+    driver: str
+    setting: str
+    simulated_s: float
+    contact_s: float
+    """Time of the contact, s; infinite if there was none."""
+    clearance_m: float
+    """Least clearance of the body, m."""
+    disc_m: float
+    """Least clearance of the disc that holds the body, m."""
+    odometry_m: float
+    """Largest error of the axle's place by the odometry, m."""
+    swing: Swing | None
+    """Swing of the driver; None if it does not swing."""
+
+
+Job = partial[list[LongRun]]
+
+
+class Journal:
+    """Keeps the runs of each job in a file as soon as the job is done.
+
+    The file has one JSON object per line: the seed, the number of the job, its runs.
+
+    Args:
+        path: The file; it need not exist.
+        seed: Seed of the jobs. The journal ignores jobs of other seeds in the file.
+
+    Raises:
+        InputError: A line of the file is no job.
+    """
+
+    def __init__(self, path: Path, seed: int) -> None:
+        self._path, self._seed = path, seed
+        self.done: dict[int, list[LongRun]] = {}
+        lines = path.read_text("utf-8").splitlines() if path.exists() else []
+        for number, line in enumerate(lines, 1):
+            try:
+                kept = json.loads(line)
+                runs = [_run_of(each) for each in kept["runs"]]
+                if kept["seed"] == seed:
+                    self.done[kept["job"]] = runs
+            except (json.JSONDecodeError, KeyError, TypeError):
+                raise InputError(
+                    "journal", f"line {number} of {path} is no job; remove the line"
+                ) from None
+
+    def keeping(self, number: int, job: Job) -> Job:
+        """A job that appends its runs to the file when it is done, in any process."""
+        return partial(_keep, self._path, self._seed, number, job)
+
+
+def _keep(path: Path, seed: int, number: int, job: Job) -> list[LongRun]:
+    runs = job()
+    kept = [
+        {**run._asdict(), "swing": run.swing and run.swing._asdict()} for run in runs
+    ]
+    # One write in append mode: several processes share the file.
+    line = json.dumps({"seed": seed, "job": number, "runs": kept})
+    with path.open("a", encoding="utf-8") as file:
+        file.write(f"{line}\n")
+    return runs
+
+
+def _run_of(kept: dict[str, Any]) -> LongRun:
+    swing = kept["swing"] and Swing(**kept["swing"])
+    return LongRun(**{**kept, "swing": swing})
+
+
+def long_run(trial: Trial, swing: Swing | None = None) -> LongRun:
+    """Runs a trial.
+
+    Args:
+        trial: The trial to run.
+        swing: Swing of its driver, for the record.
+
+    Returns:
+        The result.
+    """
+    return _judged(trial.driver, trial.variant, swing, run_result(trial))
+
+
+def _judged(
+    driver: str, setting: str, swing: Swing | None, result: RunResult
+) -> LongRun:
+    contact_s = result.simulated_s if result.collision else np.inf
+    return LongRun(
+        driver,
+        setting,
+        result.simulated_s,
+        contact_s,
+        *least_clearances(result),
+        float(odometry_error(result).max()),
+        swing,
+    )
+
+
+def jobs(seed: int) -> list[Job]:
+    """The jobs whose runs make the table.
+
+    Args:
+        seed: Seed of all that is drawn and searched.
+
+    Returns:
+        The jobs, those that take longest first. Each can be called on its own.
+    """
+    found: list[Job] = []
+    slow_first = sorted(SETTINGS, key="cells of 2 cm".__ne__)
+    found += [partial(_by_search_for_contact, each, seed) for each in _SEARCHED]
+    for setting in slow_first:
+        if setting in _MAIN:
+            found += [partial(_by_hand, setting, hz) for hz in _FREQUENCIES_HZ]
+        found.append(partial(_by_search_for_drift, setting, seed))
+        found.append(partial(_drawn_swings, setting, seed))
+        found.append(partial(_drawn_commands, setting, seed))
+    found += [partial(_once, each) for each in _MAIN]
+    return found
+
+
+def _once(setting: str) -> list[LongRun]:
+    return [long_run(swing_once(setting), BY_HAND)]
+
+
+def _by_hand(setting: str, hz: float) -> list[LongRun]:
+    swing = BY_HAND._replace(hz=hz)
+    names = "four boxes", "swing, by hand, 0.1 to 10 Hz", setting
+    return [long_run(swing_at_boxes(names, FOUR_BOXES, swing, _HOUR_S), swing)]
+
+
+def _by_search_for_drift(setting: str, seed: int) -> list[LongRun]:
+    swing, _ = search_drift(setting, _DRIFT_RUNS, seed)
+    names, swing_s = ("four boxes", "swing, searched for drift", setting), 40.0
+    trial = swing_at_boxes(names, FOUR_BOXES, swing, _HOUR_S, swings=2, swing_s=swing_s)
+    return [long_run(trial, swing)]
+
+
+def _by_search_for_contact(setting: str, seed: int) -> list[LongRun]:
+    found: list[LongRun] = []
+
+    def note(swing: Swing, result: RunResult) -> float:
+        found.append(_judged("swing, searched for contact", setting, swing, result))
+        return found[-1].disc_m
+
+    search_contact(setting, _CONTACT_RUNS, seed, note)
+    return found
+
+
+def _drawn_swings(setting: str, seed: int) -> list[LongRun]:
+    found = []
+    for number in range(3):
+        place = [*SETTINGS].index(setting)
+        draw = np.random.default_rng([seed, place, number])
+        layout, swing = str(draw.choice([*LAYOUTS])), draw_swing(draw)
+        names = layout, "swing, drawn", setting
+        boxes, heading = LAYOUTS[layout](draw), draw.uniform(-np.pi, np.pi)
+        trial = swing_at_boxes(names, boxes, swing, 600.0, heading=heading)
+        found.append(long_run(trial, swing))
+    return found
+
+
+def _drawn_commands(setting: str, seed: int) -> list[LongRun]:
+    number = [*SETTINGS].index(setting)
+    trial = draw_trial(seed, number, [*DRIVERS], setting, 0.5 * _HOUR_S)
+    return [long_run(trial._replace(driver="random, pressing or looking"))]
+
+
+def summary_table(runs: Sequence[LongRun], by: Sequence[str]) -> str:
+    """Summarizes runs in a Markdown table.
+
+    Args:
+        runs: Results of the runs.
+        by: Fields of ``LongRun`` by which the runs are grouped, such as ``driver``.
+
+    Returns:
+        A table with one row per group, and a last row for all runs.
+    """
+    groups: dict[tuple[str, ...], list[LongRun]] = {}
+    for run in runs:
+        groups.setdefault(tuple(getattr(run, name) for name in by), []).append(run)
+    everything = ("all", *[""] * (len(by) - 1))
+    rows = [
+        [*names, *_summed(group)]
+        for names, group in chain(groups.items(), [(everything, [*runs])])
+    ]
+    head = ["runs", "simulated h", "contacts", "first contact, s"]
+    head += ["clearance of body, mm", "of disc, mm", "odometry error, mm"]
+    return markdown_table([*by, *head], rows)
+
+
+def _summed(runs: Sequence[LongRun]) -> list[str]:
+    times = [run.contact_s for run in runs]
+    first, hits = min(times), np.isfinite(times).sum()
+    return [
+        str(len(runs)),
+        f"{sum(run.simulated_s for run in runs) / 3600.0:.1f}",
+        str(hits),
+        f"{first:.0f}" if hits else "",
+        f"{1e3 * min(run.clearance_m for run in runs):.1f}",
+        f"{1e3 * min(run.disc_m for run in runs):.1f}",
+        f"{1e3 * max(run.odometry_m for run in runs):.1f}",
+    ]

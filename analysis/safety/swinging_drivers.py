@@ -1,0 +1,313 @@
+"""Drivers that swing to make the odometry drift, and then press against bodies.
+
+When the forward speed is in phase with the angular acceleration, the odometry's errors
+of successive ticks can have the same sign. A driver of this module looks around, visits
+each box, swings for minutes at the start, and then drives at the boxes again. There it
+turns each front corner of the body towards the box. It steers by the true pose, so that
+it finds the boxes however far the odometry has drifted.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import differential_evolution
+
+from analysis.safety.driver_trials import (
+    AHEAD,
+    AIM,
+    SETTINGS,
+    TWIST,
+    Row,
+    Trial,
+    make_trial,
+    outside,
+    run_result,
+)
+from diagrams import RunResult
+from systems.base.robot import RobotParameters
+from systems.framework.signals import TICK_S
+
+#: Range of the frequencies of swings, Hz.
+SLOWEST_HZ, FASTEST_HZ = 0.1, 10.0
+#: Duration of a run in the search for drift, and in the search for a contact, s. The
+#: latter suffices to visit four boxes, to swing, and to press against all four.
+_DRIFT_S, _CONTACT_S = 48.0, 450.0
+#: Bearing of the body's front left corner from the axle, rad.
+_CORNER = math.atan2(0.5 * RobotParameters().width_m, 0.5 * RobotParameters().length_m)
+
+
+class Swing(NamedTuple):
+    """How a driver swings. Fields without a description are those of ``Row``."""
+
+    swing_v: float
+    """Amplitude of the forward speed, m/s."""
+    swing_omega: float
+    """Amplitude of the yaw rate, rad/s."""
+    hz: float
+    """Frequency, Hz."""
+    phase: float
+    """Phase by which the turn leads the forward speed, rad."""
+    edge: float = 1.0
+    skew: float = 0.0
+
+    def until(self, end_s: float) -> Row:
+        """A row of a driver's table that swings until the given time, s."""
+        v, omega, hz, *shape = self
+        return Row(end_s, TWIST, 0, 0, 0, 0, 0, v, omega, math.tau * hz, *shape)
+
+
+#: A swing that was found by hand: v = 0.72 cos(20 t), omega = 3.5 sin(20 t).
+BY_HAND = Swing(0.72, 3.5, 20.0 / math.tau, -0.5 * math.pi)
+
+
+class _Script:
+    """A driver's table under construction."""
+
+    def __init__(self) -> None:
+        self.rows: list[Row] = []
+        self.now_s = 0.0
+
+    def add(self, seconds: float, row: Row) -> None:
+        """Appends a row with the given duration, s."""
+        self.now_s += seconds
+        self.rows.append(row._replace(end_s=self.now_s))
+
+    def look_around(self) -> None:
+        """Turns in place, by a full turn."""
+        self.add(8.0, Row(0.0, TWIST, 0.0, 0.9))
+
+    def press(self, x: float, y: float) -> None:
+        """Drives at a point and turns both front corners of the body towards it."""
+        goal = Row(0.0, x=x, y=y, by_truth=1.0)
+        self.add(2.0 + math.hypot(x, y) / 0.4, goal._replace(mode=AHEAD, v=0.4))
+        for bearing in (_CORNER, -_CORNER):
+            self.add(1.0, goal._replace(mode=AHEAD, v=0.1))
+            self.add(2.0, goal._replace(mode=AIM, omega=bearing))
+
+    def home(self, heading: float, seconds: float) -> None:
+        """Drives back to the start and turns to a heading."""
+        self.add(seconds, Row(0.0, AHEAD, 0.4, by_truth=1.0))
+        x, y = 1e6 * math.cos(heading), 1e6 * math.sin(heading)
+        self.add(2.0, Row(0.0, AIM, x=x, y=y, by_truth=1.0))
+
+
+def swing_at_boxes(
+    names: tuple[str, str, str],
+    boxes: Sequence[Sequence[float]],
+    swing: Swing,
+    duration_s: float,
+    *,
+    heading: float = 0.0,
+    swings: int = 4,
+    swing_s: float = 10.0,
+    presses: int = 1,
+    seed: int = 1,
+) -> Trial:
+    """A driver that visits boxes, swings, and presses against the boxes again.
+
+    Args:
+        names: Names of layout, driver and setting.
+        boxes: (x, y, theta, length, width) each, m and rad.
+        swing: How it swings. After each swing it returns to the start.
+        duration_s: Duration of the run, s.
+        heading: Heading at the start and at the beginning of each swing, rad.
+        swings: Number of swings between visits to boxes.
+        swing_s: Duration of each swing, s.
+        presses: Number of boxes that it visits between swings.
+        seed: Seed of the noise.
+
+    Returns:
+        The trial.
+    """
+    boxes, script, turn, home_s = outside(boxes), _Script(), 0, 4.0 + 0.03 * swing_s
+    faces = [_nearest_point(box) for box in boxes]
+    script.look_around()
+    for face in faces:
+        script.press(*face)
+        script.home(heading, home_s)
+    while script.now_s < duration_s:
+        for _ in range(swings):
+            script.add(swing_s, swing.until(0.0))
+            script.home(heading, home_s)
+        for _ in range(presses):
+            script.press(*faces[turn % len(faces)])
+            script.home(heading, home_s)
+            turn += 1
+    source = 80.0, 0.0
+    return make_trial(names, boxes, script.rows, heading, source, seed, duration_s)
+
+
+def _nearest_point(box: Sequence[float]) -> tuple[float, float]:
+    """The point of a box that is nearest to the origin."""
+    x, y, theta, length, width = box
+    c, s = math.cos(theta), math.sin(theta)
+    u = min(max(-c * x - s * y, -0.5 * length), 0.5 * length)
+    v = min(max(s * x - c * y, -0.5 * width), 0.5 * width)
+    return x + c * u - s * v, y + s * u + c * v
+
+
+def swing_once(setting: str) -> Trial:
+    """A driver that visits a box, swings once for minutes, and visits the box again.
+
+    It swings for 150 s, with cells of 2 cm for 80 s, with a tick of 50 ms for 40 s.
+    With an odometry that takes the chord of each tick, the robot touches the box.
+
+    Args:
+        setting: Name of the robot's settings.
+
+    Returns:
+        The trial.
+    """
+    names, box = ("box", "swing, by hand, once", setting), (0.0, -2.63, 0.0, 0.3, 0.3)
+    swing_s = {"cells of 2 cm": 80.0, "tick of 50 ms": 40.0}.get(setting, 150.0)
+    duration_s = 60.0 + swing_s
+    return swing_at_boxes(names, [box], BY_HAND, duration_s, swings=1, swing_s=swing_s)
+
+
+def swing_alone(swing: Swing, setting: str, duration_s: float) -> Trial:
+    """A driver that looks around and then swings on an empty floor.
+
+    Args:
+        swing: How it swings.
+        setting: Name of the robot's settings.
+        duration_s: Duration of the run, s.
+
+    Returns:
+        The trial.
+    """
+    names, script = ("empty", "swing", setting), _Script()
+    script.look_around()
+    script.add(duration_s, swing.until(0.0))
+    source = 80.0, 0.0
+    return make_trial(names, [], script.rows, 0.0, source, 1, duration_s)
+
+
+#: Bounds of the numbers that make a swing: forward speed, m/s; logarithms of the yaw
+#: rate, rad/s, and of the frequency, Hz; phase, rad; edge and skew.
+_BOUNDS = (
+    (0.02, 0.72),
+    (math.log(1e-3), math.log(6.0)),
+    (math.log(SLOWEST_HZ), math.log(FASTEST_HZ)),
+    (-math.pi, math.pi),
+    (1.0, 4.0),
+    (-1.0, 1.0),
+)
+
+
+def draw_swing(draw: np.random.Generator) -> Swing:
+    """Draws a swing with a frequency from ``SLOWEST_HZ`` to ``FASTEST_HZ``."""
+    return _swing_at(draw.uniform(size=len(_BOUNDS)))
+
+
+def _swing_at(x: Any) -> Swing:
+    """The swing that a point of the unit cube stands for."""
+    low, high = np.transpose(_BOUNDS)
+    v, log_omega, log_hz, *shape = (low + (high - low) * np.asarray(x)).tolist()
+    return Swing(v, math.exp(log_omega), math.exp(log_hz), *shape)
+
+
+def _repeated(swing: Swing, setting: str) -> Swing:
+    """The same swing with a period of whole ticks.
+
+    The encoders then round each period alike, and the errors of periods add up.
+    """
+    tick_s = SETTINGS[setting].get("tick_s", TICK_S)
+    period_s = tick_s * max(round(1.0 / (swing.hz * tick_s)), 2)
+    return swing._replace(hz=1.0 / period_s)
+
+
+def odometry_error(result: RunResult) -> NDArray[np.float64]:
+    """(ticks,) distance of the axle's estimated place from its true place, m."""
+    columns = result.columns
+    x = columns["p_WB_x"] - columns["p_WB_estimated_x"]
+    y = columns["p_WB_y"] - columns["p_WB_estimated_y"]
+    return np.hypot(x, y)
+
+
+def search_drift(setting: str, runs: int, seed: int) -> tuple[Swing, float]:
+    """Searches by differential evolution for the swing with the largest drift.
+
+    Args:
+        setting: Name of the robot's settings.
+        runs: Approximate number of runs, of 48 s each.
+        seed: Seed of the search.
+
+    Returns:
+        The swing, and the drift of the odometry, m/s.
+    """
+
+    def drift(x: NDArray[np.float64]) -> float:
+        swing = _repeated(_swing_at(x), setting)
+        result = run_result(swing_alone(swing, setting, _DRIFT_S))
+        return -float(odometry_error(result)[-1]) / result.simulated_s
+
+    best = _evolve(drift, len(_BOUNDS), runs, seed)
+    return _repeated(_swing_at(best.x), setting), -float(best.fun)
+
+
+def four_boxes(distance_m: float) -> list[tuple[float, ...]]:
+    """Boxes on all four sides of the start, for drift in any direction.
+
+    Args:
+        distance_m: Distance of their centers from the start, m.
+
+    Returns:
+        (x, y, theta, length, width) each, m and rad.
+    """
+    sides = (0.0, -1.0), (0.0, 1.0), (1.0, 0.0), (-1.0, 0.0)
+    return [(distance_m * x, distance_m * y, 0.0, 0.3, 0.3) for x, y in sides]
+
+
+def _searched_trial(x: NDArray[np.float64], setting: str) -> Trial:
+    """The trial that a point of the unit cube stands for.
+
+    The point gives the swing, the heading and the distance of the boxes.
+    """
+    heading, far = math.tau * x[-2], 1.5 + 0.5 * x[-1]
+    names = "four boxes", "swing, searched for contact", setting
+    return swing_at_boxes(
+        names, four_boxes(far), _swing_at(x[:-2]), _CONTACT_S, heading=heading,
+        swings=6, swing_s=40.0, presses=4,
+    )  # fmt: skip
+
+
+def search_contact(
+    setting: str,
+    runs: int,
+    seed: int,
+    judge: Callable[[Swing, RunResult], float],
+) -> None:
+    """Searches by differential evolution for a run that ends in a contact.
+
+    It varies the swing, the heading and the distance of four boxes.
+
+    Args:
+        setting: Name of the robot's settings.
+        runs: Approximate number of runs, of 450 s each.
+        seed: Seed of the search.
+        judge: Called with the swing and the result of each run. The search minimizes
+            the value that it returns.
+    """
+
+    def worth(x: NDArray[np.float64]) -> float:
+        trial = _searched_trial(x, setting)
+        # The clearance is infinite where the robot never came near a body.
+        return min(judge(_swing_at(x[:-2]), run_result(trial)), 10.0)
+
+    _evolve(worth, len(_BOUNDS) + 2, runs, seed)
+
+
+def _evolve(
+    function: Callable[[NDArray[np.float64]], float], numbers: int, runs: int, seed: int
+) -> Any:
+    members = 4
+    generations = max(1, runs // (members * numbers) - 1)
+    return differential_evolution(
+        function, [(0.0, 1.0)] * numbers, maxiter=generations, popsize=members,
+        rng=seed, polish=False, tol=0.0,
+    )  # fmt: skip

@@ -1,1 +1,0 @@
-"""Scripts that print the tables of the pages."""

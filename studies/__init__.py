@@ -1,0 +1,1 @@
+"""Investigations whose numbers the documentation quotes."""

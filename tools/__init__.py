@@ -1,0 +1,1 @@
+"""What developers run: mutation testing, schemas that are shipped."""
