@@ -20,7 +20,7 @@ from pydrake.systems.framework import (
 from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams import SoundFollower
-from diagrams.robot import connect_by_name
+from diagrams.building.robot import connect_by_name
 from systems.framework.block_facts import block_facts
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams import Scenario
-from diagrams.robot import block_seed
+from diagrams.building.robot import block_seed
 from systems.base.diff_drive_plant import (
     SCHEMES,
     PlantNumbers,

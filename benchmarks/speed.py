@@ -16,8 +16,8 @@ from diagrams import (
     load_scenario,
     simulate,
 )
-from diagrams.run_parameters import Engine
-from diagrams.simulation import simulator_config
+from diagrams.running.simulation import simulator_config
+from diagrams.scenario.run_parameters import Engine
 
 #: Runs of each; the fastest counts, since a machine only ever adds time.
 REPEATS = 3

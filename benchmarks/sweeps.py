@@ -25,7 +25,7 @@ from analysis.sweeps.plan import SweepPlan
 from analysis.sweeps.sweep import run_sweep
 from benchmarks.process_tree import tree_usage
 from diagrams import simulate
-from diagrams.run_parameters import Engine
+from diagrams.scenario.run_parameters import Engine
 from studies.support.figures import Figure, print_figures
 
 ENGINES: tuple[Engine, ...] = ("drake", "compiled")

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from analysis.recordings.locate import locate
     from analysis.recordings.locate_result import LocateResult, SourceEstimate
     from analysis.sweeps.plan import SweepPlan
-    from diagrams.loading import library_scenarios, load_scenario
-    from diagrams.scenario import Scenario
+    from diagrams.scenario.loading import library_scenarios, load_scenario
+    from diagrams.scenario.scenario import Scenario
     from phonotaxis.runs import RunResult, simulate
     from phonotaxis.studies import (
         ComparisonResult,
@@ -63,15 +63,15 @@ _HOMES = {
     "InputError": "systems.framework.input_error",
     "LocateResult": "analysis.recordings.locate_result",
     "RunResult": "phonotaxis.runs",
-    "Scenario": "diagrams.scenario",
+    "Scenario": "diagrams.scenario.scenario",
     "SourceEstimate": "analysis.recordings.locate_result",
     "StabilityResult": "phonotaxis.studies",
     "SweepPlan": "analysis.sweeps.plan",
     "SweepResult": "phonotaxis.studies",
     "columns": "analysis.exports.columns",
     "compare": "phonotaxis.studies",
-    "library_scenarios": "diagrams.loading",
-    "load_scenario": "diagrams.loading",
+    "library_scenarios": "diagrams.scenario.loading",
+    "load_scenario": "diagrams.scenario.loading",
     "locate": "analysis.recordings.locate",
     "simulate": "phonotaxis.runs",
     "stability": "phonotaxis.studies",

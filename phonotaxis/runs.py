@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import diagrams
-from diagrams.audio.run_audio import RunAudio
-from diagrams.loading import load_scenario
-from diagrams.run_parameters import Engine
-from diagrams.scenario import Scenario
+from diagrams.running.audio.run_audio import RunAudio
+from diagrams.scenario.loading import load_scenario
+from diagrams.scenario.run_parameters import Engine
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:

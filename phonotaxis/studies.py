@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from analysis.sweeps.plan import SweepPlan, load_sweep
-from diagrams.loading import load_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.loading import load_scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
@@ -246,7 +246,7 @@ def stability(
     from analysis.stability.law_analysis import analyse_law
     from analysis.stability.report_files import stability_document
     from analysis.stability.report_parts import parts_for
-    from diagrams.laws import make_controller
+    from diagrams.building.laws import make_controller
 
     if not isinstance(scenario, Scenario):
         scenario = load_scenario(scenario)

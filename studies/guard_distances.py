@@ -23,7 +23,7 @@ from matplotlib.patches import Wedge
 from analysis.reporting.palette import COLOURS, SERIES_COLOURS, draw_grid
 from analysis.safety.driver_trials import drive_at_a_wall
 from diagrams import Scenario
-from diagrams.scenario_warnings.guarantees import clear_way, seen_angle_deg
+from diagrams.scenario.warnings.guarantees import clear_way, seen_angle_deg
 from studies.tables import Table
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_presets import SENSOR_PRESETS

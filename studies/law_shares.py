@@ -14,7 +14,7 @@ import pandas as pd
 
 from analysis.reporting.intervals import wilson_interval
 from analysis.sweeps.store import load_results
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
 from studies.tables import Table
 
 _HEAD = (

@@ -22,7 +22,7 @@ from analysis.models.linearisation import check_gradient, compare_routes
 from analysis.models.open_loops import DIRECTIONS, BreakPoint, target_loop
 from analysis.models.operating_points import OperatingPoint, moving_equilibrium
 from diagrams import load_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from studies.tables import Table
 from systems.framework.signals import TICK_S
 

@@ -16,7 +16,7 @@ import pytest
 import phonotaxis
 from analysis.commands.command_line import COMMANDS
 from diagrams import library_scenarios
-from diagrams.fields.shipped import known_laws
+from diagrams.scenario.fields.shipped import known_laws
 
 #: A shell that says nothing for so long hangs.
 WAIT_S = 60.0

@@ -11,7 +11,7 @@ import phonotaxis
 from analysis import installation
 from analysis.commands.command_line import COMMANDS, make_parser
 from diagrams import load_scenario
-from diagrams.fields.shipped import schema_text
+from diagrams.scenario.fields.shipped import schema_text
 
 
 def call(capsys, *words: str) -> tuple[int, str, str]:

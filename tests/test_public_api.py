@@ -337,7 +337,7 @@ NOISE = np.random.default_rng(3).standard_normal((3, 9600))
         ([["a"] * 9], {"sample_rate_hz": 48_000}, "holds no numbers"),
         (NOISE, {"sample_rate_hz": 48_000, "geometry": [[0.0]]}, "geometry: micro"),
         (NOISE, {"sample_rate_hz": 48_000, "geometry": [1.0, 2.0]}, "of positions"),
-        ("a.wav", {"sample_rate_hz": 48_000}, "a file has its own"),
+        ("a.wav", {"sample_rate_hz": 48_000}, r"sample_rate_hz: .*file"),
     ],
 )
 def test_samples_that_cannot_be_used_are_refused(samples, options, message):

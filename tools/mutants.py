@@ -37,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 #: metrics, statistics and claims.
 MODULES = (
     "systems/*/*.py",
-    "diagrams/stop_rules.py",
+    "diagrams/running/stop_rules.py",
     "analysis/reporting/intervals.py",
     "analysis/runs/metrics.py",
     "analysis/runs/proximity.py",

@@ -12,8 +12,8 @@ from typing import Any
 
 from pydantic.json_schema import models_json_schema
 
-from diagrams.participants import FollowerParameters, SourceParameters
-from diagrams.scenario import Scenario
+from diagrams.scenario.participants import FollowerParameters, SourceParameters
+from diagrams.scenario.scenario import Scenario
 from systems.framework.meanings import meanings
 from systems.framework.parameters import Parameters
 from systems.laws.catalogue import LAWS

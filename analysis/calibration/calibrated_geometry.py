@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from analysis.calibration.calibration import Calibration
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.reporting.plain_values import write_json
-from diagrams.yaml_text import LARGEST_BYTES, dump_yaml
+from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml
 from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 

@@ -7,8 +7,8 @@ from typing import Annotated
 
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from diagrams.fields.explain import explain
-from diagrams.loading import read_mapping
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.loading import read_mapping
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Time

@@ -26,8 +26,8 @@ from diagrams import (
     build_sound_follower,
     make_simulator,
 )
-from diagrams.bodies import robot_rectangle
-from diagrams.stop_rules import Collision, StopRules
+from diagrams.running.stop_rules import Collision, StopRules
+from diagrams.scenario.bodies import robot_rectangle
 from systems.base.wheel_speed_command import hand_position_twist, limited_wheel_speeds
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, rectangle_clearance, rotate

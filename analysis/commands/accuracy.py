@@ -35,7 +35,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[Sequence[LocalizationCell]]:
     from analysis.hearing.trial_counts import check_trials
-    from diagrams.loading import load_scenario
+    from diagrams.scenario.loading import load_scenario
 
     place = take(options.out)
     overrides = [] if options.seed is None else [f"seed={options.seed}"]

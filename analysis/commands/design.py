@@ -19,8 +19,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[DesignStudy]:
-    from diagrams.loading import load_scenario
-    from diagrams.scenario_files import check_files
+    from diagrams.scenario.loading import load_scenario
+    from diagrams.scenario.scenario_files import check_files
 
     place = take(options.out)
     scenario = load_scenario(options.scenario, overrides(options))

@@ -28,7 +28,7 @@ class SavedAudio:
 
     def __init__(self, directory: str, out: Path, scenario: Scenario) -> None:
         from analysis.reporting.result_directory import check_directory
-        from diagrams.audio.audible import check_audible
+        from diagrams.scenario.audible import check_audible
         from systems.framework.input_error import InputError
 
         check_audible(scenario)

@@ -30,7 +30,7 @@ class SavedMovie:
         self, file: str, scenario: Scenario, place: Place, saved: SavedAudio | None
     ) -> None:
         from analysis.movies.encoding import MovieFile
-        from diagrams.audio.audible import check_audible
+        from diagrams.scenario.audible import check_audible
         from systems.framework.input_error import InputError
 
         self._shown, self._movie = file, MovieFile(file)

@@ -54,8 +54,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.run_error import RunError
-    from diagrams.loading import load_scenario
-    from diagrams.scenario_files import check_files
+    from diagrams.scenario.loading import load_scenario
+    from diagrams.scenario.scenario_files import check_files
     from systems.framework.input_error import InputError
 
     place, exports = take(options.out), Exports.chosen(options)
@@ -72,7 +72,7 @@ def _prepare(options: Namespace, take: Take) -> Job[RunResult]:
     from analysis.exports.recorded_run import RecordedRun
     from analysis.runs.run_report import run_summary, summary_text, write_run
     from diagrams import build_sound_follower, prepared_loop, simulate
-    from diagrams.scenario_warnings.warnings_of import warnings_of
+    from diagrams.scenario.warnings.warnings_of import warnings_of
 
     for warning in warnings_of(scenario):
         logging.getLogger("phonotaxis").warning("%s", warning)

@@ -48,8 +48,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
     from analysis.run_error import RunError
     from analysis.stability.choice import chosen_laws, chosen_robot
-    from diagrams.loading import load_scenario
-    from diagrams.scenario_files import check_files
+    from diagrams.scenario.loading import load_scenario
+    from diagrams.scenario.scenario_files import check_files
 
     place = take(options.out)
     whole = load_scenario(options.scenario, overrides(options))
@@ -66,7 +66,7 @@ def _prepare(options: Namespace, take: Take) -> Job[list[LawAnalysis]]:
         write_stability,
     )
     from analysis.stability.report_parts import parts_for
-    from diagrams.laws import make_controller
+    from diagrams.building.laws import make_controller
 
     if note:
         logging.getLogger("phonotaxis").warning("%s", note)

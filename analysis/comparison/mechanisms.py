@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 
 from analysis.runs.run_table import column
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
 
 #: A body without an echo for so many ticks before the contact was out of sight: none
 #: at the last tick.

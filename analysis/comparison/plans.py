@@ -10,14 +10,14 @@ from pydantic import ValidationError
 
 import diagrams
 from analysis.sweeps.plan import SweepPlan, load_sweep
-from diagrams.fields.explain import explain
-from diagrams.loading import (
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.loading import (
     load_scenario,
     parse_setting,
     read_mapping,
     scenario_from_mapping,
 )
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
 

@@ -16,8 +16,8 @@ from analysis.design.requirements import DesignRequirements, check_law, metres_t
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from analysis.linear.contact_mode import contact_matrix
 from analysis.models.ideal_scenarios import changed, ideal_scenario
-from diagrams.scenario import Scenario
-from diagrams.simulation import simulate
+from diagrams.running.simulation import simulate
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.parameters import AttractionParameters
 

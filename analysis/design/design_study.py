@@ -28,7 +28,7 @@ from analysis.laws.push_and_pull import (
     kinetic_energy,
 )
 from analysis.linear.contact_mode import largest_contact_stiffness
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 #: Distances from obstacle to rest for the table of barriers, m.
 _TO_GO_M = (1.0, 1.5, 2.0, 3.0)

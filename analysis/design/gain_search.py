@@ -27,7 +27,7 @@ from analysis.laws.push_and_pull import (
     spring,
     stiffest,
 )
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 from systems.laws.repulsion import RepulsionParameters

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagrams import load_scenario, simulate
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 #: Lateral offsets of the start, m: from before one obstacle to before the other.
 JAM_STARTS_M = tuple(np.linspace(-0.6, 0.6, 9).round(3).tolist())

@@ -16,7 +16,7 @@ from analysis.laws.push_and_pull import (
     stiffest,
 )
 from analysis.linear.contact_mode import largest_contact_stiffness
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 #: Gains are rounded; a bound holds to within the rounding.

@@ -25,8 +25,8 @@ from analysis.exports.ros2_values import (
     vector,
 )
 from diagrams import dump_scenario
-from diagrams.participants import FollowerParameters
-from diagrams.scenario_warnings.warnings_of import warnings_of
+from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import InputError
 
 _PACKAGES = ("mcap", "mcap_ros2")

@@ -11,14 +11,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.loading import load_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.loading import load_scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from diagrams.run_result import RunResult
+    from diagrams.running.run_result import RunResult
 
 SCENARIO_FILE, TABLE_FILE = "scenario.yaml", "trajectory.parquet"
 #: Without these there is nothing to see.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.hearing.cramer_rao import LocalizationBound, SlopeEnergy, position_bound
 from diagrams import Scenario, build_sound_follower, make_simulator
-from diagrams.robot import block_seed
+from diagrams.building.robot import block_seed
 from systems import MicArray
 from systems.base.robot import microphones_B
 from systems.framework.noise import tick_generator

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from diagrams.laws import make_controller
-from diagrams.scenario import Scenario
+from diagrams.building.laws import make_controller
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.ranging.collision_vector import SLOTS
 

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 from pydrake.autodiffutils import AutoDiffXd
 
 from diagrams import Scenario
-from diagrams.laws import make_controller
-from diagrams.own_code import loaded_digests
+from diagrams.building.laws import make_controller
+from diagrams.scenario.own_code import loaded_digests
 from systems.framework.input_error import InputError
 
 #: Spacing of ``forces_n``, m. Linear interpolation of the default laws between

@@ -21,7 +21,7 @@ from analysis.models.linear_models import NEUTRAL
 from analysis.models.model_reduction import minimal_model
 from analysis.models.open_loops import DIRECTIONS, Direction
 from analysis.models.operating_points import OperatingPoint, motion_model
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point
 

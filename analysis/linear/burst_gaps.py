@@ -13,7 +13,7 @@ from analysis.linear.burst_cycle import HOLDS, Hold, burst_cycle
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import NEUTRAL
 from analysis.models.operating_points import OperatingPoint, motion_model
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 
 @dataclass(frozen=True)

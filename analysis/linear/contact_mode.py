@@ -27,7 +27,7 @@ from analysis.models.block_models import block_model
 from analysis.models.ideal_scenarios import require_rolling
 from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters

@@ -12,7 +12,7 @@ from analysis.linear.contact_mode import contact_matrix
 from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 

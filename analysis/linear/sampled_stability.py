@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from analysis.linear.contact_mode import contact_matrix, delayed_output, motion_chain
 from analysis.models.linear_models import LinearModel
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.signals import TICK_S
 
 Scheme = Literal["held acceleration", "held velocity", "held velocity, one tick late"]

@@ -14,7 +14,7 @@ from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_scenarios import changed, frozen_scenario
 from analysis.models.operating_points import OperatingPoint
 from diagrams import build_sound_follower, make_simulator
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point
 

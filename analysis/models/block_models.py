@@ -19,7 +19,7 @@ from analysis.models.autodiff import seed, value_and_gradient
 from analysis.models.diagram_state import set_discrete_state
 from analysis.models.ideal_loop import IdealLoop
 from analysis.models.linear_models import LinearModel
-from diagrams.simulation import simulator_config
+from diagrams.running.simulation import simulator_config
 
 #: Appended to the name of a signal as it is after the updates of its tick.
 AFTER = "_after"

@@ -28,7 +28,7 @@ from analysis.models.operating_points import (
     resting_equilibrium,
 )
 from analysis.runs.shortest_path import shortest_path_length
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, rectangle_corners
 

@@ -30,10 +30,10 @@ from analysis.models.ideal_scenarios import (
     require_ideal,
 )
 from diagrams import build_sound_follower
-from diagrams.own_code import loaded_digests
-from diagrams.robot import parts_of
-from diagrams.scenario import Scenario
-from diagrams.simulation import simulator_config
+from diagrams.building.robot import parts_of
+from diagrams.running.simulation import simulator_config
+from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.scenario import Scenario
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.base.parameters import PlantParameters
 from systems.framework.input_error import InputError
 

@@ -21,7 +21,7 @@ from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
 from analysis.models.operating_points import OperatingPoint
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 BreakPoint = Literal["sensor", "actuator", "wheels"]

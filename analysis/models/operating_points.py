@@ -20,7 +20,7 @@ from analysis.models.ideal_loop import IdealLoop, ideal_loop
 from analysis.models.ideal_scenarios import changed, ideal_scenario
 from analysis.models.linear_models import NEUTRAL, LinearModel, Mode
 from analysis.models.model_reduction import minimal_model
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.world.geometry import control_point, nearest_point_on_rectangle
 

@@ -26,7 +26,7 @@ from analysis.runs.scene import (
 )
 from analysis.runs.trajectory_artists import draw_room
 from diagrams import RunResult
-from diagrams.bodies import microphones_W, robot_rectangle
+from diagrams.scenario.bodies import microphones_W, robot_rectangle
 from systems.world.geometry import rectangle_corners
 
 #: Dots a picture's inch; pictures are 8 inch wide.

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.robot import world_seeds
-from diagrams.scenario import Scenario
-from diagrams.world_blocks import world_blocks
+from diagrams.building.robot import world_seeds
+from diagrams.building.world_blocks import world_blocks
+from diagrams.scenario.scenario import Scenario
 from systems.odor.odor_plume import concentration
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
-from diagrams.yaml_text import parse_yaml
+from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive

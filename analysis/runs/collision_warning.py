@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.run_result import RunResult
+from diagrams.running.run_result import RunResult
 from systems.framework.compiling import njit
 from systems.world.geometry import fan_ranges
 

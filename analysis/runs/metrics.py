@@ -21,8 +21,8 @@ from analysis.runs.smoothness import (
     turn_reversals,
     windows,
 )
-from diagrams.run_result import RunResult
-from diagrams.stop_rules import ROUNDING_S
+from diagrams.running.run_result import RunResult
+from diagrams.running.stop_rules import ROUNDING_S
 from systems.framework.compiling import njit
 from systems.world.geometry import beyond_rectangle, control_point_velocity
 

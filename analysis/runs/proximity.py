@@ -9,8 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from diagrams.bodies import rectangles_at
-from diagrams.run_result import RunResult
+from diagrams.running.run_result import RunResult
+from diagrams.scenario.bodies import rectangles_at
 from systems.framework.compiling import njit
 from systems.world.geometry import contact_time, rectangle_clearance
 

@@ -38,7 +38,7 @@ from analysis.runs.scene import (
 )
 from analysis.runs.tracked_bodies import tracked_bodies
 from diagrams import RunResult, Scenario
-from diagrams.bodies import RecordedPath
+from diagrams.scenario.bodies import RecordedPath
 from systems.safety.braking import BRAKED, HALTED, PASSED, SLOWED, TURNED
 from systems.sound.parameters import SoundParameters
 

@@ -19,7 +19,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from analysis.reporting.palette import COLOURS
 from analysis.runs.scene import Look, bounds, sensor_pose
 from diagrams import RunResult, Scenario
-from diagrams.participants import SourceParameters
+from diagrams.scenario.participants import SourceParameters
 from systems.base.robot import microphones_B
 
 #: Heights are not modelled; these look right, m.

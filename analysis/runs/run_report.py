@@ -16,7 +16,7 @@ from analysis.runs.guarded_motion import halts_of
 from analysis.runs.metrics import run_metrics
 from analysis.runs.proximity import Proximity
 from diagrams import RunResult, build_sound_follower, write_scenario
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
 from systems.search.search_ending import fault_names
 
 

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from analysis.reporting.palette import COLOURS, ROBOT_COLOURS
 from diagrams import RunResult, Scenario
-from diagrams.bodies import Path, robot_rectangle
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
+from diagrams.scenario.bodies import Path, robot_rectangle
 from systems.framework.input_error import InputError
 from systems.sound.parameters import SoundParameters
 from systems.world.geometry import nearest_point_on_rectangle, rectangle_corners, rotate

@@ -25,8 +25,8 @@ from analysis.runs.scene import (
     tick_at,
 )
 from diagrams import RunResult
-from diagrams.bodies import microphones_W, robot_rectangle
-from diagrams.participants import SourceParameters
+from diagrams.scenario.bodies import microphones_W, robot_rectangle
+from diagrams.scenario.participants import SourceParameters
 from systems.world.geometry import rectangle_corners
 
 #: A body is drawn again when it has moved so far, m.

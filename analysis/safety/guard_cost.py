@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from diagrams import load_scenario, simulate
-from diagrams.simulation import prepared_loop
+from diagrams.running.simulation import prepared_loop
 
 
 class TickCost(NamedTuple):

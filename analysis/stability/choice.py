@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from diagrams.loading import scenario_from_mapping
-from diagrams.scenario import Scenario
+from diagrams.scenario.loading import scenario_from_mapping
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS, LAWS
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from analysis.reporting.html_page import Cell, number, paragraph, table
 from analysis.stability.law_analysis import Part
-from diagrams.scenario_warnings.guarantees import Guarantees, guarantees
+from diagrams.scenario.warnings.guarantees import Guarantees, guarantees
 
 
 def safety_parts() -> tuple[Part, ...]:

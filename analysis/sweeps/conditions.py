@@ -8,8 +8,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from diagrams.bodies import Body, Surroundings
-from diagrams.scenario import Scenario
+from diagrams.scenario.bodies import Body, Surroundings
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Length, NonNegativeLength, Parameters
 from systems.world.plane import beyond_rectangle

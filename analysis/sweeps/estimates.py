@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from analysis.reporting.intervals import Estimate, median_interval, wilson_interval
 from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
 
 #: A drawn number is cut into at most so many bins, of so many runs or more.
 MOST_BINS, LEAST_RUNS = 8, 20

@@ -17,10 +17,10 @@ from analysis.run_error import RunError
 from analysis.runs.metrics import run_metrics
 from analysis.sweeps.plan import SweepPoint
 from diagrams import RunResult, Scenario, simulate
-from diagrams.own_code import code_of_sweep, is_interrupt
-from diagrams.run_parameters import Engine
-from diagrams.scenario_warnings.warnings_of import warnings_of
-from diagrams.stop_rules import Collision
+from diagrams.running.stop_rules import Collision
+from diagrams.scenario.own_code import code_of_sweep, is_interrupt
+from diagrams.scenario.run_parameters import Engine
+from diagrams.scenario.warnings.warnings_of import warnings_of
 from systems.framework.input_error import shortened
 
 #: Cause in the row of a run that raised an error.

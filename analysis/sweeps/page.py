@@ -27,7 +27,7 @@ from analysis.sweeps.one_run import FAILED
 from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.plots import grid_axes, plot_heat_maps, plot_line, plot_marginal
 from analysis.sweeps.sweep import reproducing_command
-from diagrams.stop_rules import SUCCESSFUL
+from diagrams.running.stop_rules import SUCCESSFUL
 
 #: Pages stay readable: so many maps, and so many commands for errors and others.
 MOST_MAPS, MOST_ERRORS, MOST_OTHERS = 12, 200, 10

@@ -21,16 +21,16 @@ from pydantic import Field, Strict, ValidationError, model_validator
 from analysis.sweeps.conditions import Conditions
 from analysis.sweeps.distributions import Distribution
 from analysis.sweeps.sweep_file import read_sweep
-from diagrams.fields.explain import explain
-from diagrams.loading import (
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.loading import (
     load_scenario,
     resolve_sound,
     scenario_from_mapping,
     set_fields,
 )
-from diagrams.own_code import own_files
-from diagrams.scenario import Scenario
-from diagrams.yaml_text import dump_yaml
+from diagrams.scenario.own_code import own_files
+from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.yaml_text import dump_yaml
 from systems.framework.input_error import InputError
 from systems.framework.parameters import Parameters
 

@@ -20,7 +20,7 @@ from analysis.sweeps.plan import SweepPlan, SweepPoint
 from analysis.sweeps.processes import WorkerError, run_locally
 from analysis.sweeps.store import StoreError, SweepStore, load_results
 from diagrams import Scenario, build_sound_follower, prepared_loop
-from diagrams.run_parameters import MANY_RUNS, Engine
+from diagrams.scenario.run_parameters import MANY_RUNS, Engine
 from systems.framework.input_error import InputError
 
 _LOGGER = logging.getLogger("phonotaxis")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from diagrams.loading import read_mapping
+from diagrams.scenario.loading import read_mapping
 from systems.framework.input_files import require_file
 
 SWEEP_SCHEMA_FILE = Path(__file__).with_name("sweep.schema.json")

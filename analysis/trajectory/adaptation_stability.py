@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 from analysis.trajectory.point_run import PointLoop, run_point
 from analysis.trajectory.route_loop import route_law
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.trajectory.impedance_sensitivity import sensitivity_sources
 from systems.laws.trajectory.parameters import (

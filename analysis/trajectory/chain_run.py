@@ -18,7 +18,7 @@ from analysis.trajectory.robot_chain import (
     resting_gaps,
 )
 from analysis.trajectory.route_loop import route_law
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.base.wheel_speed_command import clamped_velocity, integrate_velocity
 from systems.framework.compiling import njit
 from systems.laws.trajectory.trajectory_impedance import (

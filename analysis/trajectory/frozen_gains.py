@@ -22,7 +22,7 @@ from analysis.trajectory.route_loop import (
     route_law,
     route_points,
 )
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.sampled_bounds import (
     SampledMass,

@@ -14,7 +14,7 @@ from scipy.optimize import minimize_scalar
 from analysis.linear.contact_mode import motion_chain
 from analysis.linear.frequency_levels import frequency_grid
 from analysis.trajectory.route_loop import contact_gains, route_law
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 from systems.laws.trajectory.trajectory_impedance import contact_numbers
 

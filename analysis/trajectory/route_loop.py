@@ -13,8 +13,8 @@ from analysis.models.block_models import block_model, join_blocks
 from analysis.models.ideal_scenarios import require_rolling
 from analysis.models.linear_models import LinearModel
 from analysis.models.model_reduction import minimal_model
-from diagrams.scenario import Scenario
-from diagrams.simulation import simulator_config
+from diagrams.running.simulation import simulator_config
+from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import OdometryParameters
 from systems.base.wheel_odometry import WheelOdometry_

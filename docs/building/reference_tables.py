@@ -11,8 +11,8 @@ from pathlib import Path
 from analysis.commands.command_line import make_parser
 from analysis.exports.columns import COLUMNS
 from analysis.reporting.markdown import markdown_table
-from diagrams.fields.field_list import list_fields
-from diagrams.fields.shipped import scenario_schema
+from diagrams.scenario.fields.field_list import list_fields
+from diagrams.scenario.fields.shipped import scenario_schema
 
 #: Symbol in the equations and place in the papers, by field.
 _SOURCES = Path(__file__).with_name("parameter_sources.json")

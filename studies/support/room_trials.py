@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from analysis.reporting.intervals import Interval, wilson_interval
-from diagrams.bodies import microphones_W
+from diagrams.scenario.bodies import microphones_W
 from systems.base.robot import RobotParameters
 from systems.framework.noise import frame_noise, tick_generator
 from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S

@@ -11,7 +11,7 @@ from analysis.comparison.plans import comparison_plan
 from analysis.design.requirements import DesignRequirements, metres_to_go
 from analysis.laws.push_and_pull import DESIGNED_LAWS
 from diagrams import load_scenario, simulate
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from phonotaxis import main
 
 pytestmark = pytest.mark.slow

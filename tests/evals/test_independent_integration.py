@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from diagrams import build_sound_follower, make_simulator
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems import (
     ActiveImpedance2017Controller,
     ActiveImpedanceController,

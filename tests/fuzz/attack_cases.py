@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 #: What a run is made short with, where it should come to that.
 SHORT = ("--set", "duration_s=0.05")

@@ -31,7 +31,7 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 def _prepare(options: Namespace, take: Take) -> Job[str]:
     from diagrams import library_scenarios
-    from diagrams.fields.shipped import known_laws
+    from diagrams.scenario.fields.shipped import known_laws
 
     def script() -> str:
         import shtab

@@ -13,7 +13,7 @@ from analysis.commands.arguments import take_json
 from analysis.commands.command import Command, Job, Take
 
 if TYPE_CHECKING:
-    from diagrams.fields.field_list import Field
+    from diagrams.scenario.fields.field_list import Field
 
 
 def _add_arguments(parser: ArgumentParser) -> None:
@@ -32,8 +32,8 @@ def _add_arguments(parser: ArgumentParser) -> None:
 
 
 def _prepare(options: Namespace, take: Take) -> Job[list[Field]]:
-    from diagrams.fields.field_list import find_fields
-    from diagrams.fields.shipped import scenario_schema, schema_text
+    from diagrams.scenario.fields.field_list import find_fields
+    from diagrams.scenario.fields.shipped import scenario_schema, schema_text
 
     schema = scenario_schema()
     found = find_fields(schema, options.pattern)

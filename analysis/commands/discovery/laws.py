@@ -10,7 +10,7 @@ from analysis.commands.discovery.listing import listing
 
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
-    from diagrams.fields.shipped import known_laws
+    from diagrams.scenario.fields.shipped import known_laws
 
     return listing("laws", "title", known_laws)
 

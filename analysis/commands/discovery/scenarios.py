@@ -11,7 +11,7 @@ from analysis.commands.discovery.listing import listing
 
 def _prepare(options: Namespace, take: Take) -> Job[dict[str, str]]:
     from diagrams import library_scenarios
-    from diagrams.loading import read_mapping
+    from diagrams.scenario.loading import read_mapping
 
     return listing(
         "scenarios",

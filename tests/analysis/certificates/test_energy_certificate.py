@@ -12,7 +12,7 @@ from scipy.optimize import minimize_scalar
 
 from analysis.certificates.certificate_trials import try_certificate
 from analysis.certificates.energy_certificate import EnergyCertificate, certify_energy
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.world.geometry import rectangle_corners
 
 LAWS = ("conventional", "active", "active2017")

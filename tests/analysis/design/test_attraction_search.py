@@ -14,7 +14,7 @@ from analysis.design.attraction_search import (
     following_lag,
 )
 from analysis.design.requirements import DesignRequirements
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 SCENARIO, REQUIREMENTS = Scenario(), DesignRequirements()
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.design import jam_runs as module
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 #: One that stops 3 m from the source.
 RUN = SimpleNamespace(

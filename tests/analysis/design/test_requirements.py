@@ -15,7 +15,7 @@ from analysis.design.requirements import (
     with_gains,
 )
 from analysis.reporting.plain_values import plain
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 SCENARIO = Scenario()
 

@@ -8,8 +8,8 @@ import pytest
 from analysis.laws.law_curves import law_curves, radial_forces
 from analysis.laws.law_curves_plots import plot_law_curves
 from analysis.reporting.plain_values import plain
-from diagrams.laws import make_controller
-from diagrams.scenario import Scenario
+from diagrams.building.laws import make_controller
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import FORCE_LAWS
 

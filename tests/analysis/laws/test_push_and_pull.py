@@ -22,7 +22,7 @@ from analysis.laws.push_and_pull import (
     spring,
     stiffest,
 )
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 SCENARIO = Scenario()
 K_R, RHO_0, NEAREST = 2.0, 0.8, 0.03

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 
 from analysis.linear.burst_cycle import burst_cycle, simulate_burst_cycle
 from analysis.models.equilibria import follow_equilibrium
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 M, K, D, T = 3.94, 2.0, 1.0, 0.025
 

@@ -17,7 +17,7 @@ from analysis.linear.contact_mode import (
     motion_chain,
 )
 from analysis.models.equilibria import find_equilibria
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 T, MASS, LAG = 0.025, 3.94, 0.05
 SCENARIO = Scenario()

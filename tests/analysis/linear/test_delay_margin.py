@@ -22,7 +22,7 @@ from analysis.models.equilibria import follow_equilibrium
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 M, K, D, LAG, T = 3.94, 2.0, 1.0, 0.05, 0.025
 

@@ -24,7 +24,7 @@ from analysis.linear.loop_margins import frequency_response, is_loop, loop_margi
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.stability.recommended_gains import GainThresholds, recommend_gains
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
 from systems.heading.parameters import HeadingControlParameters, MotorDriverParameters
 

@@ -14,7 +14,7 @@ from analysis.models.equilibria import follow_equilibrium
 from analysis.models.linear_models import LinearModel
 from analysis.models.open_loops import closed, cut_model, open_loop, target_loop
 from analysis.models.operating_points import moving_equilibrium
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 M, K, D = 3.94, 2.0, 1.0
 

@@ -18,7 +18,7 @@ from analysis.linear.sampled_stability import (
     poles_against_period,
 )
 from analysis.models.equilibria import follow_equilibrium
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 M, K, D, T, LAG = 3.94, 2.0, 1.0, 0.025, 0.05
 

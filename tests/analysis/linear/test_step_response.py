@@ -11,7 +11,7 @@ from analysis.linear.loop_margins import loop_margins
 from analysis.linear.step_response import check_step, fitted_step
 from analysis.models.equilibria import follow_equilibrium
 from analysis.models.open_loops import open_loop
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 
 @pytest.mark.parametrize("law", ["none", "conventional", "active"])

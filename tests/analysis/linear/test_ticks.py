@@ -22,8 +22,8 @@ from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.linearisation import compare_routes, continuous_model
 from analysis.models.open_loops import open_loop
-from diagrams.laws import make_controller
-from diagrams.scenario import Scenario
+from diagrams.building.laws import make_controller
+from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
 
 M, K, D, LAG = 3.94, 2.0, 1.0, 0.05

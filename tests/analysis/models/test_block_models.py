@@ -10,7 +10,7 @@ from analysis.models.block_models import join_blocks, sampled_blocks
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import ideal_scenario
 from analysis.models.linear_models import simple_poles
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 SOURCE_PORTS = (("hearing", "pose_WS"), ("collision", "pose_WS"))
 SIGNALS = ("acceleration_W[0]", "acceleration_W[1]", "p_PS_B[0]", "p_PS_B[1]")

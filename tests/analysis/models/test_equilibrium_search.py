@@ -18,7 +18,7 @@ from analysis.models.force_field import ForceField
 from analysis.models.ideal_loop import ideal_loop
 from analysis.models.point_mass import point_mass
 from diagrams import load_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.world.geometry import nearest_point_on_rectangle
 
 LAWS = ("conventional", "active", "active2017", "conventional2017")

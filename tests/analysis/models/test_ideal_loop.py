@@ -16,7 +16,7 @@ from analysis.models.ideal_scenarios import (
     require_ideal,
 )
 from diagrams import make_simulator
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.framework.signals import TICK_S as T
 
 pytestmark = pytest.mark.drake

@@ -21,7 +21,7 @@ from analysis.models.linearisation import (
     sampled_model,
 )
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 pytestmark = pytest.mark.drake
 

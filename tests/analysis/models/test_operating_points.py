@@ -14,7 +14,7 @@ from analysis.models.ideal_loop import ideal_loop
 from analysis.models.ideal_scenarios import frozen_scenario, ideal_scenario
 from analysis.models.operating_points import moving_equilibrium, resting_equilibrium
 from diagrams import load_scenario
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 K_R, K_0, RHO_0, M, D_R = 2.0, 16.0, 0.8, 3.94, 1.0
 REPULSION = {

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from analysis.models.point_mass import STEP_S, point_mass
-from diagrams.laws import make_controller
+from diagrams.building.laws import make_controller
 from systems.laws.impedance import attraction_force, repulsion_force
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
 

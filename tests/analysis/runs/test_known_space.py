@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import diagrams.simulation
+import diagrams.running.simulation
 from analysis.runs.known_space import (
     has_known_space,
     known_space,
@@ -48,13 +48,13 @@ def last(result):
 @pytest.mark.parametrize("kind", KINDS)
 def test_it_is_what_the_block_holds_at_the_end_of_a_run(kind, monkeypatch):
     scenario = guarded("duration_s=6", *KINDS[kind])
-    simulators, make = [], diagrams.simulation.make_simulator
+    simulators, make = [], diagrams.running.simulation.make_simulator
 
     def kept(follower):
         simulators.append(make(follower))
         return simulators[-1]
 
-    monkeypatch.setattr(diagrams.simulation, "make_simulator", kept)
+    monkeypatch.setattr(diagrams.running.simulation, "make_simulator", kept)
     follower = build_sound_follower(scenario, log=True)
     result = simulate(scenario, follower=follower)
     (parts,) = follower.robots.values()

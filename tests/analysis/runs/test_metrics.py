@@ -17,8 +17,8 @@ from analysis.runs.metrics import frames_with_sound, run_metrics
 from analysis.runs.proximity import Proximity
 from analysis.runs.smoothness import log_dimensionless_jerk, spectral_arc_length
 from diagrams import RunResult, build_sound_follower, load_scenario, simulate
-from diagrams.scenario import Scenario
-from diagrams.stop_rules import Collision
+from diagrams.running.stop_rules import Collision
+from diagrams.scenario.scenario import Scenario
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.ultrasonic_array import cone_ranges
 from systems.world.geometry import contact_time, rectangle_clearance

@@ -17,7 +17,7 @@ from analysis.linear.sampled_stability import gain_chart, poles_against_period
 from analysis.linear.step_response import check_step
 from analysis.models.equilibria import find_equilibria, follow_equilibrium
 from analysis.stability import chart_plots
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 
 @pytest.fixture(scope="module")

@@ -30,7 +30,7 @@ from analysis.stability.verdict_readings import (
     read_worst_case,
     read_worst_margin,
 )
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 T = 0.025
 #: (phase deg, gain dB, M_s, alpha) of three cuts: no extreme is first or last.

@@ -26,7 +26,7 @@ from analysis.trajectory.route_loop import (
     whole_route_model,
 )
 from diagrams import build_sound_follower, load_scenario
-from diagrams.simulation import simulator_config
+from diagrams.running.simulation import simulator_config
 from systems.framework.input_error import InputError
 from systems.laws.trajectory.sampled_bounds import SampledMass, sampled_matrix
 

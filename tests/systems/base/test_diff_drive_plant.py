@@ -13,7 +13,7 @@ from pydrake.systems.analysis import (
 )
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from diagrams.run_parameters import IntegratorParameters
+from diagrams.scenario.run_parameters import IntegratorParameters
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters

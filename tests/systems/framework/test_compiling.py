@@ -108,7 +108,7 @@ def test_a_digest_is_of_all_that_a_file_imports(tmp_path):
         "from systems.world import plane",
         "from systems.world import (\n    paths,  # a comment\n    plane,\n)",
         "def f():\n    import math, systems.radio.codec as codec",
-        "from diagrams.compiled.loop import CompiledLoop",
+        "from diagrams.running.compiled.loop import CompiledLoop",
     ):
         own.write_text(text)
         digests.add(source_digest(own))

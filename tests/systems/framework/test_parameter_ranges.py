@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 
 #: What the unit at the end of a field's name allows, longest ending first. A robot on
 #: a floor stays within a kilometre, a run within a day; nothing that divides is 0.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
-from diagrams.scenario import Scenario
+from diagrams.scenario.scenario import Scenario
 from systems.base.robot import RobotParameters
 from systems.framework.meanings import meanings
 from systems.framework.parameters import (

@@ -36,7 +36,7 @@ from analysis.stability.law_analysis import analyse_law
 from analysis.stability.model_sheet import model_sheet
 from analysis.stability.report_page import stability_page
 from diagrams import build_sound_follower, load_scenario
-from diagrams.fields.shipped import SCHEMA_FILE
+from diagrams.scenario.fields.shipped import SCHEMA_FILE
 from tools.scenario_schema import make_schema, schema_file_text
 
 # As tools.schemas does.

@@ -1,0 +1,229 @@
+"""Puts robots, sources and obstacles into one world."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.primitives import ConstantVectorSource, VectorLogSink
+
+from diagrams.building.robot import (
+    Parts,
+    make_robot,
+    make_source,
+    make_world,
+    multiplexed,
+    parts_of,
+)
+from diagrams.scenario.scenario import ODOR, WORLD, Scenario
+from systems import Obstacles
+from systems.framework.input_error import InputError
+
+
+@dataclass(frozen=True)
+class SoundFollower:
+    """A built scenario: its robots and sources by name.
+
+    ``blocks``, ``port``, ``log`` and ``logged`` are those of the only robot.
+    """
+
+    diagram: Diagram
+    scenario: Scenario
+    robots: Mapping[str, Parts]
+    """Each robot's blocks: plant, odometry, hearing, tracker, collision, controller,
+    command; with audio also microphones; with ultrasonic sensing also ultrasonic;
+    with a loudspeaker also emitter."""
+    sources: Mapping[str, Parts]
+    """Each source's blocks: source, and with audio emitter."""
+    obstacles: Obstacles
+    world: Parts | None = None
+    """What all share: wind, plume, radio and sink; none where no robot searches."""
+
+    @cached_property
+    def only(self) -> Parts:
+        """The one robot.
+
+        Raises:
+            InputError: There are several.
+        """
+        if len(self.robots) > 1:
+            raise InputError(
+                "robots",
+                f"there are {len(self.robots)}: {', '.join(self.robots)}; select "
+                "a robot by its name (SoundFollower.robots)",
+            )
+        return next(iter(self.robots.values()))
+
+    @cached_property
+    def blocks(self) -> dict[str, Any]:
+        """By part: the only robot's, those of its source, and ``obstacles``."""
+        robot = self.only
+        target = self.scenario.target(next(iter(self.robots)))
+        sources = self.sources[target].blocks if target in self.sources else {}
+        world = {**sources, "obstacles": self.obstacles}
+        return {**world, **robot.blocks}
+
+    @property
+    def log(self) -> VectorLogSink | None:
+        """The only robot's log; none unless asked for."""
+        return self.only.log
+
+    @property
+    def logged(self) -> Mapping[tuple[str, str], tuple[str, ...]]:
+        """What the only robot's log holds, see ``Parts``."""
+        return self.only.logged
+
+    def port(self, part: str, name: str) -> Any:
+        """Output port of a block of the only robot, its source or the obstacles.
+
+        Args:
+            part: A key of ``blocks``.
+            name: Of the port.
+
+        Returns:
+            The port; its value is read in the block's own context.
+        """
+        return self.blocks[part].GetOutputPort(name)
+
+
+def build_sound_follower(scenario: Scenario, *, log: bool = False) -> SoundFollower:
+    """Builds the diagram of a scenario.
+
+    Every robot and every source is a diagram of its own (``make_robot``,
+    ``make_source``); the world is shared: each robot sees and can hit the
+    obstacles, the other robots and the sources, and hears all that sounds.
+
+    Args:
+        scenario: What to build.
+        log: Whether each robot logs what its blocks name columns for.
+
+    Returns:
+        The diagram, and its blocks by robot, source and part.
+
+    Raises:
+        InputError: The law is not known.
+        InputError: A sound file cannot be played.
+    """
+    builder = DiagramBuilder()
+    robots, audible = scenario.all_robots, set()
+    if any(robot.listens for robot in robots.values()):
+        audible = set(scenario.sounds())
+    sources = {
+        name: make_source(scenario, name, source, audible=name in audible)
+        for name, source in scenario.all_sources.items()
+    }
+    obstacles = Obstacles(obstacles=scenario.obstacles)
+    followers = {}
+    for name in robots:
+        target = scenario.target(name)
+        followers[name] = make_robot(
+            _own(scenario, name, audible=name in audible),
+            name,
+            bodies=len(scenario.surroundings(name).obstacles),
+            robots=scenario.robots_seen(name),
+            others=[each for each in scenario.sounds() if each != target],
+            listeners_frame_s=scenario.longest_frame_s,
+            log=log,
+        )
+    systems = [*sources.items(), ("obstacles", obstacles), *followers.items()]
+    shared = make_world(scenario, log=log)
+    if shared is not None:
+        systems.insert(0, (WORLD, shared))
+    for name, system in systems:
+        builder.AddNamedSystem(name, system)
+    world = _World(builder, scenario, obstacles, sources, followers, shared)
+    for name in robots:
+        world.surround(name)
+    diagram = builder.Build()
+    diagram.set_name("sound_follower")
+    return SoundFollower(
+        diagram,
+        scenario,
+        {name: parts_of(system) for name, system in followers.items()},
+        {name: parts_of(system) for name, system in sources.items()},
+        obstacles,
+        parts_of(shared) if shared is not None else None,
+    )
+
+
+def _own(scenario: Scenario, name: str, *, audible: bool) -> Scenario:
+    """A robot's own scenario; a loudspeaker that nobody hears is left out."""
+    own = scenario.of_robot(name)
+    return own if audible else own.model_copy(update={"loudspeaker": None})
+
+
+@dataclass(frozen=True)
+class _World:
+    """Joins what robots take from the world to those that give it."""
+
+    builder: DiagramBuilder
+    scenario: Scenario
+    obstacles: Any
+    sources: Mapping[str, Any]
+    robots: Mapping[str, Any]
+    shared: Any
+
+    def surround(self, name: str) -> None:
+        """Gives a robot all that it takes."""
+        around, target = self.scenario.surroundings(name), self.scenario.target(name)
+        if self.shared is not None:
+            for port in ("wind", "plume", "air"):
+                self._give(name, port, lambda p=port: self.shared.GetOutputPort(p))
+            if self.shared.HasInputPort(f"frames_{name}"):
+                frames = self.robots[name].GetOutputPort("frames")
+                self.builder.Connect(frames, self.shared.GetInputPort(f"frames_{name}"))
+        self._give(name, "pose_WS", lambda: self._pose(target))
+        self._give(name, "emission", lambda: self._emission(target))
+        for other in self.scenario.sounds():
+            self._give(name, f"emission_{other}", lambda o=other: self._emission(o))
+        boxes = len(self.scenario.obstacles)
+        others = dict([*around.obstacles.items()][boxes:])
+        poses = [self._pose(other) for other in others]
+        sizes = [extent for body in others.values() for extent in body.size]
+        self._give(name, "poses_WO", lambda: self._joined(name, "poses_WO", poses))
+        self._give(
+            name,
+            "sizes",
+            lambda: self._joined(name, "sizes", self._constant(name, sizes)),
+        )
+
+    def _give(self, name: str, port: str, source: Any) -> None:
+        robot = self.robots[name]
+        if robot.HasInputPort(port):
+            self.builder.Connect(source(), robot.GetInputPort(port))
+
+    def _pose(self, name: str) -> Any:
+        if name in self.sources:
+            return self.sources[name].GetOutputPort("pose_WS")
+        if name == ODOR:
+            assert self.scenario.odor is not None
+            return self._constant_port(ODOR, [*self.scenario.odor.position_m, 0.0])
+        return self.robots[name].GetOutputPort("pose_WB")
+
+    def _emission(self, name: str) -> Any:
+        if name in self.sources:
+            return self.sources[name].GetOutputPort("emission")
+        return self.robots[name].GetOutputPort("own_emission")
+
+    def _constant(self, name: str, sizes: list[float]) -> list[Any]:
+        if not sizes:
+            return []
+        return [self._constant_port(f"sizes_of_others_for_{name}", sizes)]
+
+    def _constant_port(self, name: str, values: list[float]) -> Any:
+        if not self.builder.HasSubsystemNamed(name):
+            array: Any = np.array(values)  # untyped: Drake's stubs take ndarray amiss
+            self.builder.AddNamedSystem(name, ConstantVectorSource(array))
+        return self.builder.GetSubsystemByName(name).get_output_port()
+
+    def _joined(self, name: str, port: str, more: list[Any]) -> Any:
+        """The obstacles' port, or it and others one after the other."""
+        first = self.obstacles.GetOutputPort(port)
+        ports = [each for each in (first, *more) if each.size()]
+        if len(ports) < 2:
+            return ports[0] if ports else first
+        return multiplexed(self.builder, f"{port}_for_{name}", ports)

@@ -1,0 +1,179 @@
+"""From the name of a law to its controller block, and to what drives the wheels."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from typing import Any
+
+from pydrake.systems.framework import LeafSystem
+
+from diagrams.building.own_laws import checked_law, try_law
+from diagrams.building.robots.routed_robot import make_trajectory_controller
+from diagrams.building.robots.searching_robot import search_controller
+from diagrams.scenario.own_code import asked_for, import_own, made
+from diagrams.scenario.scenario import Scenario
+from systems import (
+    RadialLawController,
+    TwistWheelCommand,
+    VelocityWheelCommand,
+    WheelSpeedCommand,
+)
+from systems.base.robot import RobotParameters
+from systems.framework.input_error import InputError
+from systems.framework.signals import TICK_S
+from systems.laws.catalogue import LAWS
+from systems.laws.law import Law
+from systems.ranging.collision_vector import SLOTS
+
+#: What a controller may command, each of size 2, and the block that obeys.
+_COMMANDS: dict[str, Callable[..., Any]] = {
+    "acceleration_W": WheelSpeedCommand,
+    "velocity_W": VelocityWheelCommand,
+    "twist_B": TwistWheelCommand,
+}
+#: What it may tell the log besides, with sizes.
+_TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
+
+
+def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> Any:
+    """Builds the controller that ``scenario.law`` names.
+
+    ``package.module:Name`` or ``path/to/file.py:Name`` is a function
+    ``law(c, s, repulsion)`` that returns the force away from an obstacle in N, or
+    a LeafSystem class that may ask for ``robot``, ``attraction``, ``repulsion``,
+    ``sensors``, ``tick_s``, ``following``, ``known``, ``bodies`` and ``seed``. Its
+    inputs are output ports of the diagram, by name; it has one of the outputs that
+    ``make_command`` knows. Either is looked up in the working directory, too. A
+    function is tried at a few distances and speeds.
+
+    Args:
+        scenario: Its law, and the parameters of the law's block.
+        bodies: Number of bodies on ``poses_WO`` and ``sizes``.
+        seed: Of a law that draws random numbers.
+
+    Returns:
+        The block.
+
+    Raises:
+        InputError: There is no such law, or it does not do what a law does.
+    """
+    sensors = scenario.ultrasonic
+    if scenario.obstacle_sensing == "ideal":
+        at_once = {"firing": "simultaneous", "period_s": scenario.tick_s}
+        sensors = sensors.model_copy(update=at_once)
+    parts = {
+        "robot": scenario.robot,
+        "attraction": scenario.attraction,
+        "repulsion": scenario.repulsion,
+        "tick_s": scenario.tick_s,
+        "sensors": sensors,
+    }
+    more = {
+        "following": scenario.following,
+        "known": scenario.free_space,
+        "bodies": bodies,
+        "seed": seed,
+    }
+    name = scenario.law
+    if name in LAWS and LAWS[name].searches:
+        return search_controller(scenario)
+    if name in LAWS and LAWS[name].on_route:
+        return make_trajectory_controller(scenario)
+    if name in LAWS:
+        law = LAWS[name]
+        if law.controller is not None and law.plans:
+            return law.controller(**asked_for(law.controller, {**parts, **more}))
+        return _block(law, parts)
+    law = import_own(name, "law")
+    if inspect.isclass(law):
+        # One that takes any keyword may hand it on to a law of ours, which does not.
+        named = inspect.signature(getattr(law, "_construct", law)).parameters
+        wanted = {key: value for key, value in more.items() if key in named}
+        return _own_block(name, law, {**parts, **wanted})
+    function = checked_law(name, law)
+    reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
+    try_law(function, scenario.repulsion, reach, top_speed)
+    return RadialLawController(**parts, law=function)
+
+
+def _block(law: Law, parts: dict[str, Any]) -> Any:
+    if law.controller is not None:
+        return law.controller(**parts)
+    force = law.force
+    assert force is not None, f"{law.name} has neither force nor block"
+    arguments = law.arguments(parts["repulsion"], parts["sensors"].minimum_range_m)
+    return RadialLawController(**parts, law=force, arguments=arguments)
+
+
+def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:
+    if not issubclass(law, LeafSystem):
+        raise InputError(
+            "law",
+            f"{name!r} is a class, but not a LeafSystem; write a function law(c, "
+            "s, repulsion), or derive it from a controller of phonotaxis",
+        )
+    block = made(name, "law", law, parts)
+    commanded(block, name)
+    sizes = _output_sizes(block)
+    for port, size in _TOLD.items():
+        if sizes.get(port, size) != size:
+            raise InputError(
+                "law",
+                f"{name!r} has an output port {port} of size {sizes[port]}; make it "
+                f"{size}, or leave it out",
+            )
+    return block
+
+
+def make_command(
+    controller: Any, robot: RobotParameters, tick_s: float = TICK_S
+) -> Any:
+    """Builds the block that drives the wheels as a controller commands.
+
+    Args:
+        controller: A block with one output of size 2 out of ``acceleration_W`` (of
+            P, m/s^2), ``velocity_W`` (of P, m/s) and ``twist_B`` (forward speed and
+            yaw rate, m/s and rad/s).
+        robot: Dimensions and limits.
+        tick_s: Period of the command, s.
+
+    Returns:
+        The block, with an input of that name.
+
+    Raises:
+        InputError: The controller has none of them, or several.
+    """
+    command = _COMMANDS[commanded(controller)]
+    return command(robot=robot, tick_s=tick_s)
+
+
+def commanded(controller: Any, name: str = "") -> str:
+    """Output port by which a controller commands.
+
+    Args:
+        controller: As of ``make_command``.
+        name: Of its law, for the error.
+
+    Returns:
+        Name of the port.
+
+    Raises:
+        InputError: It has none that is known, or several.
+    """
+    name = name or controller.get_name()
+    sizes = _output_sizes(controller)
+    found = [port for port in _COMMANDS if port in sizes]
+    if len(found) == 1 and sizes[found[0]] == 2:
+        return found[0]
+    has = ", ".join(f"{port} of size {sizes[port]}" for port in found) or "none"
+    raise InputError(
+        "law",
+        f"{name!r} needs one output port of size 2 out of {', '.join(_COMMANDS)}, and "
+        f"has {has}; {'add one' if not found else 'leave one of size 2'}",
+    )
+
+
+def _output_sizes(block: Any) -> dict[str, int]:
+    ports = map(block.get_output_port, range(block.num_output_ports()))
+    return {port.get_name(): port.size() for port in ports}

@@ -1,0 +1,63 @@
+"""A user's own blocks in a robot."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Mapping
+from typing import Any
+
+from pydrake.systems.framework import LeafSystem
+
+from diagrams.scenario.own_code import import_own, made
+from systems.framework.block_facts import BlockFacts
+from systems.framework.input_error import InputError
+
+
+def with_own_blocks(
+    blocks: Mapping[str, Any], names: tuple[str, ...], parts: Mapping[str, Any]
+) -> dict[str, Any]:
+    """A robot's blocks by part, a user's own among them.
+
+    Args:
+        blocks: Ours by part.
+        names: Of the user's own, ``package.module:Name`` or ``path/to/file.py:Name``;
+            one stands in the place of ours of its part.
+        parts: What its ``__init__`` may ask for, by the names of its arguments.
+
+    Returns:
+        Blocks by part: a copy with the user's own in their places.
+
+    Raises:
+        InputError: Two of them have one part, or there is no such block, it does not
+            say what it is, or it cannot be made.
+    """
+    joined, own = dict(blocks), set()
+    for name in names:
+        block = _own_block(name, parts)
+        part = block.FACTS.part
+        if part in own:
+            raise InputError(
+                "blocks",
+                f"{name!r} is a second {part!r}; give each block a part of its own",
+            )
+        own.add(part)
+        joined[part] = block
+    return joined
+
+
+def _own_block(name: str, parts: Mapping[str, Any]) -> Any:
+    found = import_own(name, "blocks")
+    if not (inspect.isclass(found) and issubclass(found, LeafSystem)):
+        raise InputError(
+            "blocks", f"{name!r} is not a LeafSystem; derive it from LeafSystem"
+        )
+    if not isinstance(getattr(found, "FACTS", None), BlockFacts):
+        raise InputError(
+            "blocks",
+            f"{name!r} does not state its part; give it an attribute FACTS, "
+            "BlockFacts(part, stage)",
+        )
+    block = made(name, "blocks", found, parts)
+    if not block.get_name():
+        block.set_name(found.__name__)
+    return block

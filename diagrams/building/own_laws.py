@@ -1,0 +1,96 @@
+"""A user's own law: tried, and watched while it runs."""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from pydrake.autodiffutils import AutoDiffXd
+
+from diagrams.scenario.own_code import is_interrupt, why
+from systems.framework.input_error import InputError, shortened
+from systems.laws.repulsion import RepulsionParameters
+
+
+def checked_law(name: str, law: Callable[..., Any]) -> Callable[..., Any]:
+    """The law, with an error that names it where it does not return a force.
+
+    Args:
+        name: Of the law, for messages.
+        law: ``law(c, s, repulsion)``; returns a force, N.
+
+    Returns:
+        A function of the same arguments. It returns a finite float or AutoDiffXd, N, or
+        raises InputError.
+    """
+
+    @functools.wraps(law)
+    def checked(c: Any, s: Any, repulsion: RepulsionParameters) -> Any:
+        try:
+            force = law(c, s, repulsion)
+        except BaseException as error:  # a user's law raises what it likes
+            if is_interrupt(error):
+                raise
+            raise _failed(name, c, s, f"raises {why(error)}") from error
+        if isinstance(force, np.ndarray) and force.shape == ():
+            force = force.item()
+        if isinstance(force, AutoDiffXd):
+            value = force.value()
+        elif isinstance(force, float | int | np.floating | np.integer):
+            value = force = float(force)
+        else:
+            kind = type(force).__name__
+            raise _failed(name, c, s, f"returns {_brief(force)} ({kind})")
+        if not math.isfinite(value):
+            raise _failed(name, c, s, f"returns {value}")
+        return force
+
+    return checked
+
+
+def try_law(
+    law: Callable[..., Any],
+    repulsion: RepulsionParameters,
+    range_m: float,
+    top_speed_m_s: float,
+) -> None:
+    """Calls a law near and far, at rest and fast, as a run will.
+
+    Args:
+        law: From ``checked_law``.
+        repulsion: Gains of all laws.
+        range_m: Largest distance that is tried, m.
+        top_speed_m_s: Largest speed that is tried, m/s.
+
+    Raises:
+        InputError: It does not return a force everywhere.
+    """
+    for share in (1e-3, 0.1, 0.5, 1.0):
+        for s in (0.0, 0.5 * top_speed_m_s, top_speed_m_s):
+            law(share * range_m, s, repulsion)
+
+
+def _failed(name: str, c: Any, s: Any, what: str) -> InputError:
+    name = shortened(name, 60)
+    at = f"c = {_number(c):.3g} m, s = {_number(s):.3g} m/s"
+    return InputError(
+        "law",
+        f"{name!r} {what} at {at}; write law(c, s, repulsion) that returns a finite "
+        "force in N",
+    )
+
+
+def _number(value: Any) -> float:
+    return float(value.value() if isinstance(value, AutoDiffXd) else value)
+
+
+def _brief(value: Any) -> str:
+    """As a reader sees it, whatever its own words would be."""
+    try:
+        text = repr(value)
+    except Exception:  # noqa: BLE001  # a user's __repr__
+        return "something"
+    return text if len(text) < 40 else f"{text[:37]}..."

@@ -1,0 +1,60 @@
+"""What all robots share and no robot has: wind, plume, and what is on the air."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from diagrams.scenario.checks.search_checks import address_of_robot
+from diagrams.scenario.scenario import Scenario
+from systems import OdorPlume, RadioChannel, SinkMonitor, WindField
+
+
+def radio_nodes(scenario: Scenario) -> dict[str, int]:
+    """Robots with a radio, and their addresses.
+
+    Args:
+        scenario: The run.
+
+    Returns:
+        Addresses by name.
+    """
+    return {
+        name: address_of_robot(robot)
+        for name, robot in scenario.all_robots.items()
+        if robot.searches
+    }
+
+
+def world_blocks(scenario: Scenario, seeds: Mapping[str, int]) -> dict[str, Any]:
+    """The blocks, by part; none where no robot needs them.
+
+    Args:
+        scenario: The run.
+        seeds: Of the blocks, by name.
+
+    Returns:
+        As a diagram needs them, not yet in one.
+    """
+    blocks: dict[str, Any] = {}
+    nodes, tick_s = radio_nodes(scenario), scenario.tick_s
+    if scenario.odor is not None and nodes:
+        blocks["wind"] = WindField(
+            parameters=scenario.wind, seed=seeds["wind_field"], tick_s=tick_s
+        )
+        blocks["plume"] = OdorPlume(
+            parameters=scenario.odor,
+            wind=scenario.wind,
+            p_WO=scenario.odor.position_m,
+            seed=seeds["odor_plume"],
+            tick_s=tick_s,
+        )
+    if nodes:
+        blocks["radio"] = RadioChannel(
+            parameters=scenario.radio,
+            robots=tuple(nodes),
+            seed=seeds["radio_channel"],
+            tick_s=tick_s,
+        )
+        blocks["sink"] = SinkMonitor(robots=nodes, tick_s=tick_s)
+    return blocks

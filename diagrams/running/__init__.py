@@ -1,0 +1,1 @@
+"""A diagram runs: Drake's simulator, the compiled loop, the end, the result."""

@@ -1,0 +1,211 @@
+"""A scenario's blocks in one compiled loop over ticks.
+
+Drake's diagram stays the model. The loop calls the same functions, the ``Step`` of each
+block, in the order that the names of their ports give, with the same integrator and the
+same random numbers; what it logs is what the diagram logs.
+
+In a tick, as Drake has it: blocks whose outputs are state have published them; all
+others do their steps, each after those whose outputs it reads; the stop rules judge;
+then the blocks with state outputs do theirs and publish them; the row is logged, in
+which all that was done at the tick is; and the plants move on by a tick.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numba.core.errors import NumbaError
+from numpy.typing import NDArray
+
+from diagrams.running.audio.run_audio import RunAudio
+from diagrams.running.compiled.loop_audio import save_sounds
+from diagrams.running.compiled.loop_blocks import LoopBlocks
+from diagrams.running.compiled.parts import run_parts
+from diagrams.running.compiled.plan import LoopPlan, LoopRobot, LoopWorld
+from diagrams.running.compiled.sounds import sounds_of_a_run
+from diagrams.running.stop_rules import JudgedTick, RunRules
+from diagrams.scenario.scenario import WORLD, Scenario
+from systems.framework.host_step import HostError
+from systems.framework.input_error import InputError, shortened
+
+
+@dataclass
+class CompiledLoop:
+    """A run that goes on tick by tick, in compiled code."""
+
+    log: NDArray[np.float64]
+    """(ticks + 1, columns) what all robots log, as far as the run has come."""
+    tick_s: float
+    rules: RunRules
+    """Know why it ended, once it has."""
+    columns: Mapping[str, Mapping[str, int]]
+    """Of each robot its columns of the log, by name."""
+    plan: LoopPlan
+    """What is done in a tick."""
+    over: bool = False
+    """Whether the run has ended."""
+    done: int = 0
+    """Ticks that are logged."""
+
+    @property
+    def time_s(self) -> float:
+        """Of the last tick that is logged, s."""
+        return (self.done - 1) * self.tick_s
+
+    def logged(self, robot: str) -> dict[str, NDArray[np.float64]]:
+        """A robot's columns, and the time.
+
+        Args:
+            robot: Its name.
+
+        Returns:
+            (ticks,) each, by name.
+        """
+        log = np.ascontiguousarray(self.log[: self.done].T)
+        times: NDArray[np.float64] = np.arange(float(self.done)) * self.tick_s
+        return {"t": times, **{n: log[k] for n, k in self.columns[robot].items()}}
+
+    def prepare(self) -> None:
+        """Compiles the blocks or loads them, where the process has not done so.
+
+        Raises:
+            InputError: numba cannot compile a law or a block of a user's own.
+        """
+        try:
+            self._call(1, 1)
+        # What numba raises depends on what it does not know.
+        except (NumbaError, NotImplementedError, ValueError) as error:
+            own = [
+                text
+                for rules in self.rules.robots.values()
+                for text in (rules.scenario.law, *rules.scenario.blocks)
+                if ":" in text
+            ]
+            if not own:
+                raise
+            raise InputError(
+                "engine",
+                f"numba cannot compile {' or '.join(map(repr, own))} "
+                f"({_complaint(error)}); run with engine drake",
+            ) from None
+
+    def _call(self, begin: int, end: int) -> tuple[int, bool]:
+        try:
+            done: tuple[int, bool] = run_parts(
+                begin, end, self.log, *self.plan.arguments
+            )
+        except HostError:
+            raise next(host.error for host in self.plan.hosts if host.error) from None
+        return done
+
+    def advance(self, ticks: int) -> None:
+        """Goes on for so many ticks, to the end of the run at most.
+
+        Raises:
+            InputError: A value became NaN or infinite.
+        """
+        end = min(self.done + ticks, len(self.log))
+        self.done, over = self._call(self.done, end)
+        if not np.isfinite(self.log[self.done - 1]).all():
+            raise InputError(
+                "engine",
+                f"a value is not finite at {self.time_s:g} s; run with engine drake, "
+                "which names the block",
+            )
+        self.over = over or self.done == len(self.log)
+        if self.over:
+            names = enumerate(self.rules.robots)
+            self.rules.take_over({name: self._last_tick(k, name) for k, name in names})
+
+    def _last_tick(self, number: int, robot: str) -> JudgedTick:
+        last, columns = self.done - 1, self.columns[robot]
+        pose = [columns[name] for name in ("p_WB_x", "p_WB_y", "theta_WB")]
+        before = max(last - 1, 0)
+        found, touched = self.plan.ended[number].tolist()
+        return JudgedTick(
+            last * self.tick_s,
+            before * self.tick_s,
+            self.log[last, pose].tolist(),
+            self.log[before, pose].tolist(),
+            self._value(columns, "target_valid", last) > 0.5,
+            self.plan.judged[number].tolist(),
+            found,
+            (touched - 1, float(self.plan.touched_at[number])) if touched else None,
+            # The judge has seen what the search had published the tick before.
+            self._value(columns, "search_ended", last - 1),
+        )
+
+    def _value(self, columns: Mapping[str, int], name: str, row: int) -> float:
+        """Of a column in a row; 0 where it is none."""
+        known = name in columns and row >= 0
+        return float(self.log[row, columns[name]]) if known else 0.0
+
+
+def _complaint(error: Exception) -> str:
+    """What numba complains of, without the way there."""
+    lines = (line.strip() for line in str(error).splitlines())
+    around = "During", "raised", "Failed in"
+    known = (line for line in lines if line and not line.startswith(around))
+    return shortened(next(known, type(error).__name__), 120)
+
+
+def compile_loop(
+    scenario: Scenario,
+    blocks: Mapping[str, LoopBlocks],
+    rules: RunRules,
+    shared: LoopBlocks | None = None,
+    audio: RunAudio | None = None,
+) -> CompiledLoop:
+    """The loop of a scenario that has one.
+
+    Args:
+        scenario: What to run.
+        blocks: Of each robot; they may be made for another start or seed.
+        rules: When the run ends.
+        shared: What all robots share, if they share anything.
+        audio: Where its sound goes, if it is saved.
+
+    Returns:
+        The loop, before its first tick.
+
+    Raises:
+        InputError: A block of a user's own has no step, or a sound file cannot be
+            played.
+    """
+    ticks = int(scenario.duration_s / scenario.tick_s + 1e-9)
+    times: NDArray[np.float64] = np.arange(ticks + 1.0) * scenario.tick_s
+    sounds = sounds_of_a_run(scenario, times)
+    world = LoopWorld(scenario, shared, ticks) if shared is not None else None
+    robots = {
+        name: LoopRobot(scenario, name, own, ticks, sounds.heard[name], world)
+        for name, own in blocks.items()
+    }
+    plan = LoopPlan(robots, times)
+    for name in robots:
+        plan.surround(name, rules.robots[name].surroundings)
+    for name, function in sounds.carried.items():
+        plan.remember(name, function)
+    for each in (*((world,) if world else ()), *robots.values()):
+        plan.add(each)
+    if audio is not None:
+        save_sounds(plan, robots, sounds, audio)
+    plan.judge(rules, scenario.tick_s)
+    width, columns = 0, {}
+    logged: dict[str, LoopRobot | LoopWorld] = {**robots}
+    if world is not None:
+        logged[WORLD] = world
+    for name, each in logged.items():
+        own = each.made
+        plan.logged += [each.view(port) for _, port in own.columns]
+        wanted = [text for texts in own.columns.values() for text in texts]
+        columns[name] = {text: width + k for k, text in enumerate(wanted)}
+        width += len(wanted)
+    return CompiledLoop(
+        np.empty((ticks + 1, width)),
+        scenario.tick_s,
+        rules,
+        columns,
+        plan,
+    )

@@ -1,0 +1,69 @@
+"""Saves the sound of a run that a compiled loop carries out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from diagrams.running.audio.run_audio import LISTENING, RunAudio
+from diagrams.running.compiled.plan import LoopPlan, LoopRobot
+from diagrams.running.compiled.sounds import Sounds
+from systems.framework.input_error import InputError
+from systems.framework.signals import AudioFrame, Emission
+
+
+def save_sounds(
+    plan: LoopPlan, robots: Mapping[str, LoopRobot], sounds: Sounds, audio: RunAudio
+) -> None:
+    """Lets a loop write what is heard and played, when its blocks have done a tick.
+
+    Args:
+        plan: Of the loop, with its robots in it.
+        robots: By name.
+        sounds: What sounds in the run.
+        audio: Where it goes.
+
+    Raises:
+        InputError: A robot that listens has no microphones that compiled loops know.
+    """
+    for name, ticks in audio.frame_ticks.items():
+        robot = robots[name]
+        if "audio" not in robot.facts.carried:
+            raise InputError(
+                "save_audio",
+                f"no block of {name} gives frames to a compiled loop; leave "
+                "--save-audio out, or run with engine drake",
+            )
+        frame = robot.facts.carried["audio"]
+        asks = LISTENING in robot.made.sizes
+        listening = robot.view(LISTENING) if asks else np.ones(1)
+        plan.show(listening, partial(_hear, audio, name, frame), ticks)
+    for name in audio.loudspeakers:
+        function = partial(_play, audio, name, sounds.played[name])
+        plan.show(np.ones(1), function, 1)
+
+
+def _hear(
+    audio: RunAudio,
+    robot: str,
+    frame: Callable[[int], AudioFrame],
+    tick: int,
+    listening: Any,
+    _: Any,
+) -> None:
+    asked = tick > 0 and listening[0] > 0.5
+    audio.hear(robot, tick, frame(tick) if asked else None)
+
+
+def _play(
+    audio: RunAudio,
+    name: str,
+    emission: Callable[[int], Emission],
+    tick: int,
+    _: Any,
+    __: Any,
+) -> None:
+    audio.play(name, tick, emission(tick))

@@ -1,0 +1,177 @@
+"""A robot's blocks for compiled loops, made once for runs that differ in layout."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from functools import cached_property, partial
+from typing import Any
+
+from diagrams.building.robot import (
+    OUTSIDE,
+    columns_of,
+    require_published,
+    robot_blocks,
+    world_seeds,
+)
+from diagrams.building.world_blocks import radio_nodes, world_blocks
+from diagrams.scenario.own_code import loaded_digests
+from diagrams.scenario.scenario import Scenario
+from systems.framework.input_error import InputError
+from systems.framework.step_block import RunFacts, Step
+
+#: What blocks take from elsewhere: robots from the world, and it from them.
+_WORLD = *OUTSIDE, "frames"
+#: Fields of a scenario that no block is made from, but for what ``RunFacts`` tell.
+_NO_BLOCKS = {
+    "name",
+    "description",
+    "engine",
+    "seed",
+    "duration_s",
+    "arena_m",
+    "start",
+    "obstacles",
+    "stop",
+    "robots",
+    "sources",
+    "source",
+    "wind",
+    "odor",
+}
+#: Blocks by what they were made from, the last used ones last.
+_SHARED: dict[str, LoopBlocks] = {}
+_MOST_SHARED = 64
+
+
+class LoopBlocks:
+    """Blocks of a robot by part, and how their ports are joined."""
+
+    def __init__(self, blocks: Mapping[str, Any]) -> None:
+        """Takes blocks that are in a diagram or in none.
+
+        Raises:
+            InputError: Not every input is published by one block or by the world.
+        """
+        require_published(blocks.values(), _WORLD)
+        self.blocks = blocks
+        self.sizes: dict[str, int] = {}
+        """Of all that the ports carry, by name."""
+        self.inputs = {part: self._names(b, "input") for part, b in blocks.items()}
+        """Names of each part's input ports."""
+        self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
+        """Names of each part's output ports."""
+        self.columns = columns_of(blocks)
+        """What the log holds, in order: the columns of each (part, port)."""
+
+    def _names(self, block: Any, kind: str) -> list[str]:
+        port: Callable[[int], Any] = getattr(block, f"get_{kind}_port")
+        ports = list(map(port, range(getattr(block, f"num_{kind}_ports")())))
+        self.sizes |= {port.get_name(): port.size() for port in ports}
+        return [port.get_name() for port in ports]
+
+    @cached_property
+    def outside(self) -> set[str]:
+        """Names of what comes from the world."""
+        return {*self.sizes}.difference(*self.outputs.values())
+
+    def steps(self, run: RunFacts) -> dict[str, Step]:
+        """What each part does in a run.
+
+        Raises:
+            InputError: A block of a user's own has no step.
+        """
+        return {part: _step_for(block, run) for part, block in self.blocks.items()}
+
+    def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
+        """Parts as they do their steps: before the log, or with state outputs after."""
+        late = [part for part, step in steps.items() if step.publish is not None]
+        known = self.outside.union(*(self.outputs[part] for part in late))
+        waiting, early = [part for part in self.blocks if part not in late], []
+        while waiting:
+            part = next(p for p in waiting if known.issuperset(self.inputs[p]))
+            waiting.remove(part)
+            early.append(part)
+            known.update(self.outputs[part])
+        return early, late
+
+
+def _step_for(block: Any, run: RunFacts) -> Step:
+    if not hasattr(block, "step_for"):
+        raise InputError(
+            "engine",
+            f"{block.get_name()} has no method step_for, which a compiled loop "
+            "needs; add this method, or run with engine drake",
+        )
+    step: Step = block.step_for(run)
+    return step
+
+
+def shared_blocks(scenario: Scenario) -> dict[str, LoopBlocks]:
+    """Blocks for a compiled loop, those of an earlier scenario where they serve.
+
+    They do where scenarios differ in layout, start and seed alone: Drake never frees
+    blocks written in Python.
+
+    Args:
+        scenario: What to run.
+
+    Returns:
+        Of each robot.
+
+    Raises:
+        InputError: As ``robot_blocks``.
+    """
+    blocks = {}
+    for name in scenario.all_robots:
+        own = scenario.of_robot(name)
+        bodies = len(scenario.surroundings(name).obstacles)
+        target = scenario.target(name)
+        others = [sound for sound in scenario.sounds() if sound != target]
+        robots = scenario.robots_seen(name)
+        made = partial(
+            robot_blocks, own, name, bodies=bodies, robots=robots, others=others
+        )
+        if own.blocks:  # they may ask for the whole scenario
+            blocks[name] = LoopBlocks(made())
+            continue
+        made_from = _without_goal(own).model_dump_json(exclude=_NO_BLOCKS)
+        sizes = own.source_size, own.odor and own.odor.container_m
+        code = loaded_digests(own)
+        key = f"{name} {bodies} {robots} {others} {sizes} {code} {made_from}"
+        blocks[name] = _shared(key, made)
+    return blocks
+
+
+def shared_world(scenario: Scenario) -> LoopBlocks | None:
+    """What all robots share, as ``shared_blocks`` has what each of them has.
+
+    Args:
+        scenario: What to run.
+
+    Returns:
+        None where no robot searches.
+    """
+    nodes = radio_nodes(scenario)
+    if not nodes:
+        return None
+    made_from = scenario.model_dump_json(include={"wind", "odor", "radio", "tick_s"})
+    made = partial(world_blocks, scenario, world_seeds(scenario))
+    return _shared(f"{nodes} {made_from}", made)
+
+
+def _shared(key: str, made: Callable[[], Mapping[str, Any]]) -> LoopBlocks:
+    found = _SHARED.pop(key, None)
+    if found is None:
+        found = LoopBlocks(made())
+    _SHARED[key] = found
+    if len(_SHARED) > _MOST_SHARED:
+        del _SHARED[next(iter(_SHARED))]
+    return found
+
+
+def _without_goal(own: Scenario) -> Scenario:
+    """Goals are the run's, see ``RunFacts``."""
+    if own.route is None:
+        return own
+    route = own.route.model_copy(update={"goal_m": (0.0, 0.0)})
+    return own.model_copy(update={"route": route})

@@ -1,0 +1,304 @@
+"""What is done in a tick of a compiled loop: parts, and the order of their calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import cached_property, partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.building.robot import block_seed, seed_of
+from diagrams.running.compiled.judge import contacts_of, judge_all
+from diagrams.running.compiled.loop_blocks import LoopBlocks
+from diagrams.running.compiled.parts import PUBLISH
+from diagrams.running.compiled.source import LoopPart, address_of, compiled_part
+from diagrams.running.stop_rules import (
+    CONTACT,
+    GIVES_UP,
+    SEARCH_REPORT,
+    TOUCHED,
+    UNJUDGED,
+    RunRules,
+)
+from diagrams.scenario.bodies import Surroundings
+from diagrams.scenario.scenario import Scenario
+from systems.framework.compiling import njit
+from systems.framework.host_step import HostCall, HostFunction, host_step
+from systems.framework.step_block import RunFacts, Step
+
+#: What a robot is judged by, and sizes of what not every robot has.
+_WATCHED = {
+    "pose_WB": 3,
+    "velocity_WB": 3,
+    "pose_WS": 3,
+    "target_valid": 1,
+    GIVES_UP: 1,
+    SEARCH_REPORT: 4,
+    CONTACT: 2,
+    TOUCHED: 1,
+    "calling": 1,
+}
+#: Of these, what it is judged by.
+_JUDGED = [name for name in _WATCHED if name != "calling"]
+
+
+class LoopWorld:
+    """What all robots of a run share: its blocks' steps, and what their ports carry."""
+
+    def __init__(self, scenario: Scenario, made: LoopBlocks, ticks: int) -> None:
+        run = RunFacts(
+            ticks,
+            scenario.tick_s,
+            (0.0, 0.0, 0.0),
+            scenario.integrator.scheme,
+            scenario.integrator.step_s,
+            partial(block_seed, scenario.seed),
+            {},
+        )
+        self.made, self.steps = made, made.steps(run)
+        self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
+
+    def view(self, port: str) -> NDArray[np.float64]:
+        """What a port carries."""
+        return self._views[port]
+
+
+class LoopRobot:
+    """One robot of a run: its blocks' steps, and what their ports carry."""
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        name: str,
+        made: LoopBlocks,
+        ticks: int,
+        heard: Mapping[str, Callable[[int], Any]],
+        world: LoopWorld | None = None,
+    ) -> None:
+        own = scenario.all_robots[name]
+        self.facts = RunFacts(
+            ticks,
+            scenario.tick_s,
+            own.start.pose,
+            scenario.integrator.scheme,
+            scenario.integrator.step_s,
+            partial(seed_of, scenario, owner=name),
+            {**heard},
+            scenario.mapped(),
+            own.route.goal_m if own.route is not None else None,
+        )
+        self.made, self.steps = made, made.steps(self.facts)
+        sizes = {**_WATCHED, **made.sizes}
+        self._views = {port: np.zeros(size) for port, size in sizes.items()}
+        if world is not None:
+            given = made.outside.intersection(world.made.sizes)
+            self._views |= {port: world.view(port) for port in given}
+            if f"frames_{name}" in world.made.sizes:
+                self._views["frames"] = world.view(f"frames_{name}")
+
+    def view(self, port: str) -> NDArray[np.float64]:
+        """What a port carries."""
+        return self._views[port]
+
+
+class LoopPlan:
+    """The parts of a loop, and when each is called.
+
+    Args:
+        robots: Of the run, by name.
+        times: (n,) of the ticks, s.
+    """
+
+    def __init__(
+        self, robots: Mapping[str, LoopRobot], times: NDArray[np.float64]
+    ) -> None:
+        self._robots, self._times = robots, times
+        self.logged: list[NDArray[np.float64]] = []
+        """What a row of the log holds."""
+        self.hosts: list[HostCall] = []
+        """What is called in Python."""
+        self.ended = np.zeros((len(robots), 2), dtype=np.int64)
+        """Of each robot what its judge said, and 1 more than the number of the body
+        that it has touched."""
+        self.touched_at = np.zeros(len(robots))
+        """Of each robot the part of the tick that had passed by then."""
+        self.judged = np.tile(np.array(UNJUDGED), (len(robots), 1))
+        """Of each robot the judge's state."""
+        self._parts: list[tuple[LoopPart, str]] = []
+        self._judge = 0
+        self._filled: list[int] = []
+        self._early: list[int] = []
+        self._late: list[int] = []
+        self._plants: list[int] = []
+
+    def add(self, robot: LoopRobot | LoopWorld) -> None:
+        """The blocks of a robot, or what robots share."""
+        early, late = robot.made.order(robot.steps)
+        for part in (*early, *late):
+            step, made = robot.steps[part], robot.made
+            inputs = tuple(map(robot.view, made.inputs[part]))
+            outputs = tuple(map(robot.view, made.outputs[part]))
+            number = self._step(step, inputs, outputs)
+            if step.publish is None:
+                self._early.append(number)
+            else:
+                (self._plants if part == "plant" else self._late).append(number)
+
+    def remember(self, name: str, function: HostFunction) -> None:
+        """Shows a robot's motion to a Python function at the begin of every tick.
+
+        Args:
+            name: Of the robot.
+            function: Takes its pose and velocity, and whether it calls.
+        """
+        ports = "pose_WB", "velocity_WB", "calling"
+        motion = tuple(map(self._robots[name].view, ports))
+        step = host_step(function, sum(map(len, motion)), 0, 1)
+        self._filled.append(self._step(step, motion, ()))
+
+    def show(
+        self, view: NDArray[np.float64], function: HostFunction, period_ticks: int
+    ) -> None:
+        """Shows numbers to a Python function, as they are when the robots are judged.
+
+        Args:
+            view: (n,) what a port carries.
+            function: Takes them.
+            period_ticks: From one time to the next, ticks.
+        """
+        step = host_step(function, len(view), 0, period_ticks)
+        self._early.append(self._step(step, (view,), ()))
+
+    def _step(
+        self, step: Step, inputs: tuple[Any, ...], outputs: tuple[Any, ...]
+    ) -> int:
+        """The part of a block."""
+        if step.host is not None:
+            self.hosts.append(step.host)
+        part, state = LoopPart(), np.array(step.state, dtype=float)
+        values = {"state": state, "inputs": inputs, "outputs": outputs}
+        values["numbers"] = step.numbers
+        lines = [f"{name} = {part.expression(it)}" for name, it in values.items()]
+        if step.publish is not None:
+            publish = f"{part.name(step.publish)}(state, outputs, numbers)"
+            lines += [f"if tick == {PUBLISH}:", f"    {publish}", "    return 0"]
+        elif outputs:
+            lines.append(f"{part.name(_clear)}(outputs)")
+        lines.append(f"{part.name(step.step)}(tick, state, inputs, outputs, numbers)")
+        return self._add(part, lines)
+
+    def surround(self, name: str, around: Surroundings) -> None:
+        """What a robot takes from the world in every tick.
+
+        Args:
+            name: Of the robot.
+            around: All that it can see and hit.
+        """
+        robot, robots, times = self._robots[name], self._robots, self._times
+        everything = {**around.bodies, around.target: around.followed}
+        wanted = {"pose_WS": [around.target], "poses_WO": [*around.obstacles]}
+        for port, bodies in wanted.items():
+            if port == "pose_WS" or port in robot.made.outside:
+                into = robot.view(port)
+                known = {3 * k: b for k, b in enumerate(bodies) if b not in robots}
+                paths = [everything[body].path for body in known.values()]
+                at = times if any(path.moves for path in paths) else times[:1]
+                places = np.array([*known], dtype=np.int64)
+                poses = np.reshape([path.poses(at) for path in paths], (-1, len(at), 3))
+                self._fill_by(_fill, into, places, poses)
+                for k, body in enumerate(bodies):
+                    if body in robots:
+                        self._fill_by(_copy, into, 3 * k, robots[body].view("pose_WB"))
+        if "sizes" in robot.made.outside:
+            sizes = [body.size for body in around.obstacles.values()]
+            robot.view("sizes")[:] = np.ravel(sizes)
+
+    def _fill_by(self, function: Any, *values: Any) -> None:
+        """Fills a port by a function of values and the tick."""
+        part = LoopPart()
+        arguments = ", ".join(map(part.expression, values))
+        line = f"{part.name(function)}({arguments}, tick)"
+        self._filled.append(self._add(part, [line]))
+
+    def judge(self, rules: RunRules, tick_s: float) -> None:
+        """Judges all robots at the end of a tick.
+
+        Args:
+            rules: When the run ends.
+            tick_s: s.
+        """
+        robots = self._robots
+        watched = tuple(
+            (*map(robot.view, _JUDGED), np.array(robot.facts.initial_pose))
+            for robot in robots.values()
+        )
+        contacts = tuple(
+            contacts_of(rules.robots[name], [*robots], self._times) for name in robots
+        )
+        values = tick_s, watched, contacts, self.judged, self.ended, self.touched_at
+        part = LoopPart()
+        arguments = ", ".join(map(part.expression, values))
+        lines = [f"if {part.name(judge_all)}(tick, {arguments}):", "    return 1"]
+        self._judge = self._add(part, lines)
+
+    def _add(self, part: LoopPart, lines: Sequence[str]) -> int:
+        self._parts.append((part, part.source(lines)))
+        return len(self._parts) - 1
+
+    @cached_property
+    def arguments(self) -> tuple[Any, ...]:
+        """What ``run_parts`` takes after the log; compiles the parts."""
+        self._kept = [
+            (compiled_part(text, part.names), part.words())
+            for part, text in self._parts
+        ]
+        parts = [(address_of(code), words.ctypes.data) for code, words in self._kept]
+        ports = [(values.ctypes.data, values.size) for values in self.logged]
+        late, plants = (
+            [(part, publishes) for publishes in (False, True) for part in of_a_kind]
+            for of_a_kind in (self._late, self._plants)
+        )
+        begins, first = [*self._late, *self._plants], [*self._filled, *self._early]
+        return (
+            _table(ports),
+            _table(parts),
+            (
+                np.array(begins, dtype=np.int64),
+                np.array(first, dtype=np.int64),
+                self._judge,
+                _table(late),
+                _table(plants),
+            ),
+        )
+
+
+def _table(pairs: Sequence[tuple[int, int]]) -> NDArray[np.int64]:
+    return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+
+
+@njit(cache=True)
+def _fill(
+    out: Any, places: Any, poses: Any, tick: int
+) -> None:  # pragma: no cover  (compiled)
+    """From the row of a tick; where all rest there is but one."""
+    row = min(tick, poses.shape[1] - 1)
+    for body in range(len(places)):
+        for k in range(3):
+            out[places[body] + k] = poses[body, row, k]
+
+
+@njit(cache=True)
+def _copy(
+    out: Any, first: int, values: Any, _tick: int
+) -> None:  # pragma: no cover  (compiled)
+    for k in range(len(values)):
+        out[first + k] = values[k]
+
+
+@njit(cache=True)
+def _clear(outputs: Any) -> None:  # pragma: no cover  (compiled)
+    for k in range(len(outputs)):
+        for j in range(len(outputs[k])):
+            outputs[k][j] = 0.0

@@ -1,0 +1,115 @@
+"""What sounds in a compiled run: functions of the tick."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.building.robot import naming_sounds, seed_of
+from diagrams.scenario.scenario import Scenario
+from systems.framework.host_step import HostFunction
+from systems.framework.signals import Emission
+from systems.sound.mic_array import microphone_reach
+from systems.sound.parameters import SoundParameters
+from systems.sound.sound_emitter import emissions_along, history_ticks
+from systems.sound.waveforms import make_waveform
+
+
+class Sounds(NamedTuple):
+    """What robots hear in a run."""
+
+    heard: dict[str, dict[str, Callable[[int], Emission]]]
+    """Of each robot, by its input port, the emission at a tick; nothing where it hears
+    no waves."""
+    carried: dict[str, HostFunction]
+    """Of each robot with a loudspeaker, what has to see its pose and velocity at every
+    tick before anybody hears it."""
+    played: dict[str, Callable[[int], Emission]]
+    """Of each source and loudspeaker, the emission at a tick; empty where nobody hears
+    waves."""
+
+
+def sounds_of_a_run(scenario: Scenario, times: NDArray[np.float64]) -> Sounds:
+    """What robots hear: sources, on which nothing acts back, and loudspeakers.
+
+    Args:
+        scenario: What is run.
+        times: (n,) of the ticks, s.
+
+    Returns:
+        Functions of ticks below n.
+
+    Raises:
+        InputError: A sound file cannot be played.
+    """
+    robots = scenario.all_robots
+    sounds = Sounds({name: {} for name in robots}, {}, {})
+    hearing = [name for name, own in robots.items() if own.listens]
+    ticks = history_ticks(
+        microphone_reach(scenario.room, scenario.acoustics),
+        scenario.acoustics.c,
+        scenario.longest_frame_s,
+        scenario.tick_s,
+    )
+    for source, sound in scenario.sounds().items() if hearing else ():
+        p_WS, v_WS = np.zeros((2, ticks + len(times), 2))
+        on_since: Callable[[], float | None] | None = None
+        if source in robots:
+            p_WS[:] = robots[source].start.position_m
+            motion, calls = (p_WS[ticks:], v_WS[ticks:]), CalledOn()
+            sounds.carried[source] = _remembering(*motion, calls, scenario.tick_s)
+            if robots[source].searches == "odor":
+                on_since = calls.since
+        else:
+            path = scenario.all_sources[source].path()
+            p_WS[ticks:] = path.poses(times)[:, :2]
+            p_WS[:ticks] = p_WS[ticks]
+            v_WS[ticks:] = [path.velocity(time)[:2] for time in times.tolist()]
+        waveform = _waveform(scenario, source, sound)
+        emission = emissions_along(
+            p_WS, v_WS, waveform, sound, ticks, scenario.tick_s, on_since
+        )
+        sounds.played[source] = emission
+        for name in hearing:
+            followed = scenario.target(name) == source
+            sounds.heard[name]["emission" if followed else f"emission_{source}"] = (
+                emission
+            )
+    return sounds
+
+
+class CalledOn:
+    """When a loudspeaker was called on."""
+
+    def __init__(self) -> None:
+        self.time_s: float | None = None
+
+    def since(self) -> float | None:
+        """s; None: not yet."""
+        return self.time_s
+
+
+def _remembering(
+    p_WS: NDArray[np.float64],
+    v_WS: NDArray[np.float64],
+    calls: CalledOn,
+    tick_s: float,
+) -> HostFunction:
+    """Writes a robot's places and velocities, and when it first called."""
+
+    def remember(tick: int, motion: Any, _: Any) -> None:
+        p_WS[tick], v_WS[tick] = motion[:2], motion[3:5]
+        if calls.time_s is None and motion[6] > 0.5:
+            calls.time_s = tick * tick_s
+
+    return remember
+
+
+def _waveform(
+    scenario: Scenario, source: str, sound: SoundParameters
+) -> NDArray[np.float32]:
+    with naming_sounds(scenario, source, sound):
+        return make_waveform(sound, seed_of(scenario, "sound_emitter", source))

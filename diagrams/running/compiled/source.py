@@ -1,0 +1,285 @@
+"""Generated source of parts of a loop, compiled by numba once for all processes.
+
+numba keeps compiled code for functions of files, by the types of their arguments. So
+the source is written into a file beside that code, whose name tells all that the code
+depends on; and what numbers cannot be, functions and named tuples, stands in it as
+names, while all numbers come by the address of a few arrays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import logging
+import sys
+import time
+from collections import namedtuple
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from functools import cache, cached_property
+from itertools import count
+from pathlib import Path
+from types import FunctionType, ModuleType
+from typing import Any
+
+import numba
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from diagrams.running.compiled.parts import ARRAYS
+from diagrams.scenario.own_code import digests_of
+from systems.framework.compiling import cache_folder, njit, source_digest
+from systems.framework.input_error import InputError, shortened
+from systems.framework.parameters import Parameters
+
+#: Generated files that were not used for so long are removed, s.
+_KEPT_S = 30 * 86_400.0
+
+_LOGGER = logging.getLogger("phonotaxis")
+_COUNT = count()
+
+
+class LoopPart:
+    """A function of the tick, as source and the values that it takes.
+
+    Values get into the source by ``expression``, names by ``name``.
+    """
+
+    def __init__(self) -> None:
+        self.names: dict[str, Any] = {}
+        """Functions and named tuples, by their names in the source."""
+        self._floats: list[float] = []
+        self._words = [0, 0]
+        self._arrays: dict[int, str] = {}
+        self._kept: list[Any] = []
+
+    def source(self, lines: Sequence[str]) -> str:
+        """The source of a function of ``tick``, which returns 0 if it returns nothing.
+
+        Args:
+            lines: Of the function.
+        """
+        words = f"{self.name(ARRAYS[np.dtype(np.int64)])}(address, (1,))"
+        floats = f"{self.name(ARRAYS[np.dtype(np.float64)])}(words[0], (words[1],))"
+        body = [f"words = {words}", f"floats = {floats}", *lines, "return 0"]
+        return "\n".join(["def part(tick, address):", *_indented(body), ""])
+
+    def words(self) -> NDArray[np.int64]:
+        """What the function is called with the address of; to be kept with the part."""
+        floats = np.array(self._floats)
+        self._kept.append(floats)
+        self._words[:2] = floats.ctypes.data, floats.size
+        return np.array(self._words, dtype=np.int64)
+
+    def expression(self, value: Any) -> str:
+        """A value as source text.
+
+        Args:
+            value: A number, text, an array, a function, a tuple of values, or
+                parameters, which become a named tuple of their fields and of what they
+                derive from them; lists become arrays (an empty one is of pairs), what
+                is unset becomes 0.
+
+        Raises:
+            InputError: It is, or holds, anything else.
+        """
+        if isinstance(value, Parameters):
+            kind = _tuple_type(type(value))
+            return self._call(kind, [getattr(value, name) for name in kind._fields])
+        if isinstance(value, tuple):
+            return self._call(type(value), value)
+        if isinstance(value, str) or callable(value):
+            return repr(value) if isinstance(value, str) else self.name(value)
+        if value is None or isinstance(value, float):
+            self._floats.append(0.0 if value is None else value)
+            return f"floats[{len(self._floats) - 1}]"
+        if isinstance(value, int):
+            word = self._word(value)
+            return f"({word} != 0)" if isinstance(value, bool) else word
+        return self._array(value)
+
+    def name(self, function: Any) -> str:
+        """Name of a function or class; a function is compiled for the part."""
+        plain = getattr(function, "py_func", function)
+        known = _compilable(plain) if isinstance(plain, FunctionType) else plain
+        for name, value in self.names.items():
+            if value is known:
+                return name
+        # A lambda's name stands in brackets.
+        name = f"{known.__name__.strip('<>')}_{len(self.names)}"
+        self.names[name] = known
+        return name
+
+    def _call(self, kind: type, values: Any) -> str:
+        text = "".join(f"{self.expression(value)}, " for value in values)
+        return f"{self.name(kind)}({text})" if hasattr(kind, "_fields") else f"({text})"
+
+    def _word(self, value: int) -> str:
+        self._words.append(int(value))
+        return f"words[{len(self._words) - 1}]"
+
+    def _array(self, value: Any) -> str:
+        """By its address; its shape is no part of the source: it serves all layouts."""
+        if id(value) not in self._arrays:
+            # An empty list is one of pairs; scalars become arrays of one number.
+            empty = isinstance(value, list) and not value
+            whole = np.ascontiguousarray(np.empty((0, 2)) if empty else value)
+            if whole.dtype not in ARRAYS:
+                raise InputError(
+                    "engine",
+                    f"{shortened(repr(value), 60)} cannot be used in compiled "
+                    "loops; give blocks numbers or arrays, or run with engine "
+                    "drake",
+                )
+            self._kept += value, whole
+            at = self._word(whole.ctypes.data)
+            shape = "".join(f"{self._word(size)}, " for size in whole.shape)
+            text = f"{self.name(ARRAYS[whole.dtype])}({at}, ({shape}))"
+            scalar = isinstance(value, np.generic)
+            self._arrays[id(value)] = f"{text}[0]" if scalar else text
+        return self._arrays[id(value)]
+
+
+def _indented(lines: Sequence[str]) -> list[str]:
+    return [f"    {line}" for line in lines]
+
+
+@cache
+def _tuple_type(model: type[Parameters]) -> Any:
+    derived = [
+        name
+        for each in reversed(model.__mro__)
+        for name, value in vars(each).items()
+        if isinstance(value, cached_property)
+    ]
+    return namedtuple(f"{model.__name__}Numbers", [*model.model_fields, *derived])
+
+
+@cache
+def _compilable(function: FunctionType) -> Any:
+    """A function for compiled code, without what checks it for Drake's sake.
+
+    Known to numba by its type alone: a compiled function within a named tuple would
+    be a pointer, and code with pointers is not kept.
+    """
+    return register_jitable(inspect.unwrap(function))
+
+
+def compiled_part(source: str, names: Mapping[str, Any]) -> Any:
+    """The function ``part`` of generated source, compiled or loaded.
+
+    Args:
+        source: Of ``LoopPart.source``.
+        names: What its names stand for.
+
+    Returns:
+        The function; the same one for the same source and names.
+    """
+    return _loaded(source, tuple(names.items()))
+
+
+@cache
+def _loaded(source: str, named: tuple[tuple[str, Any], ...]) -> Any:
+    file = _file(source, dict(named))
+    if file is None or not any((file.parent / "__pycache__").glob(f"{file.stem}.*")):
+        _say_that_it_takes_time()
+    # numba asks for the module of what it loads; parts without a file are not one.
+    name = file.stem if file else f"part_{next(_COUNT)}"
+    module = ModuleType(f"phonotaxis.{name}")
+    sys.modules[module.__name__] = module
+    vars(module).update(named)
+    exec(compile(source, str(file or "<part>"), "exec"), vars(module))
+    return njit("int64(int64, int64)", cache=file is not None)(module.part)
+
+
+@cache
+def _say_that_it_takes_time() -> None:
+    _LOGGER.info("compiling code for this kind of scenario, for up to 15 s ...")
+
+
+def address_of(part: Any) -> int:
+    """Where the code of a compiled part stands.
+
+    Args:
+        part: Of ``compiled_part``.
+
+    Returns:
+        By which ``run_parts`` calls it, as long as the part is kept.
+    """
+    (found,) = part.overloads.values()
+    address: int = found.library.get_pointer_to_function(found.fndesc.llvm_func_name)
+    return address
+
+
+def _file(source: str, names: Mapping[str, Any]) -> Path | None:
+    """A file of the source; none where its names do not tell what it does.
+
+    Its own name is a hash of all that compiled code depends on.
+    """
+    origins = (
+        [*map(str, _origins(names))] if all(map(_is_known, names.values())) else []
+    )
+    if not origins:
+        return None
+    text = "".join([*(f"# {line}\n" for line in origins), source])
+    folder = cache_folder() / "parts"
+    file = folder / f"part_{hashlib.sha256(text.encode()).hexdigest()[:24]}.source"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if file.exists():
+            file.touch()
+        else:
+            _remove_unused(folder)
+            partial = file.with_suffix(f".{time.time_ns()}.part")
+            partial.write_text(text, encoding="utf-8")
+            partial.replace(file)
+    except OSError:
+        return None
+    return file
+
+
+def _is_known(value: Any) -> bool:
+    """Whether the files that define a function decide what it does."""
+    function = getattr(value, "py_func", value)
+    module = sys.modules.get(function.__module__)
+    if module is None:
+        return False
+    if isinstance(function, FunctionType):
+        # A user's module that was loaded anew is not that of an older function.
+        stale = function.__globals__ is not vars(module)
+        if function.__closure__ or stale:
+            return False
+    return _is_ours(function) or bool(digests_of(module))
+
+
+def _is_ours(function: Any) -> bool:
+    """Whether the digest of the package tells what a function does."""
+    return str(function.__module__).partition(".")[0] in ("diagrams", "systems")
+
+
+def _origins(names: Mapping[str, Any]) -> Iterator[str]:
+    """Where each name comes from, and the content of all files that it depends on."""
+    files = {Path(__file__)}
+    for name, value in names.items():
+        function = getattr(value, "py_func", value)
+        module = sys.modules[function.__module__]
+        fields = " ".join(getattr(value, "_fields", ()))
+        yield f"{name}: {function.__module__}.{function.__qualname__} {fields}".strip()
+        if module.__file__:
+            files.add(Path(module.__file__).resolve())
+        if not _is_ours(function):
+            for file, digest in digests_of(module).items():
+                files.add(Path(file))
+                yield f"{file} {digest}"
+    yield f"{source_digest(*files)} numba {numba.__version__}"
+
+
+def _remove_unused(folder: Path) -> None:
+    oldest = time.time() - _KEPT_S
+    for file in folder.glob("part_*.source"):
+        with suppress(OSError):  # another process removes it, too
+            if file.stat().st_mtime < oldest:
+                for code in (folder / "__pycache__").glob(f"{file.stem}.*"):
+                    code.unlink()
+                file.unlink()

@@ -1,0 +1,256 @@
+"""Runs a scenario and returns what happened."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
+
+from diagrams.building.builder import SoundFollower, build_sound_follower
+from diagrams.building.robot import publishes_state
+from diagrams.running.audio.diagram_audio import DiagramAudio
+from diagrams.running.audio.run_audio import RunAudio
+from diagrams.running.compiled.loop import CompiledLoop, compile_loop
+from diagrams.running.compiled.loop_blocks import shared_blocks, shared_world
+from diagrams.running.run_result import RunResult, gather_result, logged_columns
+from diagrams.running.stop_rules import RunRules, StopRules
+from diagrams.scenario.run_parameters import Engine
+from diagrams.scenario.scenario import WORLD, Scenario
+from systems.framework.input_error import InputError
+
+# Until then a source that sounds from the first instant has been heard and followed.
+_FIRST_TICKS_S = 0.15
+# Kinds of builds that were run in this process.
+_LOADED: set[tuple[object, ...]] = set()
+
+
+def make_simulator(follower: SoundFollower) -> Simulator:
+    """A simulator of the diagram with the scenario's integrator."""
+    simulator = Simulator(follower.diagram)
+    ApplySimulatorConfig(simulator_config(follower.scenario), simulator)
+    return simulator
+
+
+def simulator_config(scenario: Scenario) -> SimulatorConfig:
+    """The scenario's integrator, as Drake takes it."""
+    return SimulatorConfig(
+        integration_scheme=scenario.integrator.scheme,
+        max_step_size=scenario.integrator.step_s,
+        use_error_control=False,
+    )
+
+
+def simulate(
+    scenario: Scenario,
+    *,
+    follower: SoundFollower | None = None,
+    progress: Callable[[float], None] | None = None,
+    engine: Engine | None = None,
+    audio: RunAudio | None = None,
+) -> RunResult:
+    """Runs a scenario to its end.
+
+    Args:
+        scenario: What to run.
+        follower: A logged build of the same scenario to use again: Drake
+            never frees blocks written in Python, so many runs in one process
+            should share a build. Compiled runs do by themselves.
+        progress: Called with the simulated time, s, once a simulated second.
+        engine: ``drake``, or ``compiled``: the same blocks in one compiled loop; they
+            are compiled for up to 15 s when they are first used, and kept on the disk.
+            None: that of the scenario, Drake's if that is ``auto``.
+        audio: Opened files for what is heard and played; none: nothing is saved.
+
+    Returns:
+        ``RunResult``.
+
+    Raises:
+        InputError: The law is not known.
+        InputError: The sound file cannot be played, or a value became NaN.
+        InputError: The scenario or its law cannot be compiled.
+        OSError: Sound cannot be written any more.
+    """
+    if audio is not None:
+        audio.check_unused(scenario)
+    if (engine or scenario.engine) == "compiled":
+        return _run_compiled(scenario, progress, audio)
+    follower = follower or build_sound_follower(scenario, log=True)
+    logs = [parts.log for parts in follower.robots.values()]
+    if follower.scenario != scenario or None in logs:
+        raise InputError(
+            "simulate", "follower must be built from the same scenario with log=True"
+        )
+    load_compiled_code(follower)
+    simulator = make_simulator(follower)
+    rules = StopRules(follower)
+    simulator.set_monitor(_monitor(follower, rules, audio))
+    start = perf_counter()
+    simulator.Initialize()
+    views = _python_views(follower, simulator.get_context())
+    for second in range(1, math.ceil(scenario.duration_s) + 1):
+        simulator.AdvanceTo(min(second, scenario.duration_s))
+        if progress is not None:
+            progress(simulator.get_context().get_time())
+        if rules.over:
+            break
+    wall_s = perf_counter() - start
+    views.clear()
+    columns = _logged(follower, simulator)
+    world = columns.pop(WORLD, {})
+    return gather_result(scenario, rules.robots, columns, wall_s, world=world)
+
+
+def _logged(
+    follower: SoundFollower, simulator: Simulator
+) -> dict[str, dict[str, NDArray[np.float64]]]:
+    """Columns of each robot, and of the world if it has any, when a run has ended.
+
+    Drake logs at an instant before the updates at that instant. What a block publishes
+    of its state is in the row of the next tick, for it changes at ticks alone; so it is
+    moved to the row before, that of the tick at which the block made it.
+    """
+    context = simulator.get_context()
+    every = {**follower.robots}
+    if follower.world is not None:
+        every[WORLD] = follower.world
+    logs = {}
+    for name, parts in every.items():
+        assert parts.log is not None
+        log = parts.log.FindLog(context)
+        logs[name] = np.array(log.sample_times()), np.array(log.data())
+    simulator.AdvancePendingEvents()  # the updates at the last tick
+    for name, parts in every.items():
+        rows, first = logs[name][1], 0
+        for (part, port), columns in parts.logged.items():
+            block, own = parts.blocks[part], rows[first : first + len(columns)]
+            if publishes_state(block, port):
+                own[:, :-1] = own[:, 1:]
+                last = block.GetMyContextFromRoot(context)
+                own[:, -1] = parts.port(part, port).Eval(last)
+            first += len(columns)
+    return {name: logged_columns(every[name], *logs[name]) for name in every}
+
+
+def _monitor(
+    follower: SoundFollower, rules: StopRules, audio: RunAudio | None
+) -> Callable[[Any], Any]:
+    """What the simulator calls after every step: saves the sound, and judges."""
+    if audio is None:
+        return rules
+    save = DiagramAudio(follower, audio)
+
+    def monitor(context: Any) -> Any:
+        save(context)
+        return rules(context)
+
+    return monitor
+
+
+def prepared_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
+    """The compiled loop of a scenario, compiled or loaded, before its first tick.
+
+    Args:
+        scenario: What to run.
+        audio: Where its sound goes, if it is saved.
+
+    Returns:
+        The loop.
+
+    Raises:
+        InputError: As ``simulate``.
+    """
+    loop = _new_loop(scenario, audio)
+    loop.prepare()
+    listens = any(robot.listens for robot in scenario.all_robots.values())
+    kind = "compiled", *_kind(scenario)
+    if listens and kind not in _LOADED:
+        # What it calls in Python is compiled, too; errors are the run's to raise.
+        aside = _new_loop(scenario)
+        with suppress(ValueError):
+            aside.advance(math.ceil(_FIRST_TICKS_S / scenario.tick_s))
+        _LOADED.add(kind)
+    return loop
+
+
+def _new_loop(scenario: Scenario, audio: RunAudio | None = None) -> CompiledLoop:
+    blocks, world = shared_blocks(scenario), shared_world(scenario)
+    return compile_loop(scenario, blocks, RunRules(scenario), world, audio)
+
+
+def _run_compiled(
+    scenario: Scenario,
+    progress: Callable[[float], None] | None,
+    audio: RunAudio | None,
+) -> RunResult:
+    """``simulate`` by a compiled loop."""
+    loop = prepared_loop(scenario, audio)
+    start = perf_counter()
+    ticks_a_second = max(1, round(1.0 / scenario.tick_s))
+    while not loop.over:
+        loop.advance(ticks_a_second if progress else len(loop.log))
+        if progress is not None:
+            progress(loop.time_s)
+    wall_s = perf_counter() - start
+    robots = loop.rules.robots
+    columns = {name: loop.logged(name) for name in robots}
+    world = loop.logged(WORLD) if WORLD in loop.columns else {}
+    return gather_result(scenario, robots, columns, wall_s, "compiled", world)
+
+
+def _python_views(follower: SoundFollower, context: Any) -> list[Any]:
+    """Objects by which Python sees contexts, states and outputs of the blocks.
+
+    As long as they are held, they are not made anew for each call of a block: 5 %
+    of a run.
+    """
+    views: list[Any] = []
+    for parts in (*follower.sources.values(), *follower.robots.values()):
+        for part, block in parts.blocks.items():
+            own = block.GetMyContextFromRoot(context)
+            groups = range(own.num_discrete_state_groups())
+            views += [own, *(own.get_discrete_state(group) for group in groups)]
+            if own.num_continuous_states():
+                views.append(own.get_continuous_state_vector())
+            logged = (name for owner, name in parts.logged if owner == part)
+            views += [parts.port(part, name).EvalBasicVector(own) for name in logged]
+    return views
+
+
+def load_compiled_code(follower: SoundFollower) -> None:
+    """Runs some ticks aside where a process runs a kind of build for the first time.
+
+    numba compiles then, or loads what it compiled in an earlier process: a tenth of
+    a run of 40 s, or many times a run, which is none of the simulation's own time.
+    ``simulate`` does it by itself; a process that forks does it beforehand.
+
+    Raises:
+        InputError: As ``simulate``.
+    """
+    kind = _kind(follower.scenario)
+    if kind not in _LOADED:
+        simulator = make_simulator(follower)
+        simulator.Initialize()
+        simulator.AdvanceTo(min(_FIRST_TICKS_S, follower.scenario.duration_s))
+        _LOADED.add(kind)
+
+
+def _kind(scenario: Scenario) -> tuple[object, ...]:
+    """What decides which compiled functions a run needs."""
+    return tuple(
+        (
+            robot.hearing,
+            robot.obstacle_sensing,
+            robot.law,
+            robot.tdoa.method,
+            scenario.room is None,
+            robot.plant.friction is None,
+            robot.own_guard is None,
+        )
+        for robot in scenario.all_robots.values()
+    )

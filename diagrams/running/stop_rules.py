@@ -1,0 +1,556 @@
+"""When a run ends: exactly one cause, checked at every tick."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.systems.framework import EventStatus
+
+from diagrams.building.builder import SoundFollower
+from diagrams.building.robot import Parts
+from diagrams.scenario.bodies import Body, LivePath, Surroundings, robot_rectangle
+from diagrams.scenario.run_parameters import StopParameters
+from diagrams.scenario.scenario import Scenario
+from systems.world.geometry import (
+    control_point,
+    control_point_velocity,
+    first_overlap,
+    rectangle_clearance,
+)
+
+#: Causes of runs that did what they should.
+SUCCESSFUL = ("reached", "completed", "found")
+#: Causes that end the run of all robots.
+ENDING = ("collision", "diverged")
+#: Cause of a robot whose run another's end has cut short.
+INTERRUPTED = "interrupted"
+
+#: A rest of exactly ``stop.rest_time_s`` counts: instants of ticks are rounded, s.
+ROUNDING_S = 1e-9
+#: Parts into which a tick is cut for contacts, and how far a body on a path of its own
+#: may go in one, m: a body that goes farther has its tick cut into more.
+BETWEEN_TICKS, _PART_M = 5, 0.02
+
+#: Port of a law that says when it has found that there is no way, 0 or 1.
+GIVES_UP = "gives_up"
+#: Port of a search that says how it ended.
+SEARCH_REPORT = "search_report"
+#: Ports of what the bumper of a searching robot feels, and of what there is to feel.
+CONTACT, TOUCHED = "contact", "touched"
+
+_Places = Mapping[str, tuple[float, float, float]]
+_GO_ON = EventStatus.DidNothing()
+
+
+@dataclass(frozen=True)
+class Collision:
+    """Who touched whom."""
+
+    object: str
+    """Name of the obstacle, or ``source``."""
+    fault: str
+    """``robot`` or ``obstacle``: who alone, the other standing still, would have
+    come nearer since the last tick; turning counts, a body at rest never is."""
+    time: float
+    """First contact, s, to a fifth of a tick."""
+
+
+class NearBody(NamedTuple):
+    """A body that a robot can touch."""
+
+    name: str
+    body: Body
+    reach_m: float
+    """With centres farther apart than this they do not touch, m."""
+    step_m: float
+    """The most that it moves in a tick on a path of its own, m; a robot: 0."""
+
+
+def decisive_robot(robots: Mapping[str, RobotRules]) -> str:
+    """Name of the robot whose cause is that of the whole run.
+
+    The first that touched something, else the first that did not do what it
+    should, else the first.
+
+    Args:
+        robots: By name.
+    """
+    causes = {name: rules.final_cause() for name, rules in robots.items()}
+
+    def rank(name: str) -> int:
+        cause = causes[name]
+        if cause in ENDING:
+            return 0
+        return 2 if cause in (*SUCCESSFUL, INTERRUPTED) else 1
+
+    return min(robots, key=rank)
+
+
+class Seen(NamedTuple):
+    """What a robot's run is judged by, at a tick."""
+
+    pose: list[float]
+    """x, y, theta in W, m and rad."""
+    velocity: list[float]
+    """vx, vy, omega of it in W, m/s and rad/s."""
+    valid: bool
+    """Whether there is a target."""
+    gives_up: bool = False
+    """Whether the law says that there is no way to it."""
+    ended: float = 0.0
+    """Number of the ending of a search, 0 while it goes on."""
+    feels: bool = False
+    """Whether a contact switch is closed, and by a body."""
+
+
+class RunRules:
+    """When a run of one or several robots ends.
+
+    It ends when each robot has a cause of its own, or one has touched something
+    or is lost from sight; what has ended otherwise goes on beside the others.
+    """
+
+    def __init__(self, scenario: Scenario) -> None:
+        starts = {n: robot.start.pose for n, robot in scenario.all_robots.items()}
+        self._paths = {name: LivePath(pose) for name, pose in starts.items()}
+        self.robots = {
+            name: RobotRules(
+                scenario.of_robot(name), scenario.surroundings(name, self._paths)
+            )
+            for name in starts
+        }
+
+    @property
+    def cause(self) -> str:
+        """Cause of the whole run; empty while it goes on."""
+        if not self.over:
+            return ""
+        return self.robots[decisive_robot(self.robots)].final_cause()
+
+    @property
+    def over(self) -> bool:
+        """Whether the run has ended."""
+        causes = [rules.cause for rules in self.robots.values()]
+        return all(causes) or any(cause in ENDING for cause in causes)
+
+    def judge(self, time: float, seen: Mapping[str, Seen]) -> None:
+        """Decides at a tick.
+
+        Args:
+            time: s.
+            seen: What each robot does.
+        """
+        self._move(time, {name: each.pose for name, each in seen.items()})
+        for name, rules in self.robots.items():
+            rules.judge(time, seen[name])
+        self._interrupt()
+
+    def take_over(self, ticks: Mapping[str, JudgedTick]) -> None:
+        """Ends as a compiled loop has ended, which judges by the same functions.
+
+        Args:
+            ticks: The last one of each robot.
+        """
+        last = next(iter(ticks.values()))
+        before = {name: tick.pose_before for name, tick in ticks.items()}
+        self._move(last.time_before, before)
+        self._move(last.time, {name: tick.pose for name, tick in ticks.items()})
+        for name, rules in self.robots.items():
+            rules.take_over(ticks[name])
+        self._interrupt()
+
+    def _move(self, time: float, poses: Mapping[str, Sequence[float]]) -> None:
+        for name, path in self._paths.items():
+            path.move(time, poses[name])
+
+    def _interrupt(self) -> None:
+        if self.over:
+            for rules in self.robots.values():
+                rules.cause = rules.cause or INTERRUPTED
+
+
+class StopRules(RunRules):
+    """A monitor for Drake's simulator; remembers why it stopped the run."""
+
+    def __init__(self, follower: SoundFollower) -> None:
+        super().__init__(follower.scenario)
+        self._diagram, self._tick_s = follower.diagram, follower.scenario.tick_s
+        self._views = {name: _View(parts) for name, parts in follower.robots.items()}
+        self._tick = -1
+
+    def __call__(self, context: Any) -> EventStatus:
+        """Called after every step of the simulator, which may be finer than ticks."""
+        time = context.get_time()
+        tick = round(time / self._tick_s)
+        if tick == self._tick or abs(time - tick * self._tick_s) > ROUNDING_S:
+            return _GO_ON
+        self._tick = tick
+        self.judge(time, {name: view.at(context) for name, view in self._views.items()})
+        if self.over:
+            return EventStatus.ReachedTermination(self._diagram, self.cause)
+        return _GO_ON
+
+
+class _View:
+    """Reads a robot in the diagram's context."""
+
+    def __init__(self, parts: Parts) -> None:
+        plant = parts.blocks["plant"]
+        self._ports = [
+            (plant, plant.GetOutputPort(name)) for name in ("pose_WB", "velocity_WB")
+        ]
+        for name in ("target_valid", GIVES_UP, SEARCH_REPORT, CONTACT, TOUCHED):
+            having = [b for b in parts.blocks.values() if b.HasOutputPort(name)]
+            self._ports += [(block, block.GetOutputPort(name)) for block in having[:1]]
+        self._root: Any = None
+        self._contexts: list[Any] = []
+
+    def at(self, context: Any) -> Seen:
+        if context is not self._root:
+            self._root = context
+            self._contexts = [b.GetMyContextFromRoot(context) for b, _ in self._ports]
+        seen = {
+            port.get_name(): port.Eval(own).tolist()
+            for (_, port), own in zip(self._ports, self._contexts, strict=True)
+        }
+        return Seen(
+            seen["pose_WB"],
+            seen["velocity_WB"],
+            seen.get("target_valid", [0.0])[0] > 0.5,
+            seen.get(GIVES_UP, [0.0])[0] > 0.5,
+            seen.get(SEARCH_REPORT, [0.0])[0],
+            max(seen.get(CONTACT, [0.0])) > 0.5 and seen[TOUCHED][0] >= 0.0,
+        )
+
+
+def instants_of(times: NDArray[np.float64], parts: int) -> NDArray[np.float64]:
+    """Instants at which bodies are looked at.
+
+    Args:
+        times: (n + 1,) of ticks, s.
+        parts: Into which each tick is cut.
+
+    Returns:
+        (n parts + 1,) s, the ticks among them.
+    """
+    shares = np.arange(1, parts + 1) / parts
+    between = times[:-1, None] + shares * np.diff(times)[:, None]
+    return np.concatenate([times[:1], between.ravel()])
+
+
+class RuleNumbers(NamedTuple):
+    """What ends a robot's run, but for contacts."""
+
+    stop: StopParameters
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    follow_distance_m: float
+    goal_radius_m: float
+    source_rests: bool
+    searches: int = 0
+    """1 for an odour, 2 for a sound; 0: it does not search."""
+
+
+#: Causes that ``judge_tick`` finds, by their numbers.
+FOUND = (
+    "",
+    "diverged",
+    "reached",
+    "lost",
+    "stuck",
+    "no way found",
+    "found",
+    "false find",
+)
+DIVERGED = FOUND.index("diverged")
+
+#: State of ``judge_tick`` before the first tick: time and place of P from which it has
+#: stayed, time of the last valid target, since when P rests in the goal, whether it was
+#: there, ticks since the first detection, and those of them in which P followed.
+UNJUDGED = (0.0, math.inf, math.inf, 0.0, math.inf, 0.0, 0.0, 0.0)
+
+
+def judge_tick(
+    time: float,
+    state: Any,
+    pose: Any,
+    velocity: Any,
+    p_WS: Any,
+    valid: bool,  # noqa: FBT001  # compiled code has no keywords
+    gives_up: bool,  # noqa: FBT001
+    numbers: RuleNumbers,
+) -> int:
+    """Why a run ends at a tick, contacts apart.
+
+    Args:
+        time: s.
+        state: As ``UNJUDGED``, changed.
+        pose: (x, y, theta) of the robot, m and rad.
+        velocity: (vx, vy, omega) of it in W, m/s and rad/s.
+        p_WS: What it follows, m.
+        valid: Whether it has a target.
+        gives_up: Whether its law says that there is no way to it.
+        numbers: ``RuleNumbers``.
+
+    Returns:
+        Place of the cause in ``FOUND``; 0 where the run goes on.
+    """
+    stop = numbers.stop
+    x_P, y_P = control_point(pose, numbers.control_point_m)
+    distance = math.hypot(p_WS[0] - x_P, p_WS[1] - y_P)
+    if not distance <= stop.diverged_range_m:
+        return 1
+    in_goal = distance <= numbers.goal_radius_m
+    # What the end of the time is judged by.
+    if in_goal:
+        state[5] = 1.0
+    if valid or state[6] > 0.0:
+        error = abs(distance - numbers.follow_distance_m)
+        state[6] += 1.0
+        if error <= stop.following_band_m:
+            state[7] += 1.0
+    there = numbers.source_rests and in_goal and valid
+    if there:
+        vx, vy = control_point_velocity(pose[2], velocity, numbers.control_point_m)
+        there = math.hypot(vx, vy) < stop.rest_speed_m_s
+    state[4] = min(state[4], time) if there else math.inf
+    if time - state[4] >= stop.rest_time_s - ROUNDING_S:
+        return 2
+    if valid:
+        state[3] = time
+    elif time - state[3] > stop.lost_after_s:
+        return 3
+    # Stuck: P goes nowhere though there is a target, and the goal is elsewhere.
+    moved = math.hypot(x_P - state[1], y_P - state[2]) > stop.stuck_radius_m
+    if not valid or in_goal or moved:
+        state[0], state[1], state[2] = time, x_P, y_P
+        return 0
+    if time - state[0] < stop.stuck_after_s:
+        return 0
+    return 5 if gives_up else 4
+
+
+def judge_search(ended: float, pose: Any, p_WS: Any, numbers: RuleNumbers) -> int:
+    """Why a run of a search ends at a tick, contacts apart.
+
+    Args:
+        ended: Number of the search's ending, see ``systems.search.search_ending``.
+        pose: (x, y, theta) of the robot, m and rad.
+        p_WS: What it searches for, m.
+        numbers: ``RuleNumbers``.
+
+    Returns:
+        Place of the cause in ``FOUND``; 0 where the run goes on.
+    """
+    dx, dy = p_WS[0] - pose[0], p_WS[1] - pose[1]
+    distance = math.hypot(dx, dy)
+    if not distance <= numbers.stop.diverged_range_m:
+        return 1
+    if ended < 0.5:
+        return 0
+    if ended > 1.5:
+        return 3
+    if numbers.searches == 2:
+        return 6 if distance <= numbers.stop.sound_within_m else 7
+    off = math.atan2(dy, dx) - pose[2]
+    off = abs(math.degrees(math.atan2(math.sin(off), math.cos(off))))
+    ahead = off <= numbers.stop.odor_ahead_deg
+    return 6 if ahead and distance <= numbers.stop.odor_within_m else 7
+
+
+class JudgedTick(NamedTuple):
+    """A robot's last tick in a compiled loop."""
+
+    time: float
+    time_before: float
+    """Of the tick before, s; 0 at the first one."""
+    pose: list[float]
+    pose_before: list[float]
+    """The same as ``pose`` at the first tick."""
+    valid: bool
+    """Whether there is a target."""
+    state: list[float]
+    """Of ``judge_tick``."""
+    found: int
+    """What that has returned, at this tick or before."""
+    touched: tuple[int, float] | None
+    """Number of the first body that was touched since the tick before, and the part of
+    the tick that had passed."""
+    ended: float = 0.0
+    """Number of the ending of a search."""
+
+
+@dataclass
+class RobotRules:
+    """Why one robot's run ends."""
+
+    scenario: Scenario
+    """Of this robot alone."""
+    surroundings: Surroundings
+    """What it can hit, and what it follows."""
+    cause: str = ""
+    collision: Collision | None = None
+    ended: float = 0.0
+    """Number of the ending of a search."""
+    _pose: Sequence[float] | None = None
+    """At the last tick."""
+    _valid: bool = False
+    _state: list[float] = field(default_factory=lambda: [*UNJUDGED])
+    _time: float = 0.0
+
+    def __post_init__(self) -> None:
+        scenario = self.scenario
+        self._source_rests = not self.surroundings.followed.path.moves
+        self.numbers = RuleNumbers(
+            scenario.stop,
+            scenario.robot.control_point_m,
+            scenario.follow_distance_m,
+            scenario.goal_radius(moves=not self._source_rests),
+            self._source_rests,
+            {None: 0, "odor": 1, "sound": 2}[scenario.searches],
+        )
+        self.parts, self.near = self._near_bodies()
+
+    def _near_bodies(self) -> tuple[int, list[NearBody]]:
+        """Parts into which ticks are cut, and what the robot can touch."""
+        size, tick_s = self.scenario.size, self.scenario.tick_s
+        times = tick_s * np.arange(int(self.scenario.duration_s / tick_s + 1e-9) + 1.0)
+        instants, farthest, near = instants_of(times, BETWEEN_TICKS), 0.0, []
+        for name, body in self.surroundings.bodies.items():
+            step = 0.0
+            if body.path.moves and not isinstance(body.path, LivePath):
+                ways = np.diff(body.path.poses(instants)[:, :2], axis=0)
+                farthest_part = float(np.hypot(*ways.T).max(initial=0.0))
+                step = BETWEEN_TICKS * farthest_part
+                farthest = max(farthest, farthest_part)
+            reach = 0.5 * (math.hypot(*size) + math.hypot(*body.size))
+            near.append(NearBody(name, body, reach, step))
+        return BETWEEN_TICKS * max(1, math.ceil(farthest / _PART_M)), near
+
+    def judge(self, time: float, seen: Seen) -> None:
+        """Decides at a tick; what has ended stays as it ended.
+
+        Of several robots, one that has reached its goal can still be hit.
+
+        Args:
+            time: s.
+            seen: What the robot does.
+        """
+        places = {name: body.path.pose(time) for name, body, *_ in self.near}
+        ended, self._valid = self.cause, seen.valid
+        self.collision = None
+        if not seen.feels:  # what the bumper feels is no accident
+            self.collision = self._find_collision(time, seen.pose, places)
+        if self.collision is not None:
+            self.cause = "collision"
+        elif self.numbers.searches and not ended:
+            self.ended = seen.ended
+            target = self.surroundings.followed.path.pose(time)
+            found = judge_search(seen.ended, seen.pose, target, self.numbers)
+            self.cause = FOUND[found]
+        elif not ended:
+            found = judge_tick(
+                time,
+                self._state,
+                seen.pose,
+                seen.velocity,
+                self.surroundings.followed.path.pose(time),
+                self._valid,
+                seen.gives_up,
+                self.numbers,
+            )
+            self.cause = FOUND[found]
+        self._pose, self._time = seen.pose, time
+
+    def take_over(self, tick: JudgedTick) -> None:
+        """Ends as a compiled loop has ended, which judges by the same functions.
+
+        Args:
+            tick: The last one.
+        """
+        self._state, self._valid = tick.state, tick.valid
+        self._pose, self._time = tick.pose_before, tick.time_before
+        self.cause, self.ended = FOUND[tick.found], tick.ended
+        if tick.touched is not None:
+            number, part = tick.touched
+            self.collision = self._collide(
+                self.near[number], part, tick.time, tick.pose
+            )
+            self.cause = "collision"
+
+    def final_cause(self) -> str:
+        """Cause of the run, once the simulator has returned."""
+        if self.cause:
+            return self.cause
+        if self.numbers.searches:
+            return "timeout"
+        if not self._source_rests and self._has_followed():
+            return "completed"
+        if not self._valid:
+            return "lost"
+        if not self._source_rests:
+            return "astray"
+        return "unsettled" if self._state[5] > 0.0 else "timeout"
+
+    def _has_followed(self) -> bool:
+        share = self.scenario.stop.following_share
+        *_, ticks, following_ticks = self._state
+        return ticks > 0.0 and following_ticks >= share * ticks
+
+    def _find_collision(
+        self, time: float, pose: Sequence[float], places: _Places
+    ) -> Collision | None:
+        """First contact since the last tick."""
+        first = math.inf
+        touched: NearBody | None = None
+        before = pose if self._pose is None else self._pose
+        gone = math.dist(pose[:2], before[:2])
+        for near in self.near:
+            body, step = near.body, near.step_m
+            if isinstance(body.path, LivePath):
+                step = body.path.step_m
+            x, y, _ = places[near.name]
+            if math.hypot(x - pose[0], y - pose[1]) > near.reach_m + gone + step:
+                continue
+            instants = instants_of(np.array([self._time, time]), self.parts)
+            poses = body.path.poses(instants if time > self._time else instants[:1])
+            size = self.scenario.size
+            part = first_overlap(tuple(before), tuple(pose), size, poses, body.size)
+            if part < first:
+                first, touched = part, near
+        if touched is None:
+            return None
+        return self._collide(touched, first, time, pose)
+
+    def _collide(
+        self, near: NearBody, part: float, time: float, pose: Sequence[float]
+    ) -> Collision:
+        """The contact with a body when a part of the tick had passed."""
+        instant = self._time + part * (time - self._time)
+        fault = self._fault(instant, time, pose, near.body)
+        return Collision(near.name, fault, instant)
+
+    def _fault(
+        self, instant: float, time: float, pose: Sequence[float], body: Body
+    ) -> str:
+        """Who alone would have come nearer since the last tick, the other standing."""
+        robot_then = self._footprint(self._time, time, pose)
+        robot_now = self._footprint(instant, time, pose)
+        body_then, body_now = body.rectangle(self._time), body.rectangle(instant)
+        robot_alone = rectangle_clearance(robot_now, body_then)
+        body_alone = rectangle_clearance(robot_then, body_now)
+        return "robot" if robot_alone <= body_alone else "obstacle"
+
+    def _footprint(
+        self, instant: float, time: float, pose: Sequence[float]
+    ) -> NDArray[np.float64]:
+        """The robot's rectangle between the last tick and this one."""
+        now = np.array(pose)
+        before = now if self._pose is None else np.array(self._pose)
+        part = (instant - self._time) / max(time - self._time, self.scenario.tick_s)
+        return robot_rectangle(before + part * (now - before), self.scenario.robot)

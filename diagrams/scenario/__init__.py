@@ -1,0 +1,1 @@
+"""The scenario: its fields, its files, its checks and its warnings."""

@@ -1,0 +1,96 @@
+"""Whether a guard can keep what it promises, asked before anything runs."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from diagrams.scenario.bodies import Body
+from diagrams.scenario.participants import FollowerParameters
+from systems.base.robot import body_radius
+from systems.framework.input_error import InputError
+from systems.safety.parameters import GuardParameters
+from systems.safety.views import (
+    PlaceError,
+    place_error,
+    sensor_sectors,
+    stopping_way,
+)
+from systems.world.plane import beyond_rectangle
+
+
+def check_guard(
+    prefix: str, robot: FollowerParameters, bodies: Mapping[str, Body], tick_s: float
+) -> None:
+    """Refuses a guarded robot that could never start, or not drive ahead.
+
+    Args:
+        prefix: What the robot's fields begin with in a message.
+        robot: The robot; without a guard nothing is asked.
+        bodies: All that it could touch, by name.
+        tick_s: Period of control, s.
+
+    Raises:
+        InputError: Its sensors do not serve, its grid does not, or something stands
+            in its bubble.
+    """
+    if robot.own_guard is None:
+        return
+    if robot.obstacle_sensing != "ultrasonic":
+        raise InputError(
+            f"{prefix}obstacle_sensing",
+            f"is {robot.obstacle_sensing}, but the guard needs ranges; set it to "
+            "ultrasonic, or leave guard out",
+        )
+    try:
+        robot.free_space.check(robot.robot)
+    except InputError as error:
+        field = f"{prefix}free_space.{error.field}"
+        raise InputError(field, error.message) from None
+    _check_view(prefix, robot)
+    _check_memory(prefix, robot, robot.own_guard, tick_s)
+    bubble, (x, y) = robot.free_space.start_bubble_m, robot.start.position_m
+    for name, body in bodies.items():
+        distance = math.hypot(*beyond_rectangle((x, y), body.rectangle(0.0)))
+        if distance < bubble:
+            raise InputError(
+                f"{prefix}start.position_m",
+                f"{name!r} is {distance:.3g} m from the axle, within "
+                f"{prefix}free_space.start_bubble_m, {bubble:g} m, which the "
+                "guard assumes to be free; move one of them, or lower "
+                "start_bubble_m",
+            )
+
+
+def _check_view(prefix: str, robot: FollowerParameters) -> None:
+    sectors = sensor_sectors(robot.ultrasonic, robot.robot.control_point_m)
+    turns = sectors.right[:, :1] + np.array([-math.tau, 0.0, math.tau])
+    ahead = (turns < 0.0) & (turns + sectors.left - sectors.right > 0.0)
+    if not np.any(ahead.any(axis=1) & sectors.seen_by.any(axis=1)):
+        raise InputError(
+            f"{prefix}ultrasonic.axes_deg",
+            "no sensor looks straight ahead, so that the guard would never let the "
+            "robot drive there; add the direction 0, or leave guard out",
+        )
+
+
+def _check_memory(
+    prefix: str, robot: FollowerParameters, guard: GuardParameters, tick_s: float
+) -> None:
+    """What is a braking ahead has to stay known until the robot has stopped."""
+    known, body = robot.free_space, robot.robot
+    stopping = stopping_way(guard, body, robot.plant, tick_s)
+    error = PlaceError.of(known, body, robot.odometry)
+    distance = body_radius(body) + stopping
+    needed = place_error(distance, stopping, error)
+    if needed > known.place_error_m:
+        raise InputError(
+            f"{prefix}free_space.place_error_m",
+            f"is {known.place_error_m:g} m, but by the time the robot stops, "
+            f"{stopping:.2g} m on, what was {distance:.3g} m away may be off by "
+            f"{needed:.2g} m, by encoder pulses of {error.pulse_m * 1e3:.2g} mm "
+            f"and a wheel_error of {known.wheel_error:g}; raise it, or use an "
+            "encoder with more pulses or a smaller wheel_error",
+        )

@@ -1,0 +1,109 @@
+"""What robots that search need of their scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.run_parameters import RunParameters
+from systems.framework.input_error import InputError
+
+
+def address_of_robot(robot: FollowerParameters) -> int:
+    """Address of a searching robot in its radio frames.
+
+    Args:
+        robot: That searches.
+
+    Returns:
+        1 to 3.
+    """
+    smells = robot.searches == "odor"
+    return robot.search.address if smells else robot.sound_search.address
+
+
+def check_searches(
+    robots: Mapping[str, tuple[str, FollowerParameters]], run: RunParameters
+) -> None:
+    """Refuses searches for what is not there, or by what cannot serve.
+
+    Args:
+        robots: By name, with what their fields begin with in a message.
+        run: What the run has beside them.
+
+    Raises:
+        InputError: Names the field and the remedy.
+    """
+    searching = {name: each for name, each in robots.items() if each[1].searches}
+    taken: dict[int, str] = {}
+    for name, (prefix, robot) in searching.items():
+        group = "search" if robot.searches == "odor" else "sound_search"
+        if robot.searches == "odor":
+            _check_odor(prefix, run)
+        else:
+            _check_sound(prefix, robot, robots)
+        if robot.guard is not None:
+            raise InputError(
+                f"{prefix}guard",
+                f"is set, but law {robot.law!r} drives the motors itself; leave guard "
+                "out",
+            )
+        address = address_of_robot(robot)
+        if address in taken:
+            raise InputError(
+                f"{prefix}{group}.address",
+                f"{address} is that of robot {taken[address]!r}; give each robot "
+                "its own address, 1 to 3",
+            )
+        taken[address] = name
+
+
+def _check_odor(prefix: str, run: RunParameters) -> None:
+    if run.odor is None:
+        raise InputError(
+            "odor",
+            f"is missing, and {prefix}law 'plume_search' searches for one; set "
+            "odor.position_m",
+        )
+    if run.room is not None and not run.room.contains(run.odor.position_m):
+        x, y = run.odor.position_m
+        raise InputError(
+            "odor.position_m",
+            f"({x:g}, {y:g}) is outside the room, which begins at "
+            f"{tuple(run.room.corner.tolist())} and is {run.room.size_m} m; move it, "
+            "or set room.corner_m",
+        )
+
+
+def _check_sound(
+    prefix: str,
+    robot: FollowerParameters,
+    robots: Mapping[str, tuple[str, FollowerParameters]],
+) -> None:
+    if robot.hearing != "audio":
+        raise InputError(
+            f"{prefix}hearing",
+            f"is {robot.hearing!r}, but law 'sound_search' needs the sound waves "
+            "for cross-power spectra; set it to audio",
+        )
+    if len(robot.robot.microphones_m) < 4:
+        raise InputError(
+            f"{prefix}robot.microphones_m",
+            f"has {len(robot.robot.microphones_m)} microphones, but law "
+            "'sound_search' needs four, with the first in the middle; use "
+            "robot.preset song2011_hearing",
+        )
+    if robot.sound_search.await_call:
+        callers = [
+            name
+            for name, (_, other) in robots.items()
+            if other.searches == "odor"
+            and other.search.address == robot.sound_search.caller
+        ]
+        if not callers:
+            raise InputError(
+                f"{prefix}sound_search.caller",
+                f"{robot.sound_search.caller} is not the address of a robot that "
+                "smells, so that no robot calls; set sound_search.await_call to "
+                "false, or give a robot law plume_search and this search.address",
+            )

@@ -1,0 +1,159 @@
+"""Every field of a scenario, with unit, default, range and meaning."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from typing import Any
+
+from diagrams.scenario.fields.near_miss import did_you_mean
+from diagrams.scenario.fields.schema_walk import options, resolved
+from systems.framework.input_error import InputError
+
+_KINDS = {
+    "number": "number",
+    "integer": "whole number",
+    "boolean": "true or false",
+    "string": "text",
+    "object": "group",
+    "null": "null",
+}
+
+
+@dataclass(frozen=True)
+class Field:
+    """A field of a scenario."""
+
+    path: str
+    """Dotted, as ``--set`` takes it; 0 for any element of a list, NAME for any name."""
+    kind: str
+    """What its values are, in words."""
+    unit: str
+    """Of a number; empty: it has none."""
+    default: Any
+    """A plain value; None, too, where the field is a group that is always there."""
+    range: str
+    """Which values are legal; empty: all of the kind."""
+    meaning: str
+    """What it is."""
+
+
+def list_fields(schema: Mapping[str, Any]) -> Iterator[Field]:
+    """All fields, groups before what is in them.
+
+    Args:
+        schema: JSON Schema of a scenario.
+
+    Yields:
+        Each field.
+    """
+    yield from _fields(schema, schema, "", None)
+
+
+def find_fields(schema: Mapping[str, Any], pattern: str) -> list[Field]:
+    """Fields whose path or meaning a pattern matches, those by their path first.
+
+    Args:
+        schema: JSON Schema of a scenario.
+        pattern: A part of it, or with ``*``, ``?`` and ``[...]`` all of a path; of
+            upper or lower case. Empty: all.
+
+    Returns:
+        One or more.
+
+    Raises:
+        InputError: None does.
+    """
+    every, wanted = list(list_fields(schema)), pattern.casefold()
+    if any(each in wanted for each in "*?["):
+        by_path = [f for f in every if fnmatchcase(f.path.casefold(), wanted)]
+    else:
+        by_path = [f for f in every if wanted in f.path.casefold()]
+    by_meaning = [
+        f
+        for f in every
+        if f not in by_path and fnmatchcase(f.meaning.casefold(), f"*{wanted}*")
+    ]
+    if found := by_path + by_meaning:
+        return found
+    last = [f.path.rpartition(".")[2] for f in every]
+    hint = did_you_mean(pattern, [*last, *(f.path for f in every)], most=3)
+    raise InputError(
+        "pattern",
+        f"{pattern!r} is in no field's path or meaning{hint}; 'phonotaxis "
+        "fields' lists all fields",
+    )
+
+
+def _fields(
+    schema: Mapping[str, Any], node: Mapping[str, Any], above: str, defaults: Any
+) -> Iterator[Field]:
+    for name, field in node.get("properties", {}).items():
+        # A group may have other defaults than its model.
+        default = field.get("default")
+        if isinstance(defaults, Mapping) and name in defaults:
+            default = defaults[name]
+        yield from _field(schema, field, f"{above}{name}", default)
+
+
+def _field(
+    schema: Mapping[str, Any], node: Mapping[str, Any], path: str, default: Any
+) -> Iterator[Field]:
+    choices = options(schema, node)
+    null = any(each.get("type") == "null" for each in node.get("anyOf", ()))
+    groups = [each for each in choices if "properties" in each]
+    yield Field(
+        path=path,
+        kind=" or ".join([*map(_kind, choices), *(["null"] if null else [])]),
+        unit=node.get("unit", ""),
+        default=None if groups and not null else default,
+        range=" or ".join(filter(None, map(_range, choices))),
+        meaning=node.get("description") or _meaning(schema, node),
+    )
+    for each in groups:
+        yield from _fields(schema, each, f"{path}.", default)
+    for each in choices:
+        if "properties" in (element := resolved(schema, each.get("items", {}))):
+            yield from _fields(schema, element, f"{path}.0.", None)
+        for changes in each.get("patternProperties", {}).values():
+            named = resolved(schema, changes)
+            what = f"{', '.join(named['properties'])}: see these fields of a scenario"
+            yield Field(f"{path}.NAME", "group", "", None, "", what)
+
+
+def _meaning(schema: Mapping[str, Any], node: Mapping[str, Any]) -> str:
+    """That of what it is made of."""
+    found = ""
+    for each in options(schema, node):
+        element = resolved(schema, each.get("items", {}))
+        found = found or each.get("description", "") or element.get("description", "")
+    return found
+
+
+def _kind(node: Mapping[str, Any]) -> str:
+    if "enum" in node:
+        return " or ".join(node["enum"])
+    if "prefixItems" in node:
+        return f"[{', '.join(map(_kind, node['prefixItems']))}]"
+    if "items" in node:
+        element = node["items"]
+        return f"list of {'groups' if '$ref' in element else _kind(element)}"
+    return _KINDS[node["type"]]
+
+
+def _range(node: Mapping[str, Any]) -> str:
+    inner = node.get("items") or next(iter(node.get("prefixItems", ())), None)
+    if inner:
+        most = f"at most {node['maxItems']}" if "maxItems" in node else ""
+        many = most if "prefixItems" not in node else ""
+        return ", each ".join(filter(None, [many, _range(inner)]))
+    low, high = node.get("minimum"), node.get("maximum")
+    above, below = node.get("exclusiveMinimum"), node.get("exclusiveMaximum")
+    ends = [
+        f"from {low:g}" if low is not None else "",
+        f"above {above:g}" if above is not None else "",
+        f"to {high:g}" if high is not None else "",
+        f"below {below:g}" if below is not None else "",
+    ]
+    return " ".join(filter(None, ends))

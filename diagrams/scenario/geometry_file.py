@@ -1,0 +1,73 @@
+"""The geometry file of a robot's microphones, for ``phonotaxis locate``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.yaml_text import dump_yaml
+from systems.base.robot import microphones_B
+from systems.framework.input_error import shortened
+from systems.sound.parameters import MicArrayParameters
+
+#: Places are written to a nanometre: sums of floats have longer tails.
+_LEAST_POSITION_STD_M, _SOUND_SPEED_STD = 0.0005, 0.5  # m, m/s
+_DECIMALS = 9
+
+
+def geometry_text(scenario: Scenario, robot: str, file: str) -> str:
+    """The YAML that goes with a recording of a robot's microphones.
+
+    Args:
+        scenario: The run.
+        robot: Its name.
+        file: Name of the recording.
+
+    Returns:
+        Stated places of the microphones in B, m, the speed of sound, and comments on
+        what they belong to and how far the array may be off.
+    """
+    own = scenario.all_robots[robot]
+    places = np.round(microphones_B(own.robot), _DECIMALS).tolist()
+    name = shortened(scenario.name, 60)
+    comments = [
+        f"Microphones of {robot} in scenario {name}, seed {scenario.seed}.",
+        f"Their sound is in {file}, one channel per microphone, in this order;",
+        f"its full scale is {own.microphones.full_scale} counts of the converter.",
+        "Positions in the robot's frame B, m: origin midway between the wheels,",
+        "x ahead, y to the left.",
+        *_faults(own.microphones),
+    ]
+    if scenario.room is not None and scenario.room.rise_m:
+        rise = scenario.room.rise_m
+        comments.append(f"The microphones are {rise:g} m above the loudspeakers.")
+    # Uniform within its tolerance, and no better than the rounding of a drawing.
+    drawn = own.microphones.position_tolerance_m / 3.0**0.5
+    document = dump_yaml(
+        {
+            "microphones": places,
+            "position_std_m": max(drawn, _LEAST_POSITION_STD_M),
+            "sound_speed": scenario.acoustics.c,
+            "sound_speed_std": _SOUND_SPEED_STD,
+        }
+    )
+    return "".join(f"# {line}\n" for line in comments) + document
+
+
+def _faults(array: MicArrayParameters) -> list[str]:
+    """What the file cannot say of the array, a line each."""
+    lines = []
+    if any(array.channel_skew_s):
+        times = ", ".join(f"{1e6 * skew:g}" for skew in array.channel_skew_s)
+        lines.append(f"The channels are sampled {times} us late (channel_skew_s).")
+    for name, value, unit in (
+        ("position_tolerance_m", array.position_tolerance_m, "m in x and in y"),
+        ("delay_tolerance_s", array.delay_tolerance_s, "s of delay"),
+        ("gain_tolerance_db", array.gain_tolerance_db, "dB of gain"),
+    ):
+        if value:
+            lines.append(f"Each may be off by {value:g} {unit} ({name}), see the seed.")
+    return lines + [
+        f"Microphone {each.microphone} is {each.kind} from {each.start_s:g} s on."
+        for each in array.faults
+    ]

@@ -1,0 +1,247 @@
+"""Scenarios from the library, from YAML files and from the command line."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pydantic_core import ValidationError
+
+from diagrams.scenario.fields.explain import explain
+from diagrams.scenario.fields.joining import begins_anew
+from diagrams.scenario.fields.near_miss import did_you_mean
+from diagrams.scenario.fields.shipped import SCHEMA_FILE, scenario_schema
+from diagrams.scenario.yaml_text import LARGEST_BYTES, dump_yaml, parse_yaml
+from systems.framework.input_error import InputError
+
+if TYPE_CHECKING:
+    from diagrams.scenario.scenario import Scenario
+
+_LIBRARY = Path(__file__).parents[1] / "scenarios"
+
+
+def library_scenarios() -> dict[str, Path]:
+    """Names and files of the scenarios that come with the package."""
+    return {path.stem: path for path in sorted(_LIBRARY.glob("*.yaml"))}
+
+
+def load_scenario(
+    source: str | Path = "default",
+    overrides: Iterable[str] | Mapping[str, Any] = (),
+) -> Scenario:
+    """Loads a scenario.
+
+    Args:
+        source: A name of the library (``phonotaxis scenarios``) or a path.
+        overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``
+            or ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML. Or a mapping of
+            dotted keys to values, as ``{"source.speed_m_s": 0.2}``.
+
+    Returns:
+        ``Scenario``.
+
+    Raises:
+        InputError: Unknown name, unreadable file, or fields that are
+            unknown, of the wrong type or out of range; names each by its whole
+            path.
+    """
+    path = _find(source)
+    data = read_mapping(path)
+    data.setdefault("name", path.stem)
+    resolve_sound(data, path.parent)
+    set_fields(data, _settings(overrides))
+    resolve_sound(data, Path.cwd())
+    return scenario_from_mapping(data)
+
+
+def _settings(
+    overrides: Iterable[str] | Mapping[str, Any],
+) -> Iterable[tuple[str, Any]]:
+    if isinstance(overrides, Mapping):
+        return [(key, _plain(key, value)) for key, value in overrides.items()]
+    if isinstance(overrides, str):
+        raise InputError(
+            "overrides", f"is the text {overrides!r}; give a list of key=value"
+        )
+    return map(parse_setting, overrides)
+
+
+def _plain(key: str, value: Any) -> Any:
+    """The value as a file would hold it, which nobody else changes."""
+    try:
+        return json.loads(json.dumps(value))
+    except (TypeError, ValueError):
+        raise InputError(
+            key,
+            f"{value!r} is not a plain value; give a number, a text, a truth "
+            "value, or a list or mapping of them",
+        ) from None
+
+
+def scenario_from_mapping(data: Mapping[str, Any]) -> Scenario:
+    """Validates a mapping of plain values; see ``load_scenario``."""
+    from diagrams.scenario.scenario import Scenario
+
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise explain(error, scenario_schema(), "a scenario") from None
+
+
+def dump_scenario(scenario: Scenario) -> str:
+    """The whole scenario as YAML, loadable by ``load_scenario``."""
+    return dump_yaml(scenario.model_dump(mode="json"))
+
+
+def write_scenario(scenario: Scenario, directory: Path) -> None:
+    """Writes a whole scenario and its schema, so that editors know its fields.
+
+    The schema is a copy: a result can be moved, and looks the same on every machine.
+
+    Args:
+        scenario: Goes to ``scenario.yaml``.
+        directory: Exists; gets ``scenario.schema.json``, too.
+    """
+    first = f"# yaml-language-server: $schema={SCHEMA_FILE.name}\n"
+    (directory / "scenario.yaml").write_text(first + dump_scenario(scenario), "utf-8")
+    shutil.copyfile(SCHEMA_FILE, directory / SCHEMA_FILE.name)
+
+
+def _find(source: str | Path) -> Path:
+    library = library_scenarios()
+    if str(source) in library:
+        return library[str(source)]
+    path = Path(source)
+    known = "a name that 'phonotaxis scenarios' lists"
+    if path.suffix in (".yaml", ".yml"):
+        if path.is_file():
+            return path
+        raise InputError(
+            "scenario", f"there is no file {source}; check the path, or use {known}"
+        )
+    raise InputError(
+        "scenario",
+        f"{str(source)!r} is not known; use {known}, or the path of a .yaml file"
+        f"{did_you_mean(str(source), library)}",
+    )
+
+
+def read_mapping(path: Path) -> dict[str, Any]:
+    """The mapping of fields that a YAML file holds; empty where it is empty.
+
+    Raises:
+        InputError: It cannot be read, or holds something else.
+    """
+    try:
+        with path.open("rb") as file:
+            content = file.read(LARGEST_BYTES + 1)
+    except OSError as error:
+        raise InputError(str(path), f"cannot be read ({error.strerror})") from None
+    data = parse_yaml(content, str(path))
+    if data is None:
+        return {}
+    if not isinstance(data, dict):
+        raise InputError(
+            str(path), "must hold a mapping of fields, for example 'duration_s: 40'"
+        )
+    return data
+
+
+def resolve_sound(data: dict[str, Any], folder: Path) -> None:
+    """A relative sound file lies beside the scenario, or where one works.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        folder: That of the file that the fields are from, or the working directory.
+    """
+    for place in [
+        data,
+        *_participants(data, "robots").values(),
+        *_participants(data, "sources").values(),
+    ]:
+        for group, key in (
+            ("microphones", "ego_noise_file"),
+            ("sound", "file"),
+            ("loudspeaker", "file"),
+        ):
+            fields = place.get(group)
+            if isinstance(fields, dict) and isinstance(fields.get(key), str):
+                fields[key] = str((folder / fields[key]).resolve())
+
+
+def _participants(data: dict[str, Any], group: str) -> dict[str, dict[str, Any]]:
+    named = data.get(group)
+    found = named.items() if isinstance(named, dict) else ()
+    return {name: fields for name, fields in found if isinstance(fields, dict)}
+
+
+def parse_setting(text: str) -> tuple[str, Any]:
+    """Key and value of ``key=value``; the value is YAML.
+
+    Raises:
+        InputError: It is not of that form.
+    """
+    key, equals, value_text = text.partition("=")
+    if not equals or not all(key.split(".")):
+        raise InputError(
+            text or "--set", "is not of the form key=value, for example seed=2"
+        )
+    return key, parse_yaml(value_text, key)
+
+
+def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
+    """Sets fields of a mapping, presets first: what is set beside one wins.
+
+    A group that has a preset begins anew with another one. Groups on the way to a
+    field are made.
+
+    Args:
+        data: Fields of a scenario, changed in place.
+        fields: Dotted paths, with indices of lists (``obstacles.0.size_m``), and
+            plain values; of two of one path the later one wins.
+
+    Raises:
+        InputError: A path leads into a plain value, or past a list's end.
+    """
+    for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
+        _set_field(data, key, value)
+
+
+def _is_preset(key: str, value: Any) -> bool:
+    return begins_anew({key.rpartition(".")[2]: value})
+
+
+def _set_field(data: dict[str, Any], key: str, value: Any) -> None:
+    *parents, last = key.split(".")
+    node: Any = data
+    for depth, part in enumerate(parents):
+        node = _descend(node, part, ".".join(parents[: depth + 1]))
+    if isinstance(node, list):
+        node[_index(node, last, key)] = value
+    elif isinstance(node, dict):
+        if begins_anew(node) and _is_preset(key, value):
+            node.clear()
+        node[last] = value
+    else:
+        raise InputError(key, "leads into a plain value; shorten the key")
+
+
+def _descend(node: Any, part: str, key: str) -> Any:
+    if isinstance(node, list):
+        return node[_index(node, part, key)]
+    if isinstance(node, dict):
+        if node.get(part) is None:  # also where a whole group is unset, as room
+            node[part] = {}
+        return node[part]
+    raise InputError(key, "leads into a plain value; shorten the key")
+
+
+def _index(node: list[Any], part: str, key: str) -> int:
+    if part.isdigit() and int(part) < len(node):
+        return int(part)
+    raise InputError(
+        key, f"{part!r} is not an index of a list of {len(node)}; count from 0"
+    )

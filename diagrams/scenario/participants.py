@@ -1,0 +1,159 @@
+"""What a scenario says of each robot and of each source."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Field, Strict, field_validator, model_validator
+
+from diagrams.scenario.fields.near_miss import unknown_law
+from systems.base.carrier_parameters import SourceRobotParameters
+from systems.base.parameters import OdometryParameters, PlantParameters
+from systems.base.robot import RobotParameters
+from systems.framework.parameters import Angle, Parameters, Point
+from systems.heading.parameters import (
+    CompassParameters,
+    HeadingControlParameters,
+    MotorDriverParameters,
+)
+from systems.hearing.parameters import (
+    CrossPowerParameters,
+    IdealHearingParameters,
+    TDOAParameters,
+    TrackerParameters,
+)
+from systems.laws.catalogue import LAWS
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.odor.parameters import AirflowParameters, GasSensorParameters
+from systems.planning.parameters import FollowingParameters
+from systems.ranging.parameters import (
+    CollisionVectorParameters,
+    ContactParameters,
+    ObjectDetectorParameters,
+    ObjectSensorParameters,
+    UltrasonicParameters,
+)
+from systems.routes.parameters import RouteParameters
+from systems.safety.parameters import FreeSpaceParameters, GuardParameters
+from systems.search.parameters import PlumeSearchParameters, SoundSearchParameters
+from systems.sound.parameters import MicArrayParameters, SoundParameters, channel_skew
+
+
+class StartParameters(Parameters):
+    """Where the robot starts, at rest."""
+
+    position_m: Point = (0.0, 0.0)
+    """Origin of B in W, m."""
+    heading_deg: Angle = 0.0
+    """Heading, deg CCW from the x axis of W."""
+
+    @property
+    def pose(self) -> tuple[float, float, float]:
+        """(x, y, theta), m and rad."""
+        return (*self.position_m, math.radians(self.heading_deg))
+
+
+class FollowerParameters(Parameters):
+    """One robot that follows a sound: its law, hearing, sensors and body."""
+
+    law: str = Field(default="active", min_length=1)
+    """A name that ``phonotaxis laws`` lists, ``package.module:Name``, or
+    ``path/to/file.py:Name``."""
+    hearing: Literal["audio", "ideal"] = "audio"
+    """Sound waves and microphones, or exact positions."""
+    obstacle_sensing: Literal["ultrasonic", "ideal"] = "ultrasonic"
+    """Cones, or exact nearest points."""
+    blocks: Annotated[tuple[str, ...], Strict(False), Field(max_length=32)] = ()
+    """A user's own blocks, ``package.module:Name`` or ``path/to/file.py:Name``, that
+    the robot has in addition to its blocks, or instead of the block with the same
+    part."""
+    follows: str = ""
+    """Name of the source, or of a robot with a loudspeaker; empty: the first source."""
+    loudspeaker: SoundParameters | None = None
+    """What the robot itself plays, at the origin of B, for others to follow."""
+    start: StartParameters = StartParameters()
+    microphones: MicArrayParameters = MicArrayParameters()
+    tdoa: TDOAParameters = TDOAParameters()
+    ideal_hearing: IdealHearingParameters = IdealHearingParameters()
+    tracker: TrackerParameters = TrackerParameters()
+    ultrasonic: UltrasonicParameters = UltrasonicParameters()
+    collision_vector: CollisionVectorParameters = CollisionVectorParameters()
+    attraction: AttractionParameters = AttractionParameters()
+    repulsion: RepulsionParameters = RepulsionParameters()
+    following: FollowingParameters = FollowingParameters()
+    robot: RobotParameters = RobotParameters()
+    plant: PlantParameters = PlantParameters()
+    odometry: OdometryParameters = OdometryParameters()
+    route: RouteParameters | None = None
+    """A goal to drive to on a planned route, instead of a sound to follow."""
+    objects: ObjectSensorParameters = ObjectSensorParameters()
+    detector: ObjectDetectorParameters = ObjectDetectorParameters()
+    guard: GuardParameters | None = None
+    """Keeps the robot in space that its sensors have seen as free, with any law; null:
+    no guard, unless the law is ``guarded``."""
+    free_space: FreeSpaceParameters = FreeSpaceParameters()
+    search: PlumeSearchParameters = PlumeSearchParameters()
+    gas_sensors: GasSensorParameters = GasSensorParameters()
+    airflow_sensors: AirflowParameters = AirflowParameters()
+    contact_switches: ContactParameters = ContactParameters()
+    sound_search: SoundSearchParameters = SoundSearchParameters()
+    cross_power: CrossPowerParameters = CrossPowerParameters()
+    compass: CompassParameters = CompassParameters()
+    heading_control: HeadingControlParameters = HeadingControlParameters()
+    motor_driver: MotorDriverParameters = MotorDriverParameters()
+
+    @field_validator("law")
+    @classmethod
+    def _check_law(cls, law: str) -> str:
+        if ":" not in law and law not in LAWS:
+            raise unknown_law(law, LAWS)
+        return law
+
+    @model_validator(mode="after")
+    def _check_channels(self) -> FollowerParameters:
+        channel_skew(self.microphones, len(self.robot.microphones_m))
+        return self
+
+    @property
+    def own_guard(self) -> GuardParameters | None:
+        """``guard``, which a guarded law always has; none: nothing guards it."""
+        if self.guard is None and self.law in LAWS and LAWS[self.law].guarded:
+            return GuardParameters(obstacle_speed_m_s=0.6)
+        return self.guard
+
+    @property
+    def listens(self) -> bool:
+        """Whether it hears sound waves."""
+        return self.hearing == "audio" and not self.has_goal
+
+    @property
+    def searches(self) -> Literal["odor", "sound"] | None:
+        """What it searches for step by step; none: it follows, or has a route."""
+        return LAWS[self.law].searches if self.law in LAWS else None
+
+    @property
+    def has_goal(self) -> bool:
+        """Whether it goes to what makes no sound: a goal, or a source of odour."""
+        return self.route is not None or self.searches == "odor"
+
+    @property
+    def follow_distance_m(self) -> float:
+        """Of P from what it follows, m; a goal is driven to."""
+        return self.attraction.follow_distance_m if self.route is None else 0.0
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Length and width of the robot, m."""
+        return self.robot.length_m, self.robot.width_m
+
+
+class SourceParameters(SourceRobotParameters):
+    """One source: the robot that carries it, and what it plays."""
+
+    sound: SoundParameters = SoundParameters()
+    """What it plays."""
+    body: bool = True
+    """Whether it has a body that robots can hit and see; off: a loudspeaker in the
+    air."""

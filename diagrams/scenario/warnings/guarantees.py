@@ -1,0 +1,347 @@
+"""Which theorem of the guard holds in a scenario, and with which margins.
+
+The stability report and the warnings of a run read the same list of assumptions.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagrams.scenario.bodies import Body
+from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.warnings.corner_speeds import corner_speeds
+from systems.base.robot import body_radius
+from systems.base.tyre_grip import GRAVITY_M_S2
+from systems.framework.input_error import InputError, shortened
+from systems.ranging.parameters import UltrasonicParameters
+from systems.ranging.sensor_faults import BLIND
+from systems.safety.views import (
+    PlaceError,
+    place_error,
+    sensor_sectors,
+    stopping_way,
+    unseen_approach,
+)
+from systems.world.plane import beyond_rectangle
+
+#: What the rims still move after the commanded speed is 0, in lags.
+_LAGS = 6.0
+#: Directions in which the view is looked at, deg apart.
+_STEP_DEG = 0.25
+#: A view that lacks less is one all round, deg.
+_GAP_DEG = 1.0
+#: What sums of floats may be off, in the units of the values.
+_ROUNDING = 1e-9
+
+
+@dataclass(frozen=True)
+class Assumption:
+    """What a theorem takes for granted, in numbers."""
+
+    name: str
+    """As in docs/guard.md."""
+    text: str
+    """What is assumed of the value, in words."""
+    value: float
+    limit: float
+    """The greatest value with which it holds; for ``at_least`` the least."""
+    unit: str
+    at_least: bool = False
+    field: str = "guard"
+    """Of the robot, to be changed where this does not hold."""
+
+    @property
+    def margin(self) -> float:
+        """How far the value is on the right side of the limit; negative: it is not."""
+        least, most = self.limit, self.value
+        if not self.at_least:
+            least, most = most, least
+        return most - least
+
+    @property
+    def holds(self) -> bool:
+        """Whether the scenario keeps it, but for rounding."""
+        return self.margin >= -_ROUNDING
+
+    @property
+    def complaint(self) -> str:
+        """That it does not hold, in words, with the value and the limit."""
+        value, limit = _told_apart(self.value, self.limit)
+        unit = "" if self.unit == "of 1" else f" {self.unit}".rstrip()
+        return (
+            f"the guard's assumption {self.name} does not hold: {self.text} is "
+            f"{value}{unit}, {'below' if self.at_least else 'above'} {limit}{unit} "
+            "(docs/guard.md)"
+        )
+
+
+@dataclass(frozen=True)
+class Guarantees:
+    """What a guard promises in a scenario."""
+
+    obstacle_speed_m_s: float
+    """Up to which bodies may move, m/s; 0: all has to rest."""
+    seen_angle_deg: float
+    """Of the round, in view of the sensors, deg."""
+    seen_way_m: float
+    """How far ahead of the axle floor can be seen free, m."""
+    needed_way_m: float
+    """How far ahead of the axle it has to be so at top speed, m."""
+    assumptions: tuple[Assumption, ...]
+
+    @property
+    def promise(self) -> str:
+        """The theorem that holds, in words; what is broken, where none does."""
+        broken = [each.name for each in self.assumptions if not each.holds]
+        if broken:
+            return (
+                "nothing, because these assumptions do not hold: "
+                f"{', '.join(dict.fromkeys(broken))}"
+            )
+        if self.obstacle_speed_m_s == 0.0:
+            return "static safety: the robot touches no obstacle at rest"
+        kind = "passive orientation safety"
+        if self.seen_angle_deg > 360.0 - _GAP_DEG:
+            kind += " with a view in all directions"
+        return (
+            f"static safety, and {kind} against bodies of up to "
+            f"{self.obstacle_speed_m_s:g} m/s"
+        )
+
+
+def clear_way(scenario: Scenario, speed: float, body_speed: float) -> float:
+    """How far ahead of the axle floor has to be clear so that a command passes.
+
+    Args:
+        scenario: Of one robot; its guard gives braking and margin.
+        speed: Of the robot, m/s.
+        body_speed: Up to which it is guarded against bodies, m/s.
+
+    Returns:
+        m: the disc and its margin, the way of a tick and of braking with the lag, the
+        error of ranges, and what bodies come nearer by meanwhile.
+
+    Raises:
+        InputError: The robot has no guard.
+    """
+    guard = scenario.own_guard
+    if guard is None:
+        raise InputError(
+            "guard", "is unset, so that there is no guard to promise anything; set it"
+        )
+    known, tick_s = scenario.free_space, scenario.tick_s
+    keep = body_radius(scenario.robot) + known.place_error_m + guard.margin_m
+    error, lag = known.range_error(scenario.ultrasonic), scenario.plant.motor_lag_s
+    # A sensor's reading is so old at most, and its rows of cells come by turns.
+    age = scenario.ultrasonic.round_ticks(tick_s) * tick_s
+    way = speed**2 / (2.0 * guard.braking_m_s2) + speed * (lag + 2.0 * tick_s)
+    if body_speed == 0.0:
+        # A cell counts as a whole, and rows of cells are entered by turns.
+        cells = math.sqrt(2.0) * known.cell_m + 4.0 * age * speed
+        return keep + way + error + cells
+    time = speed / guard.braking_m_s2 + 2.0 * tick_s + _LAGS * lag
+    return keep + way + error + body_speed * (age + time)
+
+
+def seen_angle_deg(sensors: UltrasonicParameters, control_point_m: float) -> float:
+    """How much of the round range sensors see.
+
+    Args:
+        sensors: Any.
+        control_point_m: Distance of P ahead of the axle, m.
+
+    Returns:
+        deg, of 360.
+    """
+    sectors = sensor_sectors(sensors, control_point_m)
+    turns = np.arange(-180.0, 180.0, _STEP_DEG) + 0.5 * _STEP_DEG
+    seen = np.zeros(len(turns), dtype=bool)
+    for k, by in enumerate(sectors.seen_by):
+        if by.any():
+            right, left = np.degrees([sectors.right[k, 0], sectors.left[k, 0]])
+            seen |= (turns - right) % 360.0 <= left - right
+    return _STEP_DEG * float(seen.sum())
+
+
+def guarantees(scenario: Scenario) -> Guarantees:
+    """What the guard of a scenario's robot promises.
+
+    Args:
+        scenario: Of one robot.
+
+    Returns:
+        The promise, and each assumption with its margin.
+
+    Raises:
+        InputError: The robot has no guard.
+    """
+    (name,), guard = scenario.all_robots, scenario.own_guard
+    found = assumptions(scenario, name)
+    assert guard is not None
+    (view,) = (each for each in found if each.name == "view")
+    return Guarantees(
+        guard.obstacle_speed_m_s,
+        seen_angle_deg(scenario.ultrasonic, scenario.robot.control_point_m),
+        view.limit,
+        view.value,
+        found,
+    )
+
+
+def assumptions(scenario: Scenario, robot: str) -> tuple[Assumption, ...]:
+    """What the theorems of a robot's guard take for granted.
+
+    Args:
+        scenario: Any.
+        robot: Name of a robot in it.
+
+    Returns:
+        Each assumption, whether it holds or not.
+
+    Raises:
+        InputError: The robot has no guard.
+    """
+    alone = scenario.of_robot(robot)
+    guard, sensors = alone.own_guard, alone.ultrasonic
+    speed = 0.0 if guard is None else guard.obstacle_speed_m_s
+    needed = clear_way(alone, alone.robot.top_speed_m_s, speed)
+    axes, places, half_angle = sensors.beams
+    forward = np.abs(np.remainder(axes + np.pi, 2.0 * np.pi) - np.pi) <= half_angle
+    far = np.max(np.reshape(places, (-1, 2))[forward, 0], initial=-np.inf)
+    seen = alone.robot.control_point_m + float(far) + sensors.maximum_range_m
+    return (
+        _of_speeds(corner_speeds(scenario, robot), speed),
+        *_of_ranges(alone),
+        _of_the_start(alone, tuple(scenario.surroundings(robot).bodies.values())),
+        *_of_motion(alone),
+        Assumption(
+            "view",
+            "clear floor that top speed needs",
+            needed,
+            seen,
+            "m",
+            field="ultrasonic.maximum_range_m",
+        ),
+    )
+
+
+def _of_speeds(speeds: Mapping[str, float], speed: float) -> Assumption:
+    """A1: bodies rest, or are no faster than is reckoned with."""
+    text, fastest = "speed of the fastest body", 0.0
+    if speeds:
+        name = max(speeds, key=speeds.__getitem__)
+        text = f"greatest speed of a corner of {shortened(name, 60)!r}"
+        fastest = speeds[name]
+    field = "guard.obstacle_speed_m_s"
+    return Assumption("A1", text, fastest, speed, "m/s", field=field)
+
+
+def _of_the_start(scenario: Scenario, bodies: tuple[Body, ...]) -> Assumption:
+    """A3: nothing stands in the bubble."""
+    place = scenario.start.position_m
+    nearest = min(
+        (math.hypot(*beyond_rectangle(place, body.rectangle(0.0))) for body in bodies),
+        default=math.inf,
+    )
+    field = "free_space.start_bubble_m"
+    bubble = scenario.free_space.start_bubble_m
+    text = "nearest body at the start"
+    return Assumption("A3", text, nearest, bubble, "m", at_least=True, field=field)
+
+
+def _of_ranges(scenario: Scenario) -> tuple[Assumption, ...]:
+    """A2: nothing is nearer than a reading, less the margin and the noise."""
+    sensors, c = scenario.ultrasonic, scenario.acoustics.c
+    stretch = (sensors.assumed_sound_speed_m_s or c) / c
+    excess = max(stretch - 1.0, 0.0) * sensors.maximum_range_m
+    margin = scenario.free_space.range_margin_m
+    blind = sum(fault.number == BLIND for fault in sensors.faults)
+    return (
+        Assumption(
+            "A2",
+            "share of missed echoes",
+            sensors.dropout_probability,
+            0.0,
+            "of 1",
+            field="ultrasonic.dropout_probability",
+        ),
+        Assumption(
+            "A2", "number of blind sensors", blind, 0.0, "", field="ultrasonic.faults"
+        ),
+        Assumption(
+            "A2",
+            "excess of the farthest range due to the assumed speed of sound",
+            excess,
+            margin,
+            "m",
+            field="ultrasonic.assumed_sound_speed_m_s",
+        ),
+    )
+
+
+def _of_motion(scenario: Scenario) -> tuple[Assumption, ...]:
+    """A4 and A5: places and wheels as believed, and tyres that hold."""
+    guard, plant = scenario.own_guard, scenario.plant
+    assert guard is not None
+    robot, known, tick_s = scenario.robot, scenario.free_space, scenario.tick_s
+    stopping = stopping_way(guard, robot, plant, tick_s)
+    error = PlaceError.of(known, robot, scenario.odometry)
+    lost = place_error(body_radius(robot) + stopping, stopping, error)
+    slip = max(map(abs, plant.slip))
+    grip = math.inf if plant.friction is None else plant.friction
+    hardest = scenario.robot.top_speed_m_s / max(plant.motor_lag_s, scenario.tick_s)
+    return (
+        Assumption(
+            "A4",
+            "unknown share of a wheel's travel",
+            slip,
+            known.wheel_error,
+            "of 1",
+            field="free_space.wheel_error",
+        ),
+        Assumption(
+            "A4",
+            "error of a position due to encoder pulses and wheels, until the "
+            "robot stops",
+            lost,
+            known.place_error_m,
+            "m",
+            field="free_space.place_error_m",
+        ),
+        Assumption(
+            "A5",
+            "approach to a cell between two looks and while coasting",
+            unseen_approach(robot, plant, tick_s),
+            guard.least_margin_m,
+            "m",
+            field="guard.least_margin_m",
+        ),
+        Assumption(
+            "A5",
+            "friction, for the certified braking",
+            grip,
+            guard.braking_m_s2 / GRAVITY_M_S2,
+            "",
+            at_least=True,
+            field="plant.friction",
+        ),
+        Assumption(
+            "A5",
+            "friction, for a stop as hard as the lag allows",
+            grip,
+            hardest / GRAVITY_M_S2,
+            "",
+            at_least=True,
+            field="plant.friction",
+        ),
+    )
+
+
+def _told_apart(value: float, limit: float) -> tuple[str, str]:
+    """Two numbers with as many digits as they need to be seen to differ."""
+    pairs = [(f"{value:.{k}g}", f"{limit:.{k}g}") for k in (3, 6, 12)]
+    return next((pair for pair in pairs if pair[0] != pair[1]), pairs[-1])

@@ -1,0 +1,212 @@
+"""Whether a robot on a route comes to rest, and keeps away from obstacles."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
+from systems.laws.catalogue import LAWS
+from systems.laws.trajectory.parameters import (
+    AdaptationParameters,
+    TrajectoryImpedanceParameters,
+)
+from systems.laws.trajectory.sampled_bounds import (
+    SampledMass,
+    damping_bound,
+    pull_through_m,
+    rate_bound,
+    stiffness_bound,
+)
+from systems.ranging.parameters import OBJECT_SLOTS
+from systems.world.plane import beyond_rectangle, rotate
+
+#: Steps towards the place of rest, and the least one, m.
+_STEPS, _STEP_M = 2_000, 1e-6
+
+
+def route_warnings(
+    prefix: str, robot: FollowerParameters, tick_s: float
+) -> list[ScenarioWarning]:
+    """Gains with which a robot does not come to rest, or comes too near to obstacles.
+
+    Args:
+        prefix: What the robot's fields begin with in a message.
+        robot: A robot on a route.
+        tick_s: Period of control, s.
+
+    Returns:
+        One for each of them; it names the bound.
+    """
+    law = LAWS.get(robot.law)
+    if law is None or not law.on_route:
+        return []
+    own = getattr(robot.repulsion, robot.law)
+    of = SampledMass(robot.robot.mass_kg, robot.plant.motor_lag_s, tick_s)
+    field = f"{prefix}repulsion.{robot.law}"
+    found = _of_damping(field, own, of) or _of_stiffness(field, own, of)
+    body, block = robot.robot, own.block_distance_m
+    reach = math.hypot(body.control_point_m + 0.5 * body.length_m, 0.5 * body.width_m)
+    if block is not None and block < reach:
+        message = (
+            f"is {block:g}, but the body reaches {reach:.3g} m from P: it can "
+            "touch an obstacle that P stays away from; raise it"
+        )
+        found.append(ScenarioWarning(f"{field}.block_distance_m", message))
+    adaptation = getattr(own, "adaptation", None)
+    if adaptation is not None and adaptation.rule != "none":
+        amplitude = pull_through_m(own)
+        found += _of_adaptation(f"{field}.adaptation", adaptation, amplitude, of)
+        if own.safety_filter is None and block is None:
+            found += _of_safety(f"{field}.adaptation", adaptation)
+    return found
+
+
+def _of_safety(field: str, own: AdaptationParameters) -> list[ScenarioWarning]:
+    """Whether what adapts does so without the safety term of eq. 27."""
+    if own.rule == "lyapunov" and own.penalty > 0.0:
+        message = (
+            f"is {own.penalty:g}, but rule lyapunov has no safety term and ignores it; "
+            "set rule: sensitivity"
+        )
+        return [ScenarioWarning(f"{field}.penalty", message)]
+    if own.penalty > 0.0 or own.freezes or own.rate == own.contact_rate == 0.0:
+        return []
+    message = (
+        "is 0, so that the adaptation has no safety term, and such a robot "
+        "collides more often than with trajectory_conventional; set rule: "
+        "sensitivity, penalty: 3, penalty_distance_m: 1, contact_rate: 10 and "
+        "projected: true, and damping_fades: true of the law, or use "
+        "trajectory_filtered"
+    )
+    return [ScenarioWarning(f"{field}.penalty", message)]
+
+
+def _of_damping(
+    field: str, own: TrajectoryImpedanceParameters, of: SampledMass
+) -> list[ScenarioWarning]:
+    bound, damping = damping_bound(of), own.damping_n_s_m
+    if damping >= bound:
+        message = (
+            f"is {damping:g}, but from 2 M/T, {bound:g}, on the robot does not come to "
+            "rest; lower it"
+        )
+        return [ScenarioWarning(f"{field}.damping_n_s_m", message)]
+    each = own.contact_damping_n_s_m
+    if each == 0.0 or own.reading == "printed_force":
+        return []
+    contacts = math.ceil((bound - damping) / each) - 1
+    if contacts >= OBJECT_SLOTS:
+        return []
+    message = (
+        f"is {each:g}: with more than {contacts} contacts at once all dampers "
+        f"reach 2 M/T, {bound:g} N s/m, and from this value on the robot does "
+        "not come to rest; lower it"
+    )
+    return [ScenarioWarning(f"{field}.contact_damping_n_s_m", message)]
+
+
+def _of_stiffness(
+    field: str, own: TrajectoryImpedanceParameters, of: SampledMass
+) -> list[ScenarioWarning]:
+    bound = stiffness_bound(own.damping_n_s_m, of)
+    total = own.stiffness_n_m + own.contact_stiffness_n_m
+    if total < bound:
+        return []
+    name, what, value = "stiffness_n_m", "is", own.stiffness_n_m
+    if value < bound:
+        name, value = "contact_stiffness_n_m", total
+        what = "and stiffness_n_m together are"
+    message = (
+        f"{what} {value:g} N/m, but from {bound:.3g} on a robot with damping_n_s_m "
+        f"{own.damping_n_s_m:g} does not come to rest; lower it"
+    )
+    return [ScenarioWarning(f"{field}.{name}", message)]
+
+
+def _of_adaptation(
+    field: str, own: AdaptationParameters, amplitude_m: float, of: SampledMass
+) -> list[ScenarioWarning]:
+    if own.projected:
+        least, most = own.damping_box_n_s_m[0], own.stiffness_box_n_m[1]
+        bound = stiffness_bound(least, of)
+        message = (
+            f"ends at {most:g} N/m, but from {bound:.3g} on a robot with the "
+            f"lower end of damping_box_n_s_m, {least:g}, does not come to rest; "
+            "lower its upper end"
+        )
+        warning = ScenarioWarning(f"{field}.stiffness_box_n_m", message)
+        return [warning] if most >= bound else []
+    bound = rate_bound(own.rule, amplitude_m, of)
+    message = (
+        f"is {own.rate:g}, but from about {bound:.3g} on K and D run away where the "
+        f"target is {amplitude_m:.3g} m ahead; lower it, or set projected"
+    )
+    warning = ScenarioWarning(f"{field}.rate", message)
+    return [warning] if own.rate >= bound and own.normalisation is None else []
+
+
+def goal_warnings(
+    prefix: str,
+    robot: FollowerParameters,
+    resting: Mapping[str, NDArray[np.float64]],
+    margin_m: float,
+) -> list[ScenarioWarning]:
+    """A goal that is so near to obstacles at rest that the robot does not arrive.
+
+    P rests where the pull to the goal and the pushes balance,
+    K (p_d - p) + sum of K_e (S - d_j) n_j = 0. Beside one wall at b from the goal that
+    is (S - b) K_e/(K + K_e) off it. The place is found by following the force from the
+    goal; gains that adapt count as they begin.
+
+    Args:
+        prefix: What the robot's fields begin with in a message.
+        robot: A robot on a route.
+        resting: (5,) rectangle in W of each obstacle that rests, by name.
+        margin_m: ``stop.goal_margin_m``, m.
+
+    Returns:
+        One where P comes to rest farther than that from its goal; else none.
+    """
+    law = LAWS.get(robot.law)
+    if robot.route is None or law is None or not law.on_route:
+        return []
+    own = getattr(robot.repulsion, robot.law)
+    if own.reading != "restored":
+        return []
+    # Compiled code: when it is used.
+    from systems.laws.trajectory.trajectory_impedance import contact_numbers
+
+    contact, goal = contact_numbers(own), robot.route.goal_m
+    p = np.array(goal)
+    pull, push = own.stiffness_n_m, own.contact_stiffness_n_m
+    pushing: list[str] = []
+    for _ in range(_STEPS):
+        force, pushing = pull * (goal - p), []
+        for name, each in resting.items():
+            away = np.array(rotate(each[2], *beyond_rectangle(p, each)))
+            distance = math.hypot(*away)
+            if 0.0 < distance < contact.begins_m:
+                force += push * (contact.rest_m - distance) / distance * away
+                pushing.append(name)
+        step = force / (pull + push * len(pushing))
+        p += step
+        if math.hypot(*step) < _STEP_M:
+            break
+    off = math.dist(p, goal)
+    if off <= margin_m:
+        return []
+    room = contact.rest_m - margin_m * (pull + push) / push
+    names = ", ".join(map(repr, pushing))
+    message = (
+        f"{names} will hold P {off:.2g} m off the goal, farther than "
+        f"stop.goal_margin_m, {margin_m:g} m, so that the robot does not arrive; "
+        f"move the goal (next to one wall {room:.2g} m away from it is enough), "
+        "raise that margin, or lower "
+        f"{prefix}repulsion.{robot.law}.security_zone_m"
+    )
+    return [ScenarioWarning(f"{prefix}route.goal_m", message)]

@@ -1,0 +1,73 @@
+"""All warnings about a scenario; this is the only place where they are made."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from diagrams.scenario.bodies import Body
+from diagrams.scenario.participants import FollowerParameters
+from diagrams.scenario.scenario import Scenario
+from diagrams.scenario.warnings.guarantees import assumptions
+from diagrams.scenario.warnings.route_gains import goal_warnings, route_warnings
+from diagrams.scenario.warnings.scenario_warning import ScenarioWarning
+from systems.world.plane import beyond_rectangle, control_point
+
+
+def warnings_of(scenario: Scenario) -> tuple[ScenarioWarning, ...]:
+    """What a user must know of a scenario, although it can be run.
+
+    Of each robot: every assumption of its guard's theorems that the scenario breaks,
+    a start within the clearance of its route, gains with which it does not come to
+    rest, and a goal that obstacles keep it from.
+
+    Args:
+        scenario: Any.
+
+    Returns:
+        The warnings, robot by robot; empty where there are none.
+    """
+    found: list[ScenarioWarning] = []
+    robots = zip(scenario.all_robots, scenario.robot_fields(), strict=True)
+    for name, (prefix, robot) in robots:
+        if robot.own_guard is not None:
+            found += (
+                ScenarioWarning(f"{prefix}{each.field}", each.complaint)
+                for each in assumptions(scenario, name)
+                if not each.holds
+            )
+        if robot.route is not None:
+            found += _of_the_start(prefix, robot, scenario.mapped())
+            found += route_warnings(prefix, robot, scenario.tick_s)
+            margin_m = scenario.stop.goal_margin_m
+            found += goal_warnings(prefix, robot, _resting(scenario), margin_m)
+    return tuple(found)
+
+
+def _resting(scenario: Scenario) -> dict[str, NDArray[np.float64]]:
+    """Rectangles in W of the obstacles that rest, by name."""
+    return {
+        each.name: Body(each.path(), each.size_m).rectangle(0.0)
+        for each in scenario.obstacles
+        if not each.path().moves
+    }
+
+
+def _of_the_start(
+    prefix: str, robot: FollowerParameters, known: NDArray[np.float64]
+) -> Iterator[ScenarioWarning]:
+    """Whether P starts within the clearance of (k, 5) obstacles on its map, in W."""
+    assert robot.route is not None
+    place = control_point(robot.start.pose, robot.robot.control_point_m)
+    off = (math.hypot(*beyond_rectangle(place, each)) for each in known)
+    nearest, clearance = min(off, default=math.inf), robot.route.clearance_m
+    if 0.0 < nearest < clearance:
+        yield ScenarioWarning(
+            f"{prefix}start.position_m",
+            f"P starts {nearest:.3g} m from a known obstacle, within "
+            f"{prefix}route.clearance_m, {clearance:g} m: the route first leads "
+            "away from it",
+        )
