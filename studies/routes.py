@@ -1,6 +1,6 @@
 """How robots on routes arrive and collide, by law.
 
-``python -m studies routes [RUNS]`` prints the table of docs/routes.md; RUNS
+``python -m studies routes [RUNS]`` prints the table of docs/results_routes.md; RUNS
 layouts of each scenario, 200 unless told.
 """
 

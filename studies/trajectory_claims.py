@@ -1,6 +1,6 @@
 """What the claims of Engelbrecht 2021 are judged by.
 
-``python -m studies trajectory_claims`` prints the tables of docs/routes.md,
+``python -m studies trajectory_claims`` prints the tables of docs/results_routes.md,
 "Claims"; ``--help`` lists the options that print parts of them.
 """
 

@@ -20,7 +20,7 @@ def design_text(study: DesignStudy) -> str:
         "",
         (
             "K_0 of the conventional law, N/m, that stops P before an obstacle with "
-            "the target behind it:"
+            "the follow point behind it:"
         ),
     ]
     lines += [
