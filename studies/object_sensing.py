@@ -1,7 +1,7 @@
 """What a robot on a route collides with, by how it sees.
 
 ``python -m studies object_sensing [RUNS [SCENARIOS]]`` prints the table of
-docs/results_routes.md, "What beams see"; RUNS layouts of each scenario, 200 unless told.
+docs/results_routes.md, "What beams see"; RUNS layouts of each scenario, 200 by default.
 """
 
 from __future__ import annotations

@@ -112,11 +112,10 @@ def remembered_space(result: RunResult) -> Iterator[FreeSpace]:
         {},
     )
     step = block.step_for(run)
-    space = run.carried["free_space"](0)
     ticks = np.rint(result.time / tick_s).astype(np.int64)
     for tick, inputs in zip(ticks.tolist(), logged_readings(result), strict=True):
-        step.step(tick, (), inputs, (), step.numbers)
-        yield space
+        step.step(tick, step.state, inputs, (), step.numbers)
+        yield step.state.free_space
 
 
 def logged_readings(result: RunResult) -> Iterator[tuple[NDArray[np.float64], ...]]:

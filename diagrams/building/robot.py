@@ -29,6 +29,7 @@ from systems import (
     SourceRobot,
     WheelOdometry,
 )
+from systems.framework.block import Block
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
@@ -107,6 +108,8 @@ def publishes_state(block: Any, port: str) -> bool:
     """
     if isinstance(block, StepBlock) or block.num_continuous_states():
         return False
+    if isinstance(block, Block) and hasattr(block, "step"):
+        return block.step.publish is not None
     if not (block.num_discrete_state_groups() or block.num_abstract_states()):
         return False
     return not block.HasDirectFeedthrough(block.GetOutputPort(port).get_index())

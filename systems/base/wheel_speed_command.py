@@ -150,6 +150,10 @@ def limited_wheel_speeds(v: Any, omega: Any, robot: RobotParameters) -> Any:
     return left, right
 
 
+#: Columns of the port ``wheel_speeds`` of every block that commands the wheels.
+WHEEL_SPEED_COLUMNS = "wheel_speed_left", "wheel_speed_right"
+
+
 class CommandNumbers(NamedTuple):
     """What the step of a wheel command depends on."""
 
@@ -221,7 +225,7 @@ class _WheelCommand:
         "command",
         "control",
         columns={
-            "wheel_speeds": ("wheel_speed_left", "wheel_speed_right"),
+            "wheel_speeds": WHEEL_SPEED_COLUMNS,
             "v_WP": ("v_WP_x", "v_WP_y"),
         },
         states=("v_WP_x", "v_WP_y", "wheel_left", "wheel_right"),

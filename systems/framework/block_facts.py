@@ -4,17 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import Any
 
-Stage = Literal["world", "hearing", "obstacle sensing", "control", "robot"]
-#: Stages of the signal, in its order.
-STAGES: tuple[Stage, ...] = (
-    "world",
-    "hearing",
-    "obstacle sensing",
-    "control",
-    "robot",
-)
+from systems.framework.block import STAGES as STAGES, Stage as Stage, _Declared
 
 
 @dataclass(frozen=True)
@@ -38,6 +30,8 @@ class BlockFacts:
 
 def block_facts(block: Any) -> BlockFacts:
     """What a block says of itself; of a block without facts, that it controls."""
+    if isinstance(block, _Declared):
+        return BlockFacts(block.part, block.stage, block.columns, tuple(block.states))
     facts = getattr(block, "FACTS", None)
     if isinstance(facts, BlockFacts):
         return facts

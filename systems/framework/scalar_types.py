@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import inspect
 import sys
 from types import ModuleType
 from typing import Any
@@ -25,6 +26,8 @@ class _Template(TemplateSystem):
         self.__module__ = scope.__name__
 
     def _on_add(self, param: Any, cls: type, skip_rename: Any) -> Any:
+        if "_construct_copy" not in vars(cls):
+            _make_copyable(cls)
         theirs = vars(scalar_conversion)
         searching = theirs["TemplateMethod"]
         theirs["TemplateMethod"] = functools.partial(searching, scope=scalar_conversion)
@@ -32,6 +35,26 @@ class _Template(TemplateSystem):
             return super()._on_add(param, cls, skip_rename)
         finally:
             theirs["TemplateMethod"] = searching
+
+
+def _make_copyable(cls: Any) -> None:
+    """A copy for another scalar type is made with the arguments of the original."""
+    construct = cls._construct
+
+    @functools.wraps(construct)
+    def construct_and_remember(
+        self: Any, *, converter: Any = None, **options: Any
+    ) -> None:
+        construct(self, converter=converter, **options)
+        self._options = options
+
+    def construct_copy(self: Any, other: Any, converter: Any = None) -> None:
+        construct_and_remember(self, converter=converter, **other._options)
+
+    cls._construct, cls._construct_copy = construct_and_remember, construct_copy
+    signature = inspect.signature(construct)
+    shown = [p for p in signature.parameters.values() if p.name != "converter"]
+    cls.__signature__ = signature.replace(parameters=shown[1:])
 
 
 def define_for_scalars(name: str, module: str) -> Any:

@@ -2,64 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from pydrake.common.value import Value
 
+from systems.framework.block import RunFacts as RunFacts, Step as Step
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_lists
 from systems.framework.noise import tick_noise
 from systems.framework.scalar_math import float_of
-
-
-class Step(NamedTuple):
-    """What a block does in a tick.
-
-    ``step(tick, state, inputs, outputs, numbers)`` reads the inputs, one sequence of
-    numbers a port, fills the outputs element by element, and replaces the state by that
-    of the next tick. The sequences are lists of floats or of AutoDiffXd where Drake
-    calls it, and arrays in compiled code: numba can compile it.
-    """
-
-    step: Callable[..., None]
-    numbers: Any
-    """What the step depends on: a named tuple of numbers, arrays, functions and
-    parameters, or of tuples of these."""
-    state: Sequence[float] = ()
-    """At the first tick."""
-    publish: Callable[..., None] | None = None
-    """``publish(state, outputs, numbers)`` fills the outputs of a block that has them
-    in its state alone; the step then leaves them."""
-    host: Any = None
-    """``HostCall`` of a step that calls Python; the loop keeps it alive."""
-
-
-class RunFacts(NamedTuple):
-    """What a compiled loop runs, for blocks whose step depends on it.
-
-    A block joins compiled loops by ``step_for(run)``, which gives its ``Step``. Start
-    and seed are those of the run, whatever the block was made with: runs share blocks.
-    """
-
-    ticks: int
-    tick_s: float
-    initial_pose: tuple[float, float, float]
-    """Of the robot in W, m and rad."""
-    scheme: str
-    """Of the integrator, as ``runge_kutta3``."""
-    step_s: float
-    """Largest step of the integrator, s."""
-    seed_of: Callable[[str], int]
-    """Seed of a block, by its name."""
-    carried: dict[str, Callable[[int], Any]]
-    """What abstract ports carry at a tick, by name: those from outside are there from
-    the start, a block adds its own."""
-    mapped: Any = ()
-    """(n, 5) x, y, theta, length, width of what the robot's map has, m and rad."""
-    goal: tuple[float, float] | None = None
-    """Where it drives to, m, if it has a goal."""
 
 
 def reseeded(block: Any, run: RunFacts) -> Step:

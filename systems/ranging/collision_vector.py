@@ -7,14 +7,12 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.world.geometry import control_point, rotate
 
@@ -232,25 +230,25 @@ def fill_slots(vectors: Any, outputs: Any) -> None:
 
 
 #: What every block says of itself that obstacle sensing ends in.
-COLLISION_FACTS = BlockFacts(
-    "collision",
-    "obstacle sensing",
-    columns={
-        "collision_vectors_B": tuple(
+#: Output ports of every block that senses obstacles.
+COLLISION_PORTS = (
+    Port(
+        "collision_vectors_B",
+        2 * SLOTS,
+        "m, three slots of x and y",
+        tuple(
             f"collision_{slot}_B_{axis}"
             for slot in range(1, SLOTS + 1)
             for axis in "xy"
         ),
-        "features": tuple(f"feature_{slot}" for slot in range(1, SLOTS + 1)),
-    },
-)
-
-
-#: Ports that every obstacle sensing ends in.
-COLLISION_PORTS = (
-    ("collision_vectors_B", 2 * SLOTS),
-    ("mask", SLOTS),
-    ("features", SLOTS),
+    ),
+    Port("mask", SLOTS, "0 or 1, one per slot"),
+    Port(
+        "features",
+        SLOTS,
+        "number of the sensor, pair of sensors or body of the vector, 0 none",
+        "feature_{}",
+    ),
 )
 
 
@@ -318,28 +316,15 @@ def collision_step(
 
 @define_for_scalars("CollisionVector_", __name__)
 def CollisionVector_(T):
-    class Impl(LeafSystem_[T], StepBlock):
+    class Impl(Block_[T]):
         """Turns echoes into collision vectors from P (cases I and II).
-
-        .. pydrake_system::
-
-            name: CollisionVector
-            input_ports:
-            - ranges [m]
-            - echo [0 or 1]
-            - range_ages [s]
-            - pose_WB_estimated [m, m, rad]
-            output_ports:
-            - collision_vectors_B [m, three slots of x and y]
-            - mask [0 or 1 a slot]
-            - features [number of the sensor or pair, 0 none]
 
         Slots are filled from the first; only ``aggregation: sum`` fills more
         than one. Where all sensors fire at every tick, a function of the present
         ranges: no state, no latency; the ports of age and pose are not read.
-        Else a range that is held stands for a point that rests in W: it is carried
-        on to the present pose. An obstacle's own motion since that sensor fired, up
-        to a round less a tick, remains an error.
+        Otherwise a range that is held stands for a point at rest in W: the block
+        converts this point to the present pose. An obstacle's own motion since that
+        sensor fired, up to a round less a tick, remains an error.
 
         Discrete state, every tick, where ranges are held: the poses of the ticks of
         a round before this one, two for three sensors that fire one after the other.
@@ -354,66 +339,49 @@ def CollisionVector_(T):
         Reference: Han 2019, eq. 11-14, with the corrections of docs/errata.md.
         """
 
-        FACTS = COLLISION_FACTS
+        part, stage = "collision", "obstacle sensing"
+        inputs = (
+            Port("ranges", "sensors", "m"),
+            Port("echo", "sensors", "0 or 1"),
+            Port("range_ages", "sensors", "s"),
+            Port("pose_WB_estimated", 3, "m, m, rad"),
+        )
+        outputs = COLLISION_PORTS
 
         def _construct(
             self,
             *,
-            parameters=None,
-            sensors=None,
-            robot=None,
-            initial_pose=(0.0, 0.0, 0.0),
-            tick_s=TICK_S,
-            converter=None,
-        ):
+            parameters: CollisionVectorParameters = CollisionVectorParameters(),
+            sensors: UltrasonicParameters = UltrasonicParameters(),
+            robot: RobotParameters = RobotParameters(),
+            initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+            tick_s: float = TICK_S,
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._parameters = parameters or CollisionVectorParameters()
-            self._sensors = sensors or UltrasonicParameters()
-            self._robot = robot or RobotParameters()
-            self._initial_pose = tuple(initial_pose)
-            self._tick_s = tick_s
             self.set_name("collision_vector")
-            count = self._sensors.count
-            past_poses = self._sensors.round_ticks(tick_s) - 1
+            past_poses = sensors.round_ticks(tick_s) - 1
             numbers = CollisionNumbers(
-                self._parameters.pair_separation_m,
-                self._parameters.aggregation == "paper",
-                self._parameters.aggregation == "sum",
-                [*self._sensors.axes],
-                [*self._sensors.places],
-                [*self._sensors.neighbours],
-                self._robot.control_point_m,
+                parameters.pair_separation_m,
+                parameters.aggregation == "paper",
+                parameters.aggregation == "sum",
+                [*sensors.axes],
+                [*sensors.places],
+                [*sensors.neighbours],
+                robot.control_point_m,
                 tick_s,
             )
-            self.declare_step(
-                T,
-                Step(collision_step, numbers, [*self._initial_pose] * past_poses),
-                (
-                    ("ranges", count),
-                    ("echo", count),
-                    ("range_ages", count),
-                    ("pose_WB_estimated", 3),
-                ),
-                COLLISION_PORTS,
-                tick_s,
+            self.declare(
+                Step(collision_step, numbers, [*initial_pose] * past_poses),
+                tick_s=tick_s,
+                sizes={"sensors": sensors.count},
                 unread=() if past_poses else ("range_ages", "pose_WB_estimated"),
             )
 
-        def step_for(self, run):
-            """What the block does in each tick of a compiled loop, ``Step``."""
+        def step_for(self, run: RunFacts) -> Step:
+            """The step, with the initial pose of the run."""
             past_poses = len(self.step.state) // 3
             return self.step._replace(state=[*run.initial_pose] * past_poses)
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                parameters=other._parameters,
-                sensors=other._sensors,
-                robot=other._robot,
-                initial_pose=other._initial_pose,
-                tick_s=other._tick_s,
-                converter=converter,
-            )
 
     return Impl
 

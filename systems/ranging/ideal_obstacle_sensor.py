@@ -5,17 +5,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
+from systems.framework.block import Block_, Port, Step
 from systems.framework.finite import check_finite
 from systems.framework.parameters import Positive, Size
 from systems.framework.scalar_math import float_of
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.ranging.collision_vector import (
-    COLLISION_FACTS,
     COLLISION_PORTS,
     SLOTS,
     fill_slots,
@@ -102,23 +100,10 @@ def ideal_obstacle_step(
 
 @define_for_scalars("IdealObstacleSensor_", __name__)
 def IdealObstacleSensor_(T):
-    class Impl(LeafSystem_[T], StepBlock):
+    class Impl(Block_[T]):
         """Gives the exact nearest points of the bodies, in all directions.
 
-        .. pydrake_system::
-
-            name: IdealObstacleSensor
-            input_ports:
-            - pose_WB [m, m, rad]
-            - poses_WO [m, m, rad each]
-            - sizes [m, m each]
-            - pose_WS [m, m, rad]
-            output_ports:
-            - collision_vectors_B [m, three slots of x and y]
-            - mask [0 or 1 a slot]
-            - features [number of the body, 0 none]
-
-        Stands in for ``UltrasonicArray`` and ``CollisionVector`` with the same
+        It replaces ``UltrasonicArray`` and ``CollisionVector`` and has the same
         outputs. A function of the present input: no state, no latency, no
         noise; differentiable wherever the nearest point is unique.
 
@@ -127,54 +112,44 @@ def IdealObstacleSensor_(T):
             maximum_range_m: Bodies beyond it are not seen, m.
             all_bodies: Up to three bodies (``aggregation: sum``) instead of
                 the nearest one.
-            source_size: Length and width of the master robot, m.
+            source_size: Length and width of the leader, m.
             obstacle_count: Number of boxes on the obstacle ports.
         """
 
-        FACTS = COLLISION_FACTS
+        part, stage = "collision", "obstacle sensing"
+        inputs = (
+            Port("pose_WB", 3, "m, m, rad"),
+            Port("poses_WO", "3 bodies", "m, m, rad each"),
+            Port("sizes", "2 bodies", "m, m each"),
+            Port("pose_WS", 3, "m, m, rad"),
+        )
+        outputs = COLLISION_PORTS
 
         def _construct(
             self,
             *,
-            robot=None,
+            robot: RobotParameters = RobotParameters(),
             maximum_range_m: Positive = 3.0,
             all_bodies: bool = False,
             source_size: Size = (0.326, 0.352),
             obstacle_count: int = 0,
-            converter=None,
-        ):
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._config = {
-                "robot": robot or RobotParameters(),
-                "maximum_range_m": maximum_range_m,
-                "all_bodies": all_bodies,
-                "source_size": source_size,
-                "obstacle_count": obstacle_count,
-            }
-            for name in ("maximum_range_m", "source_size"):
-                check_finite(f"IdealObstacleSensor: {name}", self._config[name])
+            check_finite("IdealObstacleSensor: maximum_range_m", maximum_range_m)
+            check_finite("IdealObstacleSensor: source_size", source_size)
             self.set_name("ideal_obstacle_sensor")
             numbers = ObstacleNumbers(
-                (robot or RobotParameters()).control_point_m,
+                robot.control_point_m,
                 maximum_range_m,
                 SLOTS if all_bodies else 1,
                 source_size,
             )
-            self.declare_step(
-                T,
+            self.declare(
                 Step(ideal_obstacle_step, numbers),
-                (
-                    ("pose_WB", 3),
-                    ("poses_WO", 3 * obstacle_count),
-                    ("sizes", 2 * obstacle_count),
-                    ("pose_WS", 3),
-                ),
-                COLLISION_PORTS,
-                TICK_S,
+                tick_s=TICK_S,
+                sizes={"bodies": obstacle_count},
             )
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, **other._config, converter=converter)
 
     return Impl
 

@@ -2,26 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import ArrayLike, NDArray
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
-from systems.framework.cache import declare_cache
+from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
-from systems.framework.finite import check_finite, read_arrays
+from systems.framework.finite import check_finite
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.parameters import (
     Size,
 )
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.ranging.parameters import UltrasonicParameters
 from systems.ranging.sensor_faults import (
     BLIND,
@@ -244,136 +239,82 @@ def _read_ranges(
         ages[k] = age * numbers.tick_s
 
 
-class UltrasonicArray(LeafSystem):
+class UltrasonicArray(Block):
     """Ranges of the nearest surfaces in cones, the papers' three or any others.
 
-    .. pydrake_system::
+    The leader is a body like the obstacles; without a leader there is no port
+    ``pose_WS``. Surfaces beyond the maximum range give no echo. Surfaces nearer than
+    the minimum range read the minimum: without an echo at contact, the law would not
+    push. A cone reports a range, not a direction.
 
-        name: UltrasonicArray
-        input_ports:
-        - pose_WB [m, m, rad]
-        - poses_WO [m, m, rad each]
-        - sizes [m, m each]
-        - pose_WS [m, m, rad]
-        output_ports:
-        - ranges [m]
-        - echo [0 or 1]
-        - range_ages [s, since each sensor fired]
-
-    The master robot is a body like the obstacles; without one there is no ``pose_WS``.
-    Surfaces beyond the maximum
-    range give no echo; nearer than the minimum they read the minimum, for
-    dropping the echo at contact would drop the force. A cone reports a range,
-    not a direction.
-
-    State: ranges and echoes of the last tick, where they are held.
-    Rate and latency: a function of the present poses; no latency. Noise is
-    drawn once a tick. All fire every ``period_s``, at multiples of it, and hold in
-    between. With ``firing: sequential`` one sensor fires a period, from left to
-    right, and the others hold: with periods of 25 ms the ranges of three are 0, 25
-    and 50 ms old, and a sensor's next comes after a round of 75 ms.
+    State: ranges and echoes of the last tick, for sensors that hold them.
+    Rate and latency: a function of the present poses; no latency. The noise is
+    drawn once per tick. All sensors fire every ``period_s``, at multiples of it, and
+    hold their reading in between. With ``firing: sequential`` one sensor fires per
+    period, from left to right, and the others hold their reading: with three sensors
+    and periods of 25 ms the ranges are 0, 25 and 50 ms old, and a sensor fires again
+    after a round of 75 ms.
 
     Args:
         parameters: The sensors.
         robot: Place of P.
-        acoustics: Speed of sound; the time of flight uses it.
-        source_size: Length and width of the master robot, m; none: there is no such.
+        acoustics: Speed of sound, from which the time of flight follows.
+        source_size: Length and width of the leader, m; None if there is no leader.
         obstacle_count: Number of boxes on the obstacle ports.
         seed: Seed of the noise.
-        tick_s: Period of the robot, s.
+        tick_s: Control period of the robot, s.
 
     Raises:
-        InputError: The sensors' period is no multiple of the tick.
+        InputError: The sensors' period is not a multiple of the tick.
     """
 
-    FACTS = BlockFacts("ultrasonic", "obstacle sensing")
+    part, stage = "ultrasonic", "obstacle sensing"
+    inputs = (
+        Port("pose_WB", 3, "m, m, rad"),
+        Port("poses_WO", "3 bodies", "m, m, rad each"),
+        Port("sizes", "2 bodies", "m, m each"),
+        Port("pose_WS", 3, "m, m, rad"),
+    )
+    outputs = (
+        Port("ranges", "sensors", "m", "range_{}"),
+        Port("echo", "sensors", "0 or 1", "echo_{}"),
+        Port("range_ages", "sensors", "s, since each sensor fired"),
+    )
 
     def __init__(
         self,
         *,
-        parameters: UltrasonicParameters | None = None,
-        robot: RobotParameters | None = None,
-        acoustics: AcousticParameters | None = None,
+        parameters: UltrasonicParameters = UltrasonicParameters(),
+        robot: RobotParameters = RobotParameters(),
+        acoustics: AcousticParameters = AcousticParameters(),
         source_size: Size | None = (0.326, 0.352),
         obstacle_count: int = 0,
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._parameters = parameters or UltrasonicParameters()
-        self._control_point = (robot or RobotParameters()).control_point_m
-        self._sound_speed = (acoustics or AcousticParameters()).c
-        self._source_size = source_size or (0.0, 0.0)
-        self._tick_s = tick_s
-        self._round = self._parameters.round_ticks(tick_s)
-        check_finite("UltrasonicArray: source_size", self._source_size)
+        check_finite("UltrasonicArray: source_size", source_size or ())
         self.set_name("ultrasonic_array")
-        count = self._parameters.count
-        columns = {
-            port: tuple(f"{name}_{k}" for k in range(1, count + 1))
-            for port, name in (("ranges", "range"), ("echo", "echo"))
-        }
-        self.FACTS = replace(self.FACTS, columns=columns)
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in (
-                ("pose_WB", 3),
-                ("poses_WO", 3 * obstacle_count),
-                ("sizes", 2 * obstacle_count),
-                ("pose_WS", 3),
-            )
-            if name != "pose_WS" or source_size is not None
-        ]
-        farthest = np.full(count, self._parameters.maximum_range_m)
-        held: Any = np.concatenate([farthest, np.zeros(count)])
-        self.DeclareDiscreteState(held)
-        step = ultrasonic_step if source_size else sourceless_ultrasonic_step
-        self.step = Step(step, self._numbers(seed), held.tolist())
-        if self._round > 1:
-            self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._hold
-            )
-        sources = {port.ticket() for port in self._inputs}
-        sources |= {self.time_ticket(), self.xd_ticket()}
-        self._readings: Any = declare_cache(self, "readings", self._read, sources)
-        for port, name in enumerate(("ranges", "echo", "range_ages")):
-            self.DeclareVectorOutputPort(
-                name=name,
-                size=count,
-                calc=partial(self._calc, port),
-                prerequisites_of_calc={self._readings.ticket()},
-            )
-
-    def _numbers(self, seed: int) -> UltrasonicNumbers:
-        sensors = self._parameters
-        return UltrasonicNumbers(
-            *sensors.beams,
-            self._control_point,
-            self._source_size,
-            sensors.errors(self._sound_speed),
+        count = parameters.count
+        numbers = UltrasonicNumbers(
+            *parameters.beams,
+            robot.control_point_m,
+            source_size or (0.0, 0.0),
+            parameters.errors(acoustics.c),
             tick_noise(seed),
-            sensors.turns(self._tick_s),
-            self._round,
-            self._tick_s,
-            sensors.fault_ticks(self._tick_s),
+            parameters.turns(tick_s),
+            parameters.round_ticks(tick_s),
+            tick_s,
+            parameters.fault_ticks(tick_s),
         )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        noise = tick_noise(run.seed_of(self.get_name()))
-        return self.step._replace(numbers=self.step.numbers._replace(noise=noise))
-
-    def _read(self, context: Any) -> tuple[Any, Any]:
-        """Outputs as they stand now, and the state of the next tick."""
-        inputs = tuple(read_arrays(context, self._inputs))
-        state = context.get_discrete_state(0).CopyToVector()
-        outputs = tuple(np.zeros((3, self._parameters.count)))
-        tick = round(context.get_time() / self._tick_s)
-        self.step.step(tick, state, inputs, outputs, self.step.numbers)
-        return outputs, state
-
-    def _hold(self, context: Any, discrete_state: Any) -> None:
-        discrete_state.set_value(self._readings.Eval(context)[1])
-
-    def _calc(self, port: int, context: Any, output: Any) -> None:
-        output.SetFromVector(self._readings.Eval(context)[0][port])
+        self.declare(
+            Step(
+                ultrasonic_step if source_size else sourceless_ultrasonic_step,
+                numbers,
+                [parameters.maximum_range_m] * count + [0.0] * count,
+            ),
+            tick_s=tick_s,
+            sizes={"bodies": obstacle_count, "sensors": count},
+            omit=() if source_size else ("pose_WS",),
+            arrays=True,
+        )

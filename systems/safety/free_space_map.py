@@ -8,17 +8,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters, body_radius
-from systems.framework.block_facts import BlockFacts
-from systems.framework.cache import declare_cache
-from systems.framework.finite import check_finite, read_arrays
+from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.ranging.parameters import UltrasonicParameters
 from systems.safety.free_space import (
     NEVER,
@@ -41,8 +36,6 @@ _ARC_STEP = 0.035
 class MapNumbers(NamedTuple):
     """What the step of ``FreeSpaceMap`` depends on."""
 
-    space: FreeSpace
-    """Changed by the step."""
     sectors: Sectors
     directions: NDArray[np.float64]
     """(sensors, 2) axis of each in B, rad, and half of its aperture, rad."""
@@ -62,24 +55,30 @@ class MapNumbers(NamedTuple):
     tick_s: float
     round_ticks: int
     """From one reading of a sensor to its next."""
+
+
+class MapState(NamedTuple):
+    """The state of ``FreeSpaceMap``."""
+
+    free_space: FreeSpace
     was_at: NDArray[np.float64]
-    """(1, 3) pose at the last tick, m and rad; changed."""
+    """(1, 3) pose at the last tick, m and rad."""
 
 
 def map_step(
-    tick: int, state: Any, inputs: Any, outputs: Any, numbers: MapNumbers
+    tick: int, state: MapState, inputs: Any, outputs: Any, numbers: MapNumbers
 ) -> None:
     """What is known at one tick; see ``systems.framework.step_block.Step``.
 
     Args:
         tick: Number of the tick.
-        state: None: all is in ``numbers.space``.
+        state: ``MapState``.
         inputs: As the input ports.
         outputs: None.
         numbers: ``MapNumbers``.
     """
     ranges, echo, ages, pose, commanded = inputs
-    space, was_at, error = numbers.space, numbers.was_at, numbers.error
+    space, was_at, error = state.free_space, state.was_at, numbers.error
     time = tick * numbers.tick_s
     low, high, margin = numbers.limits
     move_window(space, pose[0], pose[1])
@@ -144,20 +143,8 @@ def rolled_way(was_at: Any, pose: Any, least: float, error: PlaceError) -> float
     return 0.5 * (max(slower, least) + max(faster, least) + error.pulse_m)
 
 
-class FreeSpaceMap(LeafSystem):
+class FreeSpaceMap(Block):
     """Remembers what range sensors have seen free, and where echoes came from.
-
-    .. pydrake_system::
-
-        name: FreeSpaceMap
-        input_ports:
-        - ranges [m]
-        - echo [0 or 1]
-        - range_ages [s, since each sensor fired]
-        - pose_WB_estimated [m, m, rad]
-        - wheel_speeds [rad/s, left and right, commanded]
-        output_ports:
-        - free_space [FreeSpace]
 
     A cell has been seen free once its circumscribed circle lay within the apertures of
     sensors at one place, nearer than what they read, less a margin. It stays so as long
@@ -186,108 +173,58 @@ class FreeSpaceMap(LeafSystem):
     Reference: ours; docs/guard.md has the theorem that rests on it.
     """
 
-    FACTS = BlockFacts("free_space", "obstacle sensing")
+    part, stage = "free_space", "obstacle sensing"
+    inputs = (
+        Port("ranges", "sensors", "m"),
+        Port("echo", "sensors", "0 or 1"),
+        Port("range_ages", "sensors", "s, since each sensor fired"),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("wheel_speeds", 2, "rad/s, left and right, commanded"),
+    )
+    outputs = (Port("free_space", OBJECT, "FreeSpace"),)
 
     def __init__(
         self,
         *,
-        parameters: FreeSpaceParameters | None = None,
-        sensors: UltrasonicParameters | None = None,
-        robot: RobotParameters | None = None,
-        odometry: OdometryParameters | None = None,
-        plant: PlantParameters | None = None,
+        parameters: FreeSpaceParameters = FreeSpaceParameters(),
+        sensors: UltrasonicParameters = UltrasonicParameters(),
+        robot: RobotParameters = RobotParameters(),
+        odometry: OdometryParameters = OdometryParameters(),
+        plant: PlantParameters = PlantParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._parameters = parameters or FreeSpaceParameters()
-        self._odometry = odometry or OdometryParameters()
-        self._plant = plant or PlantParameters()
-        self._sensors = sensors or UltrasonicParameters()
-        self._robot = robot or RobotParameters()
-        self._parameters.check(self._robot)
-        self._tick_s = tick_s
+        parameters.check(robot)
         self.set_name("free_space_map")
-        self._numbers = self._make_numbers()
-        count = self._sensors.count
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in (
-                ("ranges", count),
-                ("echo", count),
-                ("range_ages", count),
-                ("pose_WB_estimated", 3),
-                ("wheel_speeds", 2),
-            )
-        ]
-        blank = self._numbers.space, self._numbers.was_at
-        self.DeclareAbstractState(Value(_copied(*blank)))
-        self.DeclarePeriodicUnrestrictedUpdateEvent(
-            period_sec=tick_s, offset_sec=0.0, update=self._remember
-        )
-        sources = {port.ticket() for port in self._inputs}
-        sources |= {self.time_ticket(), self.xa_ticket()}
-        self._known: Any = declare_cache(self, "known", self._know, sources)
-        self.DeclareAbstractOutputPort(
-            name="free_space",
-            alloc=lambda: Value(object()),
-            calc=self._publish,
-            prerequisites_of_calc={self._known.ticket()},
-        )
-
-    def _make_numbers(self) -> MapNumbers:
-        own, sensors, robot = self._parameters, self._sensors, self._robot
-        error = own.range_error(sensors)
         axes, places, half_angle = sensors.beams
-        place_error = PlaceError.of(own, robot, self._odometry)
+        place_error = PlaceError.of(parameters, robot, odometry)
         least_way = 0.0
         if place_error.pulse_m > 0.0:
-            motion = lagged_motion(self._tick_s, self._plant.motor_lag_s)
-            steady = robot.wheel_radius_m * self._tick_s
+            motion = lagged_motion(tick_s, plant.motor_lag_s)
+            steady = robot.wheel_radius_m * tick_s
             least_way = motion.least_share * steady
         points = 2 + math.ceil(2.0 * half_angle / _ARC_STEP)
-        return MapNumbers(
-            make_free_space(own.cells, own.cell_m, sensors.count, points),
+        numbers = MapNumbers(
             sensor_sectors(sensors, robot.control_point_m),
             np.column_stack([axes, np.full(len(axes), half_angle)]),
             np.add(places, [robot.control_point_m, 0.0]),
-            (sensors.minimum_range_m, sensors.maximum_range_m, error),
+            (
+                sensors.minimum_range_m,
+                sensors.maximum_range_m,
+                parameters.range_error(sensors),
+            ),
             place_error,
             least_way,
             body_radius(robot),
-            own.start_bubble_m,
-            self._tick_s,
-            sensors.round_ticks(self._tick_s),
-            np.zeros((1, 3)),
+            parameters.start_bubble_m,
+            tick_s,
+            sensors.round_ticks(tick_s),
         )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        space, was_at = _copied(self._numbers.space, self._numbers.was_at)
-        run.carried["free_space"] = lambda _: space
-        return Step(map_step, self._numbers._replace(space=space, was_at=was_at))
-
-    def _publish(self, context: Any, output: Any) -> None:
-        output.set_value(self._known.Eval(context)[0])
-
-    def _know(self, context: Any) -> tuple[FreeSpace, NDArray[np.float64]]:
-        state: Any = context.get_abstract_state(0).get_value()
-        tick = round(context.get_time() / self._tick_s)
-        # What was entered at this tick is not entered twice.
-        if state[0].facts[0, TICK] == tick:
-            known: tuple[FreeSpace, NDArray[np.float64]] = state
-            return known
-        space, was_at = _copied(*state)
-        inputs = tuple(read_arrays(context, self._inputs))
-        numbers = self._numbers._replace(space=space, was_at=was_at)
-        map_step(tick, (), inputs, (), numbers)
-        check_finite("FreeSpaceMap: pose_WB_estimated", was_at[0])
-        return space, was_at
-
-    def _remember(self, context: Any, state: Any) -> None:
-        state.get_mutable_abstract_state(0).set_value(self._known.Eval(context))
-
-
-def _copied(
-    space: FreeSpace, was_at: NDArray[np.float64]
-) -> tuple[FreeSpace, NDArray[np.float64]]:
-    return space.copy(), np.copy(was_at)
+        space = make_free_space(
+            parameters.cells, parameters.cell_m, sensors.count, points
+        )
+        self.declare(
+            Step(map_step, numbers, MapState(space, np.zeros((1, 3)))),
+            tick_s=tick_s,
+            sizes={"sensors": sensors.count},
+        )

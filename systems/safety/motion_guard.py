@@ -6,23 +6,18 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
-
 from systems.base.lagged_motion import lagged_motion
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import (
     COMMANDS,
+    WHEEL_SPEED_COLUMNS,
     hand_position_twist,
     hand_position_velocity,
     limited_wheel_speeds,
 )
-from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import read_lists
+from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.safety.braking import (
     HALTED,
     PASSED,
@@ -31,12 +26,10 @@ from systems.safety.braking import (
     danger_of,
     rolled_speeds,
 )
-from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters, GuardParameters
 from systems.safety.views import stopping_way, tick_parts
 
-# Groups of the discrete state.
-_V_WP, _WHEEL_SPEEDS, _REPORT, _MODEL = range(4)
+#: Elements of the state: velocity of P, wheel speeds, report, modelled wheel speeds.
 _SIZES = 2, 2, 4, 2
 
 
@@ -52,7 +45,6 @@ class GuardNumbers(NamedTuple):
     reach: tuple[float, float]
     """How far from the axle cells are looked at, m, and for what rolled way they have
     to stay free, m."""
-    space: FreeSpace
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
@@ -62,18 +54,18 @@ def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -
         tick: Number of the tick.
         state: Velocity of P, m/s, x and y; wheel speeds, rad/s, left and right; what
             was done; modelled wheel speeds, rad/s.
-        inputs: What the law commands, the pose by the odometry, and what is wrong with
-            the sensing.
+        inputs: The command of the law, the pose by the odometry, the fault of the
+            sensing, and the free space.
         outputs: Left as they are: they are state.
         numbers: ``GuardNumbers``.
     """
-    command, pose = inputs[0], inputs[1]
-    robot, braking, space = numbers.robot, numbers.braking, numbers.space
+    command, pose, fault, space = inputs
+    robot, braking = numbers.robot, numbers.braking
     theta, tick_s = pose[2], braking.tick_s
     before = state[0], state[1]
     v_WP = numbers.velocity(before, command, theta, robot, tick_s)
     v, omega = hand_position_twist(v_WP, theta, robot.control_point_m)
-    trusted = inputs[2][0] < 0.5
+    trusted = fault[0] < 0.5
     wish = limited_wheel_speeds(v, omega, robot) if trusted else (0.0, 0.0)
     here = pose[0], pose[1], pose[2]
     speeds = state[8], state[9]
@@ -108,47 +100,34 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
         report[k] = state[4 + k]
 
 
-class MotionGuard(LeafSystem):
+class MotionGuard(Block):
     """Obeys a law as far as the robot can be braked to rest in free space.
 
-    .. pydrake_system::
+    It replaces ``WheelSpeedCommand``, ``VelocityWheelCommand`` or
+    ``TwistWheelCommand``: it has the same input and does the same work. It passes the
+    resulting wheel speeds if the robot, one tick later, can brake to rest so that the
+    disc about the axle that holds the body stays ``margin_m`` away from everything that
+    was never seen free. Otherwise it passes lower speeds along the same curve, or the
+    turn alone, or it brakes. The virtual mass moves by what the guard passes.
 
-        name: MotionGuard
-        input_ports:
-        - acceleration_W [m/s^2]
-        - pose_WB_estimated [m, m, rad]
-        - sensing_fault [number of what is wrong, and of the sensor, from 1]
-        - free_space [FreeSpace]
-        output_ports:
-        - wheel_speeds [rad/s, left and right]
-        - v_WP [m/s, of the virtual mass]
-        - guard_report [number of what was done, m, m, m]
-
-    It stands in the place of ``WheelSpeedCommand``, ``VelocityWheelCommand`` or
-    ``TwistWheelCommand``, whose input it has, and does their work. Then it passes what
-    comes of it if the robot, after a tick of it, can brake to rest so that the disc
-    about the axle that holds the body stays ``margin_m`` off what was never seen free;
-    else less of it along the same curve, or the turn alone, or it brakes. What it
-    changed, the virtual mass moves by.
-
-    With ``obstacle_speed_m_s`` the same holds of what is in the sensors' view now and
+    With ``obstacle_speed_m_s`` the same applies to everything in the sensors' view that
     may come nearer at that speed, unless the robot withdraws from it.
 
-    While something is wrong with the sensing, it brakes to rest, whatever the law
+    While the sensing has a fault, the guard brakes the robot to rest, whatever the law
     commands.
 
-    ``guard_report``: what was done, 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted
-    for a fault of the sensing; by how much the disc is farther from what is not free
-    than it has to be; the way in which the robot can stop; and the first of these for
-    what is in view.
+    ``guard_report``: the action, 0 passed, 1 slowed, 2 turned, 3 braked, 4 halted
+    because of a fault of the sensing; by how much the disc is farther from what is not
+    free than it has to be; the stopping distance; and the first distance again for what
+    is in view.
 
     Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
-    speeds that follow by the motors' lag, a group each. Rate and latency are those of
+    speeds that follow by the lag of the motors. Rate and latency are those of
     ``WheelSpeedCommand``.
 
     Args:
         parameters: ``GuardParameters``.
-        known: Grid of the map, and how far off a cell's place may be.
+        known: Grid of the map, and how far off the place of a cell may be.
         robot: Dimensions and top speed.
         plant: Lag of the motors.
         command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
@@ -160,84 +139,47 @@ class MotionGuard(LeafSystem):
     Ghorbal, Vogelbacher and Platzer (2017).
     """
 
-    FACTS = BlockFacts(
-        "command",
-        "control",
-        columns={
-            "wheel_speeds": ("wheel_speed_left", "wheel_speed_right"),
-            "v_WP": ("v_WP_x", "v_WP_y"),
-            "guard_report": (
+    part = "command"
+    inputs = (
+        Port("acceleration_W", 2, "m/s^2, or another command of the law"),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("sensing_fault", 2, "number of the fault, and of the sensor, from 1"),
+        Port("free_space", OBJECT, "FreeSpace"),
+    )
+    outputs = (
+        Port("wheel_speeds", 2, "rad/s, left and right", WHEEL_SPEED_COLUMNS),
+        Port("v_WP", 2, "m/s, of the virtual mass", ("v_WP_x", "v_WP_y")),
+        Port(
+            "guard_report",
+            4,
+            "number of the action, m, m, m",
+            (
                 "guard_action",
                 "guard_distance",
                 "guard_stopping_distance",
                 "guard_view_distance",
             ),
-        },
+        ),
     )
 
     def __init__(
         self,
         *,
-        parameters: GuardParameters | None = None,
-        known: FreeSpaceParameters | None = None,
-        robot: RobotParameters | None = None,
-        plant: PlantParameters | None = None,
+        parameters: GuardParameters = GuardParameters(),
+        known: FreeSpaceParameters = FreeSpaceParameters(),
+        robot: RobotParameters = RobotParameters(),
+        plant: PlantParameters = PlantParameters(),
         command: str = "acceleration_W",
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._tick_s = tick_s
         self.set_name("motion_guard")
-        self.step = Step(
-            guard_step,
-            _numbers(
-                parameters or GuardParameters(),
-                known or FreeSpaceParameters(),
-                robot or RobotParameters(),
-                plant or PlantParameters(),
-                COMMANDS[command],
-                tick_s,
-            ),
-            [0.0] * sum(_SIZES),
-            _publish_guard,
+        self.inputs = (self.inputs[0]._replace(name=command), *self.inputs[1:])
+        numbers = _numbers(parameters, known, robot, plant, COMMANDS[command], tick_s)
+        self.declare(
+            Step(guard_step, numbers, [0.0] * sum(_SIZES), _publish_guard),
+            tick_s=tick_s,
         )
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in (
-                (command, 2),
-                ("pose_WB_estimated", 3),
-                ("sensing_fault", 2),
-            )
-        ]
-        self._free_space = self.DeclareAbstractInputPort(
-            name="free_space", model_value=Value(object())
-        )
-        groups = [self.DeclareDiscreteState(size) for size in _SIZES]
-        self.DeclareStateOutputPort("wheel_speeds", groups[_WHEEL_SPEEDS])
-        self.DeclareStateOutputPort("v_WP", groups[_V_WP])
-        self.DeclareStateOutputPort("guard_report", groups[_REPORT])
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=tick_s, offset_sec=0.0, update=self._update
-        )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        space = run.carried["free_space"](0)
-        return self.step._replace(numbers=self.step.numbers._replace(space=space))
-
-    def _update(self, context: Any, discrete_state: Any) -> None:
-        inputs, state = read_lists(context, self._inputs), []
-        space: Any = self._free_space.Eval(context)
-        for group in range(len(_SIZES)):
-            state += context.get_discrete_state(group).CopyToVector().tolist()
-        tick = round(context.get_time() / self._tick_s)
-        numbers = self.step.numbers._replace(space=space)
-        guard_step(tick, state, inputs, (), numbers)
-        begin = 0
-        for group, size in enumerate(_SIZES):
-            values = np.array(state[begin : begin + size])
-            discrete_state.set_value(group, values)
-            begin += size
 
 
 def _numbers(
@@ -267,6 +209,5 @@ def _numbers(
     )
     stopping = stopping_way(own, robot, plant, tick_s)
     reach = keep + stopping + 2.0 * known.cell_m, stopping
-    blank = make_free_space(1, known.cell_m, 1, 2)
     kept = math.exp(-tick_s / plant.motor_lag_s)
-    return GuardNumbers(velocity, robot, braking, kept, reach, blank)
+    return GuardNumbers(velocity, robot, braking, kept, reach)

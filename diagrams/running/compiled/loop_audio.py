@@ -31,13 +31,13 @@ def save_sounds(
     """
     for name, ticks in audio.frame_ticks.items():
         robot = robots[name]
-        if "audio" not in robot.facts.carried:
+        if "audio" not in robot.carried:
             raise InputError(
                 "save_audio",
                 f"no block of {name} gives frames to a compiled loop; leave "
                 "--save-audio out, or run with engine drake",
             )
-        frame = robot.facts.carried["audio"]
+        frame = robot.carried["audio"]
         asks = LISTENING in robot.made.sizes
         listening = robot.view(LISTENING) if asks else np.ones(1)
         plan.show(listening, partial(_hear, audio, name, frame), ticks)

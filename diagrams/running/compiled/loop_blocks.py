@@ -6,6 +6,8 @@ from collections.abc import Callable, Mapping
 from functools import cached_property, partial
 from typing import Any
 
+from pydrake.systems.framework import PortDataType
+
 from diagrams.building.robot import (
     OUTSIDE,
     columns_of,
@@ -16,8 +18,8 @@ from diagrams.building.robot import (
 from diagrams.building.world_blocks import radio_nodes, world_blocks
 from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.scenario import Scenario
+from systems.framework.block import RunFacts, Step, _Declared
 from systems.framework.input_error import InputError
-from systems.framework.step_block import RunFacts, Step
 
 #: What blocks take from elsewhere: robots from the world, and it from them.
 _WORLD = *OUTSIDE, "frames"
@@ -56,10 +58,14 @@ class LoopBlocks:
         self.blocks = blocks
         self.sizes: dict[str, int] = {}
         """Of all that the ports carry, by name."""
+        self.objects: set[str] = set()
+        """Names of the ports that carry objects instead of numbers."""
         self.inputs = {part: self._names(b, "input") for part, b in blocks.items()}
         """Names of each part's input ports."""
         self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
         """Names of each part's output ports."""
+        # Until all blocks are derived from ``Block``.
+        self.declared = {p for p, b in blocks.items() if isinstance(b, _Declared)}
         self.columns = columns_of(blocks)
         """What the log holds, in order: the columns of each (part, port)."""
 
@@ -67,6 +73,11 @@ class LoopBlocks:
         port: Callable[[int], Any] = getattr(block, f"get_{kind}_port")
         ports = list(map(port, range(getattr(block, f"num_{kind}_ports")())))
         self.sizes |= {port.get_name(): port.size() for port in ports}
+        self.objects |= {
+            port.get_name()
+            for port in ports
+            if port.get_data_type() == PortDataType.kAbstractValued
+        }
         return [port.get_name() for port in ports]
 
     @cached_property
@@ -74,13 +85,37 @@ class LoopBlocks:
         """Names of what comes from the world."""
         return {*self.sizes}.difference(*self.outputs.values())
 
-    def steps(self, run: RunFacts) -> dict[str, Step]:
+    def steps(
+        self, run: RunFacts
+    ) -> tuple[dict[str, Step], Mapping[str, Callable[[int], Any]]]:
         """What each part does in a run.
+
+        Args:
+            run: The run.
+
+        Returns:
+            The steps by part, and what the ports that carry objects have at a tick,
+            those from outside among them.
 
         Raises:
             InputError: A block of a user's own has no step.
         """
-        return {part: _step_for(block, run) for part, block in self.blocks.items()}
+        # A block that publishes an object comes before those that read it.
+        carried, found = {**run.carried}, dict[str, Step]()
+        run = run._replace(carried=carried)
+        waiting = [*self.blocks]
+        while waiting:
+            missing = {
+                port
+                for part in waiting
+                for port in self.outputs[part]
+                if port in self.objects
+            }
+            part = next(p for p in waiting if not missing.intersection(self.inputs[p]))
+            waiting.remove(part)
+            found[part] = _step_for(self.blocks[part], run)
+            carried |= found[part].carries
+        return {part: found[part] for part in self.blocks}, carried
 
     def order(self, steps: Mapping[str, Step]) -> tuple[list[str], list[str]]:
         """Parts as they do their steps: before the log, or with state outputs after."""

@@ -24,9 +24,9 @@ from diagrams.running.stop_rules import (
 )
 from diagrams.scenario.bodies import Surroundings
 from diagrams.scenario.scenario import Scenario
+from systems.framework.block import RunFacts, Step, has_arrays
 from systems.framework.compiling import njit
 from systems.framework.host_step import HostCall, HostFunction, host_step
-from systems.framework.step_block import RunFacts, Step
 
 #: What a robot is judged by, and sizes of what not every robot has.
 _WATCHED = {
@@ -57,7 +57,7 @@ class LoopWorld:
             partial(block_seed, scenario.seed),
             {},
         )
-        self.made, self.steps = made, made.steps(run)
+        self.made, (self.steps, self.carried) = made, made.steps(run)
         self._views = {port: np.zeros(size) for port, size in made.sizes.items()}
 
     def view(self, port: str) -> NDArray[np.float64]:
@@ -89,7 +89,7 @@ class LoopRobot:
             scenario.mapped(),
             own.route.goal_m if own.route is not None else None,
         )
-        self.made, self.steps = made, made.steps(self.facts)
+        self.made, (self.steps, self.carried) = made, made.steps(self.facts)
         sizes = {**_WATCHED, **made.sizes}
         self._views = {port: np.zeros(size) for port, size in sizes.items()}
         if world is not None:
@@ -138,8 +138,17 @@ class LoopPlan:
         early, late = robot.made.order(robot.steps)
         for part in (*early, *late):
             step, made = robot.steps[part], robot.made
-            inputs = tuple(map(robot.view, made.inputs[part]))
-            outputs = tuple(map(robot.view, made.outputs[part]))
+            inputs = tuple(
+                robot.carried[port](0)
+                if port in made.objects and step.host is None and part in made.declared
+                else robot.view(port)
+                for port in made.inputs[part]
+            )
+            outputs = tuple(
+                robot.view(port)
+                for port in made.outputs[part]
+                if port not in made.objects or part not in made.declared
+            )
             number = self._step(step, inputs, outputs)
             if step.publish is None:
                 self._early.append(number)
@@ -177,7 +186,9 @@ class LoopPlan:
         """The part of a block."""
         if step.host is not None:
             self.hosts.append(step.host)
-        part, state = LoopPart(), np.array(step.state, dtype=float)
+        part, state = LoopPart(), step.state
+        if not has_arrays(state):
+            state = np.array(state, dtype=float)
         values = {"state": state, "inputs": inputs, "outputs": outputs}
         values["numbers"] = step.numbers
         lines = [f"{name} = {part.expression(it)}" for name, it in values.items()]

@@ -71,7 +71,7 @@ def test_it_is_what_a_compiled_loop_holds_at_the_end(monkeypatch):
 
     def kept(self, run):
         step = step_for(self, run)
-        spaces.append(run.carried["free_space"](0))
+        spaces.append(step.state.free_space)
         return step
 
     monkeypatch.setattr(FreeSpaceMap, "step_for", kept)

@@ -177,24 +177,25 @@ STILL = (0.0, 0.0)
 def space_map(**given: Any) -> Any:
     """The numbers of a map whose steps are called by hand."""
     run = RunFacts(0, 0.025, (0, 0, 0), "runge_kutta5", 0.0125, len, {})
-    return FreeSpaceMap(**given).step_for(run).numbers
+    step = FreeSpaceMap(**given).step_for(run)
+    return step.state, step.numbers
 
 
 def test_a_cell_is_known_for_the_way_that_wheel_errors_allow():
     """Of the bubble, 1 m: 0.02 s + 0.04 s (1 + s)/0.41 = 0.03, solved by hand."""
     known = FreeSpaceParameters(wheel_error=0.02, place_error_m=0.03)
-    numbers = space_map(parameters=known, odometry=EXACT)
+    state, numbers = space_map(parameters=known, odometry=EXACT)
     b = 0.02 + 0.04 / 0.41
     lasts = (math.sqrt(b * b + 4.0 * 0.03 * 0.04 / 0.41) - b) / (2.0 * 0.04 / 0.41)
     for tick in range(100):
         way = 0.004 * tick
-        map_step(tick, (), (*BLIND, (way, 0.0, 0.0), STILL), (), numbers)
-        assert numbers.space.facts[0, ROLLED] == pytest.approx(way)
-        behind = cell_is_free(numbers.space, -14, 0, way)
+        map_step(tick, state, (*BLIND, (way, 0.0, 0.0), STILL), (), numbers)
+        assert state.free_space.facts[0, ROLLED] == pytest.approx(way)
+        behind = cell_is_free(state.free_space, -14, 0, way)
         assert behind == (way <= lasts)
         # Under the body space stays known: the body is there.
         for x in (way - 0.3, way, way + 0.3):
-            assert cell_is_free(numbers.space, math.floor(x / 0.05), 0, way)
+            assert cell_is_free(state.free_space, math.floor(x / 0.05), 0, way)
     assert 0.15 < lasts < 0.35
 
 
@@ -207,29 +208,29 @@ def test_the_rolled_way_is_the_mean_of_both_rims(motion, rolled):
 
     A way is counted as an arc's whose chord is given, and 5 % more at most.
     """
-    numbers = space_map(odometry=EXACT)
+    state, numbers = space_map(odometry=EXACT)
     arc = 1.0 if motion[2] == 0.0 else 0.2 / math.sin(0.2)
     longer = arc if rolled == 0.1 else 1.0
     for tick in range(4):
         pose = tuple(tick * each for each in motion)
-        map_step(tick, (), (*BLIND, pose, STILL), (), numbers)
-    found = numbers.space.facts[0, ROLLED]
+        map_step(tick, state, (*BLIND, pose, STILL), (), numbers)
+    found = state.free_space.facts[0, ROLLED]
     assert 3.0 * rolled * longer - 1e-12 <= found <= 3.0 * rolled * longer * 1.05
 
 
 def test_pulses_make_a_tick_count_half_a_pulse_more_and_a_reversal_its_command():
     """q = 0.145 mm; at least 0.083 of 25 ms at the faster wheel's command."""
-    numbers, pulse = space_map(), 0.06 * math.tau / 2600
+    (state, numbers), pulse = space_map(), 0.06 * math.tau / 2600
     least = (2.0 / (1.0 - math.exp(-0.5)) - 4.0 - 1.0) * 0.06 * 0.025
     ways = [(0.01, 0.01, 5.0), (0.01, 0.01, -12.0), (0.0, 0.0, 0.0)]
     ways += [(0.0, 12.0 * least, 12.0), (0.0, 6.0 * least, -6.0)]
     x, tick = 0.0, 0
-    map_step(tick, (), (*BLIND, (x, 0.0, 0.0), STILL), (), numbers)
+    map_step(tick, state, (*BLIND, (x, 0.0, 0.0), STILL), (), numbers)
     for moved, counted, command in ways:
-        before, x, tick = numbers.space.facts[0, ROLLED], x + moved, tick + 1
+        before, x, tick = state.free_space.facts[0, ROLLED], x + moved, tick + 1
         commanded = (command, -0.5 * command)
-        map_step(tick, (), (*BLIND, (x, 0.0, 0.0), commanded), (), numbers)
-        found = numbers.space.facts[0, ROLLED] - before
+        map_step(tick, state, (*BLIND, (x, 0.0, 0.0), commanded), (), numbers)
+        found = state.free_space.facts[0, ROLLED] - before
         assert found == pytest.approx(counted + 0.5 * pulse, abs=1e-12)
 
 
