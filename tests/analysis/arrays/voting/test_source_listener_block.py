@@ -8,16 +8,16 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from systems import SourceListener
-from systems.base.robot import RobotParameters, microphones_B
-from systems.framework.input_error import InputError
-from systems.framework.signals import AudioFrame
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     hear_sources,
 )
+from analysis.arrays.voting.source_listener_block import SourceListener
+from systems.base.robot import RobotParameters, microphones_B
+from systems.framework.input_error import InputError
+from systems.framework.signals import AudioFrame
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters
