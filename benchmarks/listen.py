@@ -25,13 +25,13 @@ from typing import Any
 
 import numpy as np
 
-from studies.support.talker_trials import TALKER_ARRAYS, draw_talkers, record_talkers
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     hear_sources,
 )
+from studies.support.talker_trials import TALKER_ARRAYS, draw_talkers, record_talkers
 from systems.sound.array_shape import ArrayShape
 
 RATE, BLOCK_S, LOOP_S = 48_000, 0.01, 10.0

@@ -12,6 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from analysis.arrays.voting.source_listener_block import SourceListener
     from analysis.exports.columns import columns
     from analysis.recordings.array_geometry import ArrayGeometry
     from analysis.recordings.locate import locate
@@ -38,6 +39,7 @@ __all__ = [
     "RunResult",
     "Scenario",
     "SourceEstimate",
+    "SourceListener",
     "StabilityResult",
     "SweepPlan",
     "SweepResult",
@@ -65,6 +67,7 @@ _HOMES = {
     "RunResult": "phonotaxis.runs",
     "Scenario": "diagrams.scenario.scenario",
     "SourceEstimate": "analysis.recordings.locate_result",
+    "SourceListener": "analysis.arrays.voting.source_listener_block",
     "StabilityResult": "phonotaxis.studies",
     "SweepPlan": "analysis.sweeps.plan",
     "SweepResult": "phonotaxis.studies",

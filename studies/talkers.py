@@ -20,6 +20,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
+    ListenerMemory,
+    ListenerParameters,
+    TrackedSources,
+    hear_sources,
+)
 from analysis.hearing.synthetic_speech import speech_like
 from analysis.recordings.heard_sources import HeardSources, heard_sources
 from studies.support.figures import Figure, bounds_table
@@ -50,13 +57,6 @@ from studies.support.talker_trials import (
     with_noise,
 )
 from studies.tables import Table
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
-    ListenerMemory,
-    ListenerParameters,
-    TrackedSources,
-    hear_sources,
-)
 from systems.sound.array_shape import ArrayShape
 
 C = 343.0

@@ -31,7 +31,6 @@ from .hearing.tracking.source_tracker import (
     SourceTracker as SourceTracker,
     SourceTracker_ as SourceTracker_,
 )
-from .hearing.voting.source_listener_block import SourceListener as SourceListener
 from .laws.active_impedance_2017_controller import (
     ActiveImpedance2017Controller as ActiveImpedance2017Controller,
     ActiveImpedance2017Controller_ as ActiveImpedance2017Controller_,

@@ -33,11 +33,12 @@ from functools import partial
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-#: What is mutated unless modules are named: the blocks, and what computes verdicts,
-#: metrics, statistics and claims.
+#: What is mutated unless modules are named: the blocks, and what computes places from
+#: recordings, verdicts, metrics, statistics and claims.
 MODULES = (
     "systems/*/*.py",
     "diagrams/running/stop_rules.py",
+    "analysis/arrays/*.py",
     "analysis/reporting/intervals.py",
     "analysis/runs/metrics.py",
     "analysis/runs/proximity.py",

@@ -8,9 +8,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.calibration.wave_fronts import WaveFront, wave_front
 from systems.framework.input_error import InputError
-from systems.sound.array_budget import ArrayBudget
 
 # Directions with less than this share of the largest variance are known exactly.
 _EXACT = 1e-14

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.calibration.array_unknowns import ArrayUnknowns
 from analysis.calibration.measured_sound import MeasuredSound, check_sounds
 from analysis.calibration.sound_places import SoundPlace
 from systems.hearing.multilateration import whitening_matrix
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 _STEPS = 200

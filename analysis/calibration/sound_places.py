@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.far_field import locate_far_source
 from analysis.calibration.measured_sound import MeasuredSound
 from analysis.calibration.wave_fronts import WaveFront
-from systems.hearing.far_field import locate_far_source
 from systems.hearing.multilateration import locate_source
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 # An unknown source is rarely nearer than this share of the aperture: so weak that

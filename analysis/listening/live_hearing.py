@@ -11,20 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.voting.direction_votes import VotePlan
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
+    ListenerMemory,
+    ListenerParameters,
+    TrackedSources,
+    hear_sources,
+)
 from analysis.listening.live_faults import LiveFaults
 from analysis.listening.sound_stream import SoundBlock, SoundStream, StreamBrokenError
 from analysis.recordings.array_geometry import ArrayGeometry
 from analysis.recordings.array_match import array_mismatch, chosen_microphones
 from analysis.recordings.channel_faults import ChannelFault
 from systems.framework.input_error import InputError
-from systems.hearing.voting.direction_votes import VotePlan
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
-    ListenerMemory,
-    ListenerParameters,
-    TrackedSources,
-    hear_sources,
-)
 
 _BAND_HZ = (200.0, 15_000.0)
 _TOP_OF_RATE = 0.45

@@ -8,9 +8,9 @@ import shutil
 from types import TracebackType
 from typing import Protocol, TextIO
 
+from analysis.arrays.voting.source_listener import TrackedSources
+from analysis.arrays.voting.source_tracks import SourceTrack
 from analysis.listening.live_hearing import HeardStep, track_document
-from systems.hearing.voting.source_listener import TrackedSources
-from systems.hearing.voting.source_tracks import SourceTrack
 
 # Columns of the compass, which is odd so that ahead is in its middle, and its least.
 _COLUMNS, _LEAST_COLUMNS = 73, 25

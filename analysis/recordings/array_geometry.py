@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import Field, Strict, ValidationError, model_validator
 
+from analysis.arrays.array_budget import ArrayBudget
 from diagrams.scenario.yaml_text import parse_yaml
 from systems.framework.input_error import InputError
 from systems.framework.input_files import require_file
 from systems.framework.parameters import Parameters, Point, Positive
 from systems.sound.acoustics import AcousticParameters, sound_speed
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 # Positions that are farther apart are in other units than metres.

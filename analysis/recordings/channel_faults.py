@@ -15,11 +15,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.pair_correlations import PairCorrelations, correlate_pairs
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_order import FrameDelays, exchanged_channels, misfit
 from analysis.recordings.delay_scale import REACHES_M, DelayScale, delay_scale
 from systems.delays.copied_channels import copied_pairs
-from systems.delays.pair_correlations import PairCorrelations, correlate_pairs
 from systems.sound.array_shape import ArrayShape
 
 # Below the median of all channels by this, a channel is dead, dB; above it by

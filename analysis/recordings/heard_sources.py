@@ -9,16 +9,16 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.hearing.voting.direction_votes import (
+from analysis.arrays.voting.direction_votes import (
     DirectionVotes,
     VotePlan,
     cast_votes,
     join_votes,
 )
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import ListenerParameters, follow_sources
-from systems.hearing.voting.steady_sound import is_steady, steered_only
-from systems.hearing.voting.vote_peaks import VotedSource, gather_sources
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import ListenerParameters, follow_sources
+from analysis.arrays.voting.steady_sound import is_steady, steered_only
+from analysis.arrays.voting.vote_peaks import VotedSource, gather_sources
 from systems.sound.array_shape import ArrayShape
 
 # Samples of a channel that vote at once.

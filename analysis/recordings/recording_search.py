@@ -12,15 +12,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
-from analysis.recordings.recording_spectra import RecordingSpectra
-from systems.delays.consistent_lags import consistent_lags
-from systems.hearing.steered_response import (
+from analysis.arrays.steered_response import (
     LAG_DENSITY,
     SearchGrid,
     centroid_delays,
     steered_response,
 )
+from analysis.recordings.aligned_delays import AlignedDelays, fit_aligned_delays
+from analysis.recordings.recording_spectra import RecordingSpectra
+from systems.delays.consistent_lags import consistent_lags
 from systems.sound.array_shape import ArrayShape
 
 # Least mean weight of a stretch's snapshots: the rest is silence or echo.

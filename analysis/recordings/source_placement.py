@@ -13,13 +13,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.far_field import locate_far_source
+from analysis.arrays.range_posterior import FARTHEST_M, range_posterior
 from analysis.recordings.aligned_delays import AlignedDelays
 from analysis.recordings.array_geometry import KnownArray
-from systems.hearing.far_field import locate_far_source
 from systems.hearing.multilateration import angles_of, locate_source
-from systems.hearing.range_posterior import FARTHEST_M, range_posterior
-from systems.hearing.source_fix import SourceFix
-from systems.hearing.steered_response import NEAREST_M
+from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 # Reflections move each channel by its own, for each part that is not coherent by

@@ -18,7 +18,7 @@ from analysis.recordings.channel_faults import ChannelFault
 from analysis.recordings.recording_search import Sighting
 from analysis.recordings.source_placement import tolerance
 from systems.hearing.multilateration import locate_source, whitening_matrix
-from systems.hearing.steered_response import NEAREST_M
+from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
 # Stretches that are looked at; they lie anywhere in the recording.

@@ -15,9 +15,9 @@ import pyroomacoustics as pra
 from numpy.typing import NDArray
 from scipy.signal import find_peaks
 
+from analysis.arrays.voting.direction_votes import DirectionVotes
+from analysis.arrays.voting.vote_peaks import gather_sources
 from studies.support.talker_rooms import RATE, Recording
-from systems.hearing.voting.direction_votes import DirectionVotes
-from systems.hearing.voting.vote_peaks import gather_sources
 
 C = 343.0
 N_FFT, HOP, GRID = 512, 256, 180

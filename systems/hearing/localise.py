@@ -22,8 +22,7 @@ from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ
 from systems.hearing.coherent import arrival_delays, refine_source
 from systems.hearing.multilateration import locate_source
 from systems.hearing.parameters import TDOAParameters
-from systems.hearing.source_fix import SourceFix
-from systems.hearing.steered_response import NEAREST_M
+from systems.hearing.source_fix import NEAREST_M, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 # From this correlation on, a frame holds hardly anything but the direct sound; and

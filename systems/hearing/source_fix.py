@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 from systems.sound.array_shape import ArrayShape
 
+#: A source nearer than this to the centroid is not believed, m.
+NEAREST_M = 0.2
+
 
 @dataclass(frozen=True)
 class SourceFix:

@@ -7,6 +7,8 @@ import math
 import numpy as np
 import pytest
 
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
+from analysis.arrays.voting.vote_peaks import gather_sources
 from studies.support.moving_talkers import moving_sound
 from studies.support.talker_trials import (
     TALKER_ARRAYS,
@@ -14,8 +16,6 @@ from studies.support.talker_trials import (
     record_talkers,
     score_bearings,
 )
-from systems.hearing.voting.direction_votes import VotePlan, cast_votes
-from systems.hearing.voting.vote_peaks import gather_sources
 from systems.sound.array_shape import ArrayShape
 
 

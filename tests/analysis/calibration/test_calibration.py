@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.calibration.calibration import calibrate_array
 from analysis.calibration.calibration_misfit import calibration_misfit
 from analysis.calibration.measured_sound import MeasuredSound
@@ -19,7 +20,6 @@ from analysis.calibration.observability import (
 )
 from analysis.calibration.wave_fronts import wave_front
 from systems.framework.input_error import InputError
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 from tests.analysis.calibration.arrays import (
     LATE_STD,

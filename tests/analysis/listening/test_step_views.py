@@ -9,10 +9,10 @@ import math
 import numpy as np
 import pytest
 
+from analysis.arrays.voting.source_listener import TrackedSources
+from analysis.arrays.voting.source_tracks import SourceTrack
 from analysis.listening.live_hearing import HeardStep
 from analysis.listening.step_views import JsonLines, Screen, TextLines, view
-from systems.hearing.voting.source_listener import TrackedSources
-from systems.hearing.voting.source_tracks import SourceTrack
 
 
 def track(identity: int, bearing_deg: float, *, sounding: float = 0.9) -> SourceTrack:

@@ -8,9 +8,9 @@ import warnings
 import numpy as np
 import pytest
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.channel_faults import find_channel_faults
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 FS, C, SECONDS = 16_000, 340.0, 3.0

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.recordings.array_geometry import KnownArray
 from analysis.recordings.recording_search import Sighting
 from analysis.recordings.wavefront_misfit import channel_lateness, late_channel
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from pydrake.systems.framework import LeafSystem
 
+from analysis.arrays.voting.source_listener_block import SourceListener
 from analysis.listening.live_hearing import HeardStep, LiveHearing, listen
 from analysis.listening.sound_pipe import open_pipe
 from analysis.recordings.array_geometry import load_geometry
@@ -20,7 +21,6 @@ from diagrams import (
     make_simulator,
     simulate,
 )
-from systems import SourceListener
 
 SECONDS = 1.5
 # The robot is all but at rest, and has the source to its left.

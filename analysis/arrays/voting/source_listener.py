@@ -8,22 +8,22 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.framework.parameters import Parameters, Positive
-from systems.hearing.voting.direction_votes import (
+from analysis.arrays.voting.direction_votes import (
     DirectionVotes,
     VoteMemory,
     VotePlan,
     cast_votes,
     join_votes,
 )
-from systems.hearing.voting.source_tracks import (
+from analysis.arrays.voting.source_tracks import (
     Detection,
     SourceTrack,
     TrackMemory,
     TrackParameters,
     step_tracks,
 )
-from systems.hearing.voting.vote_peaks import gather_sources
+from analysis.arrays.voting.vote_peaks import gather_sources
+from systems.framework.parameters import Parameters, Positive
 
 # Bins that vote for a source in a window, for each second of it, and at least.
 _VOTES_S, _LEAST_VOTES = 20.0, 6.0

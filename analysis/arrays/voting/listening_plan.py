@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from systems.hearing.voting.direction_votes import VotePlan
+from analysis.arrays.voting.direction_votes import VotePlan
 from systems.sound.array_shape import ArrayShape
 
 # Speech and most noises have what is told apart below this.

@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.hearing.voting.direction_votes import DirectionVotes
+from analysis.arrays.voting.direction_votes import DirectionVotes
 
 # Steady is what scatters by less; halfway, in dB, from noise to speech.
 _STEADY_DB = 4.4

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from analysis.arrays.array_budget import ArrayBudget
 from systems.framework.compiling import njit
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 #: Ranges beyond are told by no array, m.

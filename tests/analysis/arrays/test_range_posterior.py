@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from systems.hearing.range_posterior import range_posterior
-from systems.sound.array_budget import ArrayBudget
+from analysis.arrays.array_budget import ArrayBudget
+from analysis.arrays.range_posterior import range_posterior
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.hearing.steered_response import LAG_DENSITY, SearchGrid, steered_response
+from analysis.arrays.steered_response import LAG_DENSITY, SearchGrid, steered_response
 from systems.sound.array_shape import ArrayShape
 
 # A frame's peaks count above this share of its highest, and above so many deviations

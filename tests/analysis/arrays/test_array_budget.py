@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.arrays.array_budget import ArrayBudget
 from analysis.hearing.sensitivity import ArrayErrors, predicted_std
 from systems.hearing.multilateration import locate_source
-from systems.sound.array_budget import ArrayBudget
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 from scipy.optimize import least_squares
 
-from systems.hearing.far_field import locate_far_source
+from analysis.arrays.far_field import locate_far_source
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from systems.framework.compiling import njit
+from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
 # Between two neighbours of the grid a pair's path changes by less than twice
@@ -32,8 +33,6 @@ _COARSER = 1.25
 
 # Sources are sought from this many apertures on by direction and inverse range.
 _OUTSIDE = 0.6
-#: A source nearer than this to the centroid is not believed, m.
-NEAREST_M = 0.2
 
 # Amid a large array places are sought down to this share of that, so that a
 # source which is too near is not taken for one farther off.

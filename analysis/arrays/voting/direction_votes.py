@@ -3,7 +3,7 @@
 Of several people who talk at once, one is far louder than the others at most times and
 frequencies: averages over all of them lie between the talkers, single ones do not. Each
 bin in which one wave alone reaches the array votes for a direction (after Mohan et al.
-2008, and Pavlidi et al. 2013); ``systems.hearing.voting.vote_peaks`` gathers the votes.
+2008, and Pavlidi et al. 2013); ``analysis.arrays.voting.vote_peaks`` gathers the votes.
 What is no louder than an echo of what came before does not vote.
 
 The band ends where sound along the array's shortest pairs turns by half a period:
@@ -20,14 +20,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import fft
 
-from systems.framework.input_error import InputError
-from systems.hearing.voting.phase_plane import PhasePlane
-from systems.hearing.voting.rank_one_bins import (
+from analysis.arrays.voting.phase_plane import PhasePlane
+from analysis.arrays.voting.rank_one_bins import (
     GROUP_FRAMES,
     find_rank_one,
     group_powers,
 )
-from systems.hearing.voting.steered_votes import SteeredSearch
+from analysis.arrays.voting.steered_votes import SteeredSearch
+from systems.framework.input_error import InputError
 from systems.sound.array_shape import ArrayShape
 
 _FRAME_S = 0.032

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from systems.hearing.steered_response import (
+from analysis.arrays.steered_response import (
     LAG_DENSITY,
-    NEAREST_M,
     SearchGrid,
     centroid_delays,
     steered_response,
 )
+from systems.hearing.source_fix import NEAREST_M
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0

@@ -7,16 +7,16 @@ from typing import Any, NamedTuple
 from pydrake.common.value import Value
 from pydrake.systems.framework import LeafSystem
 
-from systems.base.robot import RobotParameters, microphones_B
-from systems.framework.block_facts import BlockFacts
-from systems.hearing.audio_port import check_rate, read_audio
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     TrackedSources,
     hear_sources,
 )
+from systems.base.robot import RobotParameters, microphones_B
+from systems.framework.block_facts import BlockFacts
+from systems.hearing.audio_port import check_rate, read_audio
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from systems.hearing.voting.direction_votes import DirectionVotes
+from analysis.arrays.voting.direction_votes import DirectionVotes
 
 _CELLS = 360
 

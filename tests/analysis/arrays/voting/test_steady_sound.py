@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from scipy.special import polygamma
 
-from analysis.hearing.synthetic_speech import speech_like
-from systems.hearing.voting.direction_votes import VotePlan, cast_votes
-from systems.hearing.voting.steady_sound import (
+from analysis.arrays.voting.direction_votes import VotePlan, cast_votes
+from analysis.arrays.voting.steady_sound import (
     is_steady,
     level_scatter_db,
     steered_only,
 )
+from analysis.hearing.synthetic_speech import speech_like
 from systems.sound.array_shape import ArrayShape
 
 RATE, C = 16_000, 343.0

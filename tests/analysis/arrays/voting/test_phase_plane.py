@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.arrays.voting.phase_plane import PhasePlane
 from studies.support.talker_trials import TALKER_ARRAYS
-from systems.hearing.voting.phase_plane import PhasePlane
 from systems.sound.array_shape import ArrayShape
 
 C = 343.0

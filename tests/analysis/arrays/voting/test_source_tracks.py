@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from systems.hearing.voting.source_tracks import (
+from analysis.arrays.voting.source_tracks import (
     Detection,
     TrackMemory,
     TrackParameters,

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 import pytest
 from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
-from systems import SourceListener
-from systems.base.robot import RobotParameters, microphones_B
-from systems.framework.input_error import InputError
-from systems.framework.signals import AudioFrame
-from systems.hearing.voting.listening_plan import vote_plan
-from systems.hearing.voting.source_listener import (
+from analysis.arrays.voting.listening_plan import vote_plan
+from analysis.arrays.voting.source_listener import (
     ListenerMemory,
     ListenerParameters,
     hear_sources,
 )
+from analysis.arrays.voting.source_listener_block import SourceListener
+from systems.base.robot import RobotParameters, microphones_B
+from systems.framework.input_error import InputError
+from systems.framework.signals import AudioFrame
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters
@@ -89,4 +91,11 @@ def test_frames_through_the_block_give_the_tracks_of_the_pure_function():
 def test_frames_of_another_rate_are_refused():
     simulator, _ = listening(noise_from(0.0), rate=48_000.0)
     with pytest.raises(InputError, match="48000 Hz; record at 16000 Hz"):
+        simulator.AdvanceTo(0.1)
+
+
+def test_a_rate_that_is_not_finite_is_refused():
+    simulator, _ = listening(noise_from(0.0), rate=math.nan)
+    message = r"SourceListener: audio\.sample_rate_hz is nan at 0 s, "
+    with pytest.raises(ValueError, match=message):
         simulator.AdvanceTo(0.1)

@@ -1,0 +1,1 @@
+"""What an array tells of sounds: directions, ranges, sources, and their errors."""
