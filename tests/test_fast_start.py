@@ -122,7 +122,7 @@ def test_blocks_load_no_plotting(package):
         "print(*sys.modules)"
     )
     loaded = printed_by(code)
-    assert f"{package}.world" in loaded or f"{package}.builder" in loaded
+    assert f"{package}.world" in loaded or f"{package}.building" in loaded
     slow = {"matplotlib", "control", "pydrake.all", "scipy.signal", "scipy.stats"}
     assert not slow & loaded
 
