@@ -18,6 +18,12 @@ from .base.wheel_speed_command import (
     WheelSpeedCommand as WheelSpeedCommand,
     WheelSpeedCommand_ as WheelSpeedCommand_,
 )
+from .framework.block import (
+    OBJECT as OBJECT,
+    Block as Block,
+    Port as Port,
+    Step as Step,
+)
 from .heading.compass import MagneticHeading as MagneticHeading
 from .heading.heading_controller import HeadingController as HeadingController
 from .heading.motor_driver import MotorDriver as MotorDriver

@@ -19,6 +19,7 @@ from pydrake.systems.framework import LeafSystem, LeafSystem_
 
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays, read_lists
+from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, tick_noise
 from systems.framework.scalar_math import float_of
 
@@ -144,7 +145,7 @@ def copied(state: Any) -> Any:
 class _Declared:
     """The declaration of a block, and what is made of it."""
 
-    part: ClassVar[str] = "controller"
+    part: ClassVar[str] = ""
     """The role of the block in its robot, as ``plant`` or ``tracker``. A block replaces
     another one by having the same part."""
     stage: ClassVar[Stage] = "control"
@@ -301,7 +302,16 @@ class _Declared:
 
         Returns:
             The step, with a state of its own and the noise of the run.
+
+        Raises:
+            InputError: The block has no step.
         """
+        if not hasattr(self, "step"):
+            raise InputError(
+                "engine",
+                f"{self.get_name()} has no step, which a compiled loop needs; declare "
+                "one, or run with engine drake",
+            )
         step: Step = self.step
         if isinstance(getattr(step.numbers, "noise", None), TickNoise):
             noise = tick_noise(run.seed_of(self.get_name()))
@@ -405,8 +415,8 @@ def _field_at(state: Any, name: str, _tick: int) -> Any:
 
 
 def part_of(system: Any) -> str:
-    """The part of a system; that of a system that is no ``Block`` is ``controller``."""
-    return str(getattr(system, "part", _Declared.part))
+    """The part of a system; that of a system that states none is ``controller``."""
+    return getattr(system, "part", "") or "controller"
 
 
 def _with_port_table(cls: Any) -> str:
