@@ -270,6 +270,7 @@ class PlumeSearch(Block):
     Reference: Song 2011, 2.3.3 and 4.2; the gate and ``upwind_gradient`` are ours.
     """
 
+    part = "controller"
     inputs = (
         Port("gas_ratio", 3, "1, right front, rear and left front"),
         Port("airflow", 2, "1, left and right"),

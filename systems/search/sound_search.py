@@ -295,6 +295,7 @@ class SoundSearch(Block):
     Reference: Song 2011, 3.2.3 and 4.3; the stop by range, and who waits, are ours.
     """
 
+    part = "controller"
     inputs = (
         Port("source_bearing", 1, "rad"),
         Port("source_range", 1, "m"),
