@@ -22,6 +22,7 @@ BLOCKS: dict[str, Any] = {
     for name in systems.__all__
     if inspect.isclass(value := getattr(systems, name))
     and issubclass(value, LeafSystem)
+    and value is not systems.Block
 } | {"SourceListener": SourceListener}
 #: Those that convert to other scalars.
 TEMPLATED = {name for name in BLOCKS if hasattr(systems, f"{name}_")}

@@ -41,6 +41,7 @@ BLOCKS: dict[str, tuple[dict[str, Any], ...]] = {
     for name in systems.__all__
     if inspect.isclass(block := getattr(systems, name))
     and issubclass(block, LeafSystem)
+    and block is not systems.Block
 } | {
     # Fired at once, it reads neither ages nor pose.
     "CollisionVector": ({"sensors": UltrasonicParameters(firing="sequential")},),
