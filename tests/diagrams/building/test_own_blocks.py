@@ -69,7 +69,7 @@ def test_the_pages_block_stands_in_the_place_of_ours(folder):
     assert result.columns["rear_range"].min() == pytest.approx(0.2, abs=0.05)
     follower = build_sound_follower(result.full_scenario)
     assert follower.blocks["command"].get_name() == "careful_command"
-    assert not follower.robots["robot"].diagram.HasSubsystemNamed("wheel_speed_command")
+    assert not follower.robots["robot"].diagram.HasSubsystemNamed("wheel_command")
 
 
 def test_a_sweep_knows_the_files_of_blocks(folder):
