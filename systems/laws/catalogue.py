@@ -4,18 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from systems.laws.active import ACTIVE
+from systems.laws.active_2017 import ACTIVE_2017
 from systems.laws.baselines.records import DWA, MPPI, ORCA, STOP_WHEN_NEAR, VFH_PLUS
+from systems.laws.conventional import CONVENTIONAL
+from systems.laws.conventional_2017 import CONVENTIONAL_2017
+from systems.laws.guarded import GUARDED
 from systems.laws.law import Law
-from systems.laws.records import (
-    ACTIVE,
-    ACTIVE_2017,
-    CONVENTIONAL,
-    CONVENTIONAL_2017,
-    GUARDED,
-    NONE,
-    PLUME_SEARCH,
-    SOUND_SEARCH,
-)
+from systems.laws.no_avoidance import NONE
+from systems.laws.searches import PLUME_SEARCH, SOUND_SEARCH
 from systems.laws.trajectory.trajectory_laws import (
     TRAJECTORY_ADAPTIVE,
     TRAJECTORY_CONVENTIONAL,

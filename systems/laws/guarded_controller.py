@@ -15,7 +15,8 @@ from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import RunFacts, Step
-from systems.laws.parameters import AttractionParameters, GuardedParameters
+from systems.laws.guarded import GuardedParameters
+from systems.laws.parameters import AttractionParameters
 from systems.planning.evasion import EvasionNumbers
 from systems.planning.guarded_drive import (
     AT_TICK,
