@@ -31,19 +31,19 @@ from .hearing.tracking.source_tracker import (
     SourceTracker as SourceTracker,
     SourceTracker_ as SourceTracker_,
 )
-from .laws.baselines.dynamic_window import (
+from .laws.baselines.dynamic_window_controller import (
     DynamicWindowController as DynamicWindowController,
 )
-from .laws.baselines.path_integral import (
+from .laws.baselines.path_integral_controller import (
     PathIntegralController as PathIntegralController,
 )
-from .laws.baselines.reciprocal_avoidance import (
+from .laws.baselines.reciprocal_avoidance_controller import (
     ReciprocalAvoidanceController as ReciprocalAvoidanceController,
 )
-from .laws.baselines.stop_when_near import (
+from .laws.baselines.stop_when_near_controller import (
     StopWhenNearController as StopWhenNearController,
 )
-from .laws.baselines.vector_field_histogram import (
+from .laws.baselines.vector_field_histogram_controller import (
     VectorFieldHistogramController as VectorFieldHistogramController,
 )
 from .laws.guarded_controller import GuardedController as GuardedController

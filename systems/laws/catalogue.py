@@ -6,7 +6,11 @@ from collections.abc import Mapping
 
 from systems.laws.active import ACTIVE
 from systems.laws.active_2017 import ACTIVE_2017
-from systems.laws.baselines.records import DWA, MPPI, ORCA, STOP_WHEN_NEAR, VFH_PLUS
+from systems.laws.baselines.dynamic_window import DWA
+from systems.laws.baselines.path_integral import MPPI
+from systems.laws.baselines.reciprocal_avoidance import ORCA
+from systems.laws.baselines.stop_when_near import STOP_WHEN_NEAR
+from systems.laws.baselines.vector_field_histogram import VFH_PLUS
 from systems.laws.conventional import CONVENTIONAL
 from systems.laws.conventional_2017 import CONVENTIONAL_2017
 from systems.laws.guarded import GUARDED

@@ -7,8 +7,8 @@ import math
 import numpy as np
 import pytest
 
-from systems.laws.baselines.parameters import VectorFieldHistogramParameters
-from systems.laws.baselines.vector_field_histogram import (
+from systems.laws.baselines.vector_field_histogram import VectorFieldHistogramParameters
+from systems.laws.baselines.vector_field_histogram_controller import (
     HistogramNumbers,
     choose_direction,
     polar_histogram,

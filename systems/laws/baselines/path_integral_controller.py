@@ -1,0 +1,366 @@
+"""Baseline: model predictive path integral control on a global plan, as in Nav2."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from systems.base.robot import RobotParameters, body_radius
+from systems.framework.block import OBJECT, Port, RunFacts, Step
+from systems.framework.compiling import njit
+from systems.framework.signals import TICK_S
+from systems.laws.baselines.baseline_controller import (
+    BaselineController,
+    half_size,
+    speed_limits,
+)
+from systems.laws.baselines.path_integral import PathIntegralParameters
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.planning.carrot import find_carrot
+from systems.planning.following import FollowNumbers, wanted_speed
+from systems.planning.occupied import list_occupied
+from systems.planning.parameters import FollowingParameters
+from systems.planning.turning import wrapped
+from systems.planning.way import Way, find_way, make_way
+from systems.safety.parameters import FreeSpaceParameters
+
+#: Half of the window of the distances, m; it holds what a horizon reaches.
+_WINDOW_M = 2.5
+#: Rounds for which random numbers are drawn; then they come again.
+_ROUNDS = 16
+#: Discs that cover the body from side to side.
+_DISCS = 3
+#: A way no longer than so many times the straight line is straight; of another one
+#: places up to so far away are headed for, m.
+_DETOUR, _LOOK_AHEAD_M = 1.15, 1.5
+#: Of a step between cells across a corner.
+_ACROSS = math.sqrt(2.0)
+
+
+class RollNumbers(NamedTuple):
+    """What a sequence and its cost depend on; see ``PathIntegralParameters``."""
+
+    samples: int
+    step_s: float
+    spread: tuple[float, float]
+    """Of speeds, m/s, and yaw rates, rad/s."""
+    limits: tuple[float, float, float]
+    """Least and largest speed, m/s, and largest yaw rate, rad/s."""
+    temperature: float
+    control_gain: float
+    gains: tuple[float, float, float, float, float]
+    """Of goal, angle, forward, obstacle and collision."""
+    inflation_m: float
+    discs: tuple[float, float]
+    """Distance of the outer discs from the axle's middle, and their radius with what
+    is kept off, m."""
+    control_point_m: float
+
+
+class PathIntegralNumbers(NamedTuple):
+    """What the step of ``PathIntegralController`` depends on."""
+
+    own: PathIntegralParameters
+    roll: RollNumbers
+    follow: FollowNumbers
+    radius_m: float
+    """Of the disc for which ways are sought, m."""
+    period_ticks: int
+    noise: NDArray[np.float64]
+    """(sequences, steps, 2) of standard deviation 1."""
+
+
+class PathIntegralState(NamedTuple):
+    """The state of ``PathIntegralController``."""
+
+    plan: NDArray[np.float64]
+    """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
+    way: Way
+    """Room for the way, which is sought anew each time."""
+
+
+@njit(cache=True)
+def distance_field(
+    places: Any, x: float, y: float, half: float, cell: float
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """Distances of cells around a place from the nearest of some others.
+
+    Args:
+        places: (n, 3) middles of these, m.
+        x: Middle of the window, m.
+        y: See x.
+        half: Half of its side, m.
+        cell: Side of a cell, m.
+
+    Returns:
+        (m, m) m, along steps to neighbours: up to 8 % more than straight.
+    """
+    size = 2 * math.ceil(half / cell) + 1
+    field = np.full((size, size), 1e6)
+    for n in range(len(places)):
+        i = math.floor((places[n, 0] - x) / cell + 0.5 * size)
+        j = math.floor((places[n, 1] - y) / cell + 0.5 * size)
+        if 0 <= i < size and 0 <= j < size:
+            field[i, j] = 0.0
+    for sign in (1, -1):
+        order = range(size) if sign > 0 else range(size - 1, -1, -1)
+        for i in order:
+            for q in range(size):
+                j = q if sign > 0 else size - 1 - q
+                best = field[i, j]
+                if 0 <= j - sign < size:
+                    best = min(best, field[i, j - sign] + cell)
+                if 0 <= i - sign < size:
+                    best = min(best, field[i - sign, j] + cell)
+                    for k in (j - 1, j + 1):
+                        if 0 <= k < size:
+                            best = min(best, field[i - sign, k] + _ACROSS * cell)
+                field[i, j] = best
+    return field
+
+
+@njit(cache=True)
+def roll_out(
+    controls: Any,
+    noise: Any,
+    first: int,
+    pose: Any,
+    goal: Any,
+    field: Any,
+    cell: float,
+    numbers: RollNumbers,
+) -> None:  # pragma: no cover  (compiled)
+    """Replaces a sequence of motions by the mean of many, weighted by their costs.
+
+    Args:
+        controls: (steps, 2) speed, m/s, and yaw rate, rad/s; changed.
+        noise: As of ``PathIntegralNumbers``.
+        first: Sequence of noise with which to begin.
+        pose: (x, y, theta) of the axle, m and rad.
+        goal: Where P should be, m, and how fast that moves, m/s: x, y, vx, vy.
+        field: From ``distance_field`` around the axle, m.
+        cell: Of the field, m.
+        numbers: Spreads, limits and costs.
+    """
+    samples, steps = numbers.samples, len(controls)
+    costs, tried = np.empty(samples), np.empty((samples, steps, 2))
+    for n in range(samples):
+        row = noise[(first + n) % len(noise)]
+        costs[n] = _cost(controls, row, tried[n], pose, goal, field, cell, numbers)
+    least, total = np.min(costs), 0.0
+    mean = np.zeros((steps, 2))
+    for n in range(samples):
+        weight = math.exp(-(costs[n] - least) / numbers.temperature)
+        total += weight
+        for k in range(steps):
+            mean[k, 0] += weight * tried[n, k, 0]
+            mean[k, 1] += weight * tried[n, k, 1]
+    for k in range(steps):
+        controls[k, 0], controls[k, 1] = mean[k, 0] / total, mean[k, 1] / total
+
+
+@njit(cache=True)
+def _cost(
+    controls: Any,
+    noise: Any,
+    tried: Any,
+    pose: Any,
+    goal: Any,
+    field: Any,
+    cell: float,
+    numbers: RollNumbers,
+) -> float:  # pragma: no cover  (compiled)
+    """Fills the sequence that is tried, and says what it costs."""
+    least, most, turn = numbers.limits
+    to_goal, to_angle, forward, obstacle, collision = numbers.gains
+    aside, radius = numbers.discs
+    steps, dt, half = len(controls), numbers.step_s, 0.5 * len(field)
+    x, y, theta, total = 0.0, 0.0, pose[2], 0.0
+    for k in range(steps):
+        v = controls[k, 0] + numbers.spread[0] * noise[k, 0]
+        w = controls[k, 1] + numbers.spread[1] * noise[k, 1]
+        v, w = min(max(v, least), most), min(max(w, -turn), turn)
+        tried[k, 0], tried[k, 1] = v, w
+        off = controls[k, 0] * (v - controls[k, 0]) / numbers.spread[0] ** 2
+        off += controls[k, 1] * (w - controls[k, 1]) / numbers.spread[1] ** 2
+        total += numbers.control_gain * off
+        theta += 0.5 * w * dt
+        c, s = math.cos(theta), math.sin(theta)
+        x, y, theta = x + v * dt * c, y + v * dt * s, theta + 0.5 * w * dt
+        nearest = np.inf
+        for d in range(_DISCS):
+            at = aside * (d - 1)
+            i = math.floor((x - at * s) / cell + half)
+            j = math.floor((y + at * c) / cell + half)
+            if 0 <= i < len(field) and 0 <= j < len(field):
+                nearest = min(nearest, field[i, j] - radius)
+        cost = max(-v, 0.0) * forward
+        if nearest < 0.0:
+            cost += collision
+        cost += obstacle * math.exp(-max(nearest, 0.0) / numbers.inflation_m)
+        time, ahead = (k + 1) * dt, numbers.control_point_m
+        gx = goal[0] + goal[2] * time - pose[0] - x - ahead * c
+        gy = goal[1] + goal[3] * time - pose[1] - y - ahead * s
+        distance = math.hypot(gx, gy)
+        cost += to_goal * distance
+        if distance > ahead:
+            cost += to_angle * abs(wrapped(math.atan2(gy, gx) - theta))
+        total += cost / steps
+    return total
+
+
+@register_jitable
+def path_integral_step(
+    tick: int,
+    state: PathIntegralState,
+    inputs: Any,
+    outputs: Any,
+    numbers: PathIntegralNumbers,
+) -> None:
+    """Computes the twist, and a new plan every ``period_ticks``."""
+    target, velocity, pose, own = inputs[0], inputs[1], inputs[3], numbers.own
+    plan, space, twist = state.plan, inputs[4], outputs[0]
+    steps = len(plan)
+    if tick % numbers.period_ticks == 0:
+        controls = np.zeros((steps, 2))
+        # What is left of the last plan, and its last motion once more.
+        for k in range(steps):
+            last = min(k + 1, steps - 1)
+            controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
+        at, valid = (pose[0], pose[1], pose[2]), inputs[2][0] > 0.5
+        place, speed = (target[0], target[1]), (velocity[0], velocity[1])
+        goal = _goal(at, place, speed, valid, space, state.way, numbers)
+        beside = (place[0], place[1], own.source_clearance_m)
+        places = list_occupied(space, at[0], at[1], _WINDOW_M, beside)
+        cell = space.cell_m
+        field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
+        first = tick // numbers.period_ticks * own.samples
+        roll_out(controls, numbers.noise, first, at, goal, field, cell, numbers.roll)
+        for k in range(steps):
+            plan[k, 0], plan[k, 1] = controls[k, 0], controls[k, 1]
+    twist[0], twist[1] = plan[0, 0], plan[0, 1]
+
+
+@register_jitable
+def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
+    """Where P should be, m, and how fast that moves, m/s."""
+    ahead = numbers.follow.control_point_m
+    px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
+    if not valid:
+        return px, py, 0.0, 0.0
+    own, follow = numbers.own, numbers.follow
+    clear = np.array([[target[0], target[1], own.source_clearance_m]])
+    start = at[0], at[1]
+    find_way(way, space, start, target, 0.0, numbers.radius_m, clear)
+    straight = math.hypot(target[0] - px, target[1] - py)
+    left = straight
+    carrot = target
+    if way.facts[0, 1] > _DETOUR * math.hypot(target[0] - at[0], target[1] - at[1]):
+        left = max(straight, way.facts[0, 1] - ahead)
+        carrot = find_carrot(way, at[0], at[1], _LOOK_AHEAD_M)
+    dx, dy = carrot[0] - px, carrot[1] - py
+    far = max(math.hypot(dx, dy), 1e-9)
+    ux, uy = dx / far, dy / far
+    along = speed[0] * ux + speed[1] * uy
+    goes = wanted_speed(left - follow.distance_m, along, follow.own)
+    moves = min(follow.own.source_share * along, goes) if goes > 0.0 else 0.0
+    rest = (goes - moves) / follow.own.approach_gain
+    return px + rest * ux, py + rest * uy, moves * ux, moves * uy
+
+
+class PathIntegralController(BaselineController):
+    """Tries many sequences of motions and takes their mean, weighted by cost.
+
+    Each ``step_s`` it seeks the way to the target on the map (``find_way``, as the
+    guarded law), and along it a goal that moves with the target; draws ``samples``
+    sequences around the last plan, each costed by distance from the goal, angle,
+    driving back and what is near on the map; and takes their mean with weights
+    exp(-cost/temperature). The body is covered by three discs.
+
+    State: the plan, and the room for the way. No latency.
+
+    Args:
+        robot: Its body, and place of P.
+        attraction: The follow distance.
+        repulsion: ``RepulsionParameters``; uses ``mppi``.
+        following: How fast it drives and turns.
+        known: Grid of the map.
+        seed: Of the sequences that are tried.
+        tick_s: Period of the controller, s.
+
+    Reference: Williams et al., Information theoretic model predictive control, IEEE
+    Trans. on Robotics 34 (6), 2018; critics of Nav2's MPPI controller.
+    """
+
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
+    def __init__(
+        self,
+        *,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
+        known: FreeSpaceParameters = FreeSpaceParameters(),
+        seed: int = 0,
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self.set_name("path_integral_controller")
+        own = repulsion.mppi
+        numbers = PathIntegralNumbers(
+            own,
+            _roll_numbers(own, robot, following),
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
+            body_radius(robot) + own.clearance_m,
+            max(round(own.step_s / tick_s), 1),
+            _noise(own, seed),
+        )
+        state = PathIntegralState(np.zeros((own.steps, 2)), make_way(known.cells))
+        self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
+
+    def step_for(self, run: RunFacts) -> Step:
+        """The step, with a state of its own and the noise of the run."""
+        step = super().step_for(run)
+        noise = _noise(step.numbers.own, run.seed_of("controller"))
+        return step._replace(numbers=step.numbers._replace(noise=noise))
+
+
+def _roll_numbers(
+    own: PathIntegralParameters,
+    robot: RobotParameters,
+    following: FollowingParameters,
+) -> RollNumbers:
+    length, width = half_size(robot)
+    # Each disc covers a third of the width.
+    part = width / _DISCS
+    return RollNumbers(
+        own.samples,
+        own.step_s,
+        (own.speed_spread_m_s, own.turn_spread_rad_s),
+        speed_limits(following),
+        own.temperature,
+        own.control_gain,
+        (
+            own.goal_gain,
+            own.angle_gain,
+            own.forward_gain,
+            own.obstacle_gain,
+            own.collision_cost,
+        ),
+        own.inflation_m,
+        (2.0 * part, math.hypot(length, part) + own.clearance_m),
+        robot.control_point_m,
+    )
+
+
+def _noise(own: PathIntegralParameters, seed: int) -> NDArray[np.float64]:
+    shape = _ROUNDS * own.samples, own.steps, 2
+    return np.random.default_rng(seed).standard_normal(shape)

@@ -1,0 +1,89 @@
+"""Baseline: go to the sound, and stop while something is near."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+from numba.extending import register_jitable
+
+from systems.base.robot import RobotParameters
+from systems.framework.block import Port, Step
+from systems.framework.signals import TICK_S
+from systems.laws.baselines.baseline_controller import (
+    BaselineController,
+)
+from systems.laws.baselines.stop_when_near import StopWhenNearParameters
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.planning.following import FollowNumbers, approach
+from systems.planning.parameters import FollowingParameters
+from systems.planning.turning import turn_towards
+from systems.ranging.parameters import UltrasonicParameters
+
+
+class StopNumbers(NamedTuple):
+    """What the step of ``StopWhenNearController`` depends on."""
+
+    own: StopWhenNearParameters
+    follow: FollowNumbers
+
+
+@register_jitable
+def stop_when_near_step(
+    tick: int, state: Any, inputs: Any, outputs: Any, numbers: StopNumbers
+) -> None:
+    """Computes the twist."""
+    own, twist = numbers.own, outputs[0]
+    wanted, bearing = approach(inputs, numbers.follow)
+    ranges, echo = inputs[4], inputs[5]
+    for k in range(len(ranges)):
+        if echo[k] > 0.5 and ranges[k] < own.stop_m:
+            wanted = min(wanted, 0.0)
+    twist[0], twist[1] = turn_towards(wanted, bearing, inputs[3][2], numbers.follow.own)
+
+
+class StopWhenNearController(BaselineController):
+    """Turns to the target and drives; stops while an echo is near.
+
+    What everybody tries first. No state; no latency.
+
+    Args:
+        robot: Place of P.
+        attraction: The follow distance.
+        repulsion: ``RepulsionParameters``; uses ``stop_when_near``.
+        following: How fast it drives and turns.
+        sensors: The range sensors.
+        tick_s: Period of the controller, s.
+
+    Reference: ours; docs/results_laws.md.
+    """
+
+    inputs = (
+        *BaselineController.inputs,
+        Port("ranges", "sensors", "m"),
+        Port("echo", "sensors", "0 or 1"),
+    )
+
+    def __init__(
+        self,
+        *,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
+        sensors: UltrasonicParameters = UltrasonicParameters(),
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self.set_name("stop_when_near_controller")
+        numbers = StopNumbers(
+            repulsion.stop_when_near,
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
+        )
+        self.declare(
+            Step(stop_when_near_step, numbers),
+            tick_s=tick_s,
+            sizes={"sensors": sensors.count},
+        )

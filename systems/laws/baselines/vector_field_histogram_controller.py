@@ -1,0 +1,294 @@
+"""Baseline: VFH+, the vector field histogram of Ulrich and Borenstein, 1998."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba.extending import register_jitable
+from numpy.typing import NDArray
+
+from systems.base.robot import RobotParameters, body_radius
+from systems.framework.block import OBJECT, Port, Step
+from systems.framework.compiling import njit
+from systems.framework.signals import TICK_S
+from systems.laws.baselines.baseline_controller import (
+    BaselineController,
+)
+from systems.laws.baselines.vector_field_histogram import VectorFieldHistogramParameters
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.planning.following import FollowNumbers, approach
+from systems.planning.occupied import list_occupied
+from systems.planning.parameters import FollowingParameters
+from systems.planning.turning import turn_towards, wrapped
+
+#: Sectors of 5 deg (the paper's), and from how many on a valley is wide.
+_SECTORS, _WIDE = 72, 16
+#: No direction was chosen before.
+_NONE = -1.0
+
+
+class HistogramNumbers(NamedTuple):
+    """What a choice depends on; see ``VectorFieldHistogramParameters``."""
+
+    window_m: float
+    radius_m: float
+    """Of the robot, with what is kept off, m."""
+    thresholds: tuple[float, float]
+    """The low and the high one."""
+    gains: tuple[float, float, float]
+    """Of target, heading and direction chosen before."""
+
+
+class VectorFieldHistogramNumbers(NamedTuple):
+    """What the step of ``VectorFieldHistogramController`` depends on."""
+
+    own: VectorFieldHistogramParameters
+    histogram: HistogramNumbers
+    follow: FollowNumbers
+
+
+@njit(cache=True)
+def _apart(one: float, other: float) -> float:  # pragma: no cover  (compiled)
+    """Between two directions, sectors."""
+    apart = abs(one - other) % _SECTORS
+    return min(apart, _SECTORS - apart)
+
+
+@njit(cache=True)
+def polar_histogram(
+    places: Any, x: float, y: float, numbers: HistogramNumbers
+) -> NDArray[np.float64]:  # pragma: no cover  (compiled)
+    """The primary polar histogram: how much stands in each direction (eqs 1-6).
+
+    Args:
+        places: (n, 3) of occupied cells, m, and how certain they are, 0 to 1.
+        x: Where the robot is, m.
+        y: See x.
+        numbers: Window and radius.
+
+    Returns:
+        (72,) of sectors of 5 deg, counter-clockwise from the x axis of W.
+    """
+    density = np.zeros(_SECTORS)
+    width = math.tau / _SECTORS
+    for n in range(len(places)):
+        dx, dy = places[n, 0] - x, places[n, 1] - y
+        distance = math.hypot(dx, dy)
+        if distance > numbers.window_m:
+            continue
+        # a - b d^2 with a - b of the window's edge = 1 and a = 10: near counts more.
+        near = 10.0 - 9.0 * (distance / numbers.window_m) ** 2
+        magnitude = places[n, 2] ** 2 * near
+        wide = math.pi / 2.0
+        if distance > numbers.radius_m:
+            wide = math.asin(numbers.radius_m / distance)
+        bearing = math.atan2(dy, dx)
+        first = math.ceil((bearing - wide) / width)
+        for k in range(first, math.floor((bearing + wide) / width) + 1):
+            density[k % _SECTORS] += magnitude
+    return density
+
+
+@njit(cache=True)
+def _mask(
+    blocked: Any, places: Any, pose: Any, circle: float, numbers: HistogramNumbers
+) -> None:  # pragma: no cover  (compiled)
+    """Blocks directions that the robot cannot turn to while it moves (eqs 8-13)."""
+    x, y, theta = pose
+    left = right = math.pi
+    for n in range(len(places)):
+        dx, dy = places[n, 0] - x, places[n, 1] - y
+        if math.hypot(dx, dy) > numbers.window_m:
+            continue
+        off = wrapped(math.atan2(dy, dx) - theta)
+        # Centres of the circles to the left and to the right.
+        for side in (1.0, -1.0):
+            cx = -side * circle * math.sin(theta)
+            cy = side * circle * math.cos(theta)
+            if math.hypot(dx - cx, dy - cy) < circle + numbers.radius_m:
+                if side > 0.0 and off > 0.0:
+                    left = min(left, off)
+                if side < 0.0 and off < 0.0:
+                    right = min(right, -off)
+    for k in range(_SECTORS):
+        off = wrapped(k * math.tau / _SECTORS - theta)
+        if off > left or off < -right:
+            blocked[k] = True
+
+
+@njit(cache=True)
+def choose_direction(
+    blocked: Any,
+    target: float,
+    heading: float,
+    previous: float,
+    gains: tuple[float, float, float],
+) -> float:  # pragma: no cover  (compiled)
+    """The candidate direction of least cost (eqs 14-18).
+
+    Args:
+        blocked: (72,) which sectors are.
+        target: Direction, sectors.
+        heading: Of the robot, sectors.
+        previous: Direction that was chosen before, sectors; negative: none.
+        gains: Weights of the three.
+
+    Returns:
+        Direction, sectors; negative: all is blocked.
+    """
+    anywhere = not blocked.any()
+    begin = 0
+    while begin < _SECTORS and not blocked[begin]:
+        begin += 1
+    candidates, count = np.empty(3 * _SECTORS), 0
+    if anywhere:
+        candidates[0], count = target, 1
+    k = begin + 1
+    while not anywhere and k < begin + _SECTORS:
+        if blocked[k % _SECTORS]:
+            k += 1
+            continue
+        first = k
+        while not blocked[k % _SECTORS]:
+            k += 1
+        last = k - 1
+        if last - first + 1 <= _WIDE:
+            candidates[count] = 0.5 * (first + last)
+            count += 1
+            continue
+        candidates[count] = first + 0.5 * _WIDE
+        candidates[count + 1] = last - 0.5 * _WIDE
+        count += 2
+        within = (target - candidates[count - 2]) % _SECTORS
+        if within <= last - first - _WIDE:
+            candidates[count] = target
+            count += 1
+    best, found = np.inf, _NONE
+    for n in range(count):
+        cost = gains[0] * _apart(candidates[n], target)
+        cost += gains[1] * _apart(candidates[n], heading)
+        if previous >= 0.0:
+            cost += gains[2] * _apart(candidates[n], previous)
+        if cost < best:
+            best, found = cost, candidates[n] % _SECTORS
+    return found
+
+
+@njit(cache=True)
+def _steer(
+    state: Any,
+    places: Any,
+    pose: Any,
+    bearing: float,
+    circle: float,
+    numbers: HistogramNumbers,
+) -> tuple[float, float]:  # pragma: no cover  (compiled)
+    """Direction, rad, and the density there; NaN: all is blocked."""
+    density = polar_histogram(places, pose[0], pose[1], numbers)
+    blocked = np.empty(_SECTORS, dtype=np.bool_)
+    for k in range(_SECTORS):
+        if density[k] > numbers.thresholds[1]:
+            state[k] = 1.0
+        elif density[k] < numbers.thresholds[0]:
+            state[k] = 0.0
+        blocked[k] = state[k] > 0.5
+    _mask(blocked, places, pose, circle, numbers)
+    width = math.tau / _SECTORS
+    target, heading = (bearing / width) % _SECTORS, (pose[2] / width) % _SECTORS
+    previous = state[_SECTORS]
+    chosen = choose_direction(blocked, target, heading, previous, numbers.gains)
+    state[_SECTORS] = chosen
+    if chosen < 0.0:
+        return np.nan, 0.0
+    return chosen * width, density[round(chosen) % _SECTORS]
+
+
+@register_jitable
+def vector_field_histogram_step(
+    tick: int,
+    state: Any,
+    inputs: Any,
+    outputs: Any,
+    numbers: VectorFieldHistogramNumbers,
+) -> None:
+    """Computes the twist.
+
+    The state is which sectors are blocked, the last direction, sectors, and the last
+    speed, m/s.
+    """
+    target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
+    wanted, bearing = approach(inputs, numbers.follow)
+    clear = target[0], target[1], own.source_clearance_m
+    places = list_occupied(inputs[4], pose[0], pose[1], own.window_m, clear)
+    memory = np.empty(len(state))
+    for k in range(len(memory)):
+        memory[k] = state[k]
+    at = pose[0], pose[1], pose[2]
+    circle = abs(memory[_SECTORS + 1]) / numbers.follow.own.turn_rate_rad_s
+    direction, density = _steer(memory, places, at, bearing, circle, numbers.histogram)
+    if math.isnan(direction):
+        # Nowhere to go: it stands, and turns to the target.
+        wanted, direction = min(wanted, 0.0), bearing
+    elif wanted > 0.0:
+        wanted *= max(1.0 - density / own.slow_density, 0.0)
+    twist[0], twist[1] = turn_towards(wanted, direction, pose[2], numbers.follow.own)
+    memory[_SECTORS + 1] = twist[0]
+    for k in range(len(memory)):
+        state[k] = memory[k]
+
+
+class VectorFieldHistogramController(BaselineController):
+    """Steers into the valley of a polar histogram that lies best.
+
+    Of the cells that echoed since they were last seen free it makes the four histograms
+    of the paper at every tick: the primary one, in which each cell is as wide as the
+    robot; the binary one, by two thresholds; the masked one, without directions that it
+    cannot turn to at its speed; and takes the candidate of least cost. Speed as in the
+    first paper (Borenstein and Koren 1991): less, the more stands in that direction.
+    Where all is blocked it stands and turns to the target.
+
+    Discrete state: which sectors are blocked, last direction and speed. No latency.
+
+    Args:
+        robot: Its body, and place of P.
+        attraction: The follow distance.
+        repulsion: ``RepulsionParameters``; uses ``vfh_plus``.
+        following: How fast it drives and turns.
+        tick_s: Period of the controller, s.
+
+    Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
+    robots, IEEE Int. Conf. on Robotics and Automation, 1998.
+    """
+
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
+    def __init__(
+        self,
+        *,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
+        tick_s: float = TICK_S,
+    ) -> None:
+        super().__init__()
+        self.set_name("vector_field_histogram_controller")
+        own = repulsion.vfh_plus
+        histogram = HistogramNumbers(
+            own.window_m,
+            body_radius(robot) + own.clearance_m,
+            (own.low_threshold, own.high_threshold),
+            (own.target_gain, own.heading_gain, own.previous_gain),
+        )
+        numbers = VectorFieldHistogramNumbers(
+            own,
+            histogram,
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
+        )
+        state = [*[0.0] * _SECTORS, _NONE, 0.0]
+        self.declare(Step(vector_field_histogram_step, numbers, state), tick_s=tick_s)
