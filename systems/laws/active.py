@@ -27,6 +27,19 @@ def matched_decay(limit: float, ratio: float) -> float:
     return limit / (2.0 * math.log(ratio))
 
 
+def matched_share(limit: float, decay: float) -> float:
+    """Inverse of ``matched_decay``.
+
+    Args:
+        limit: The limit, m or m/s.
+        decay: Decay length or speed, as the limit.
+
+    Returns:
+        1/ratio of the two gains, exp(-limit / (2 decay)).
+    """
+    return math.exp(-limit / (2.0 * decay))
+
+
 class ActiveParameters(Parameters):
     """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
 

@@ -23,7 +23,7 @@ from systems.laws.active import ACTIVE
 from systems.laws.active_2017 import ACTIVE_2017
 from systems.laws.conventional import CONVENTIONAL
 from systems.laws.conventional_2017 import CONVENTIONAL_2017
-from systems.laws.law import Law
+from systems.laws.law import FORCE_COLUMNS, Law
 from systems.laws.no_avoidance import NONE
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
@@ -175,9 +175,6 @@ def _same_feature(before, now):
     return before > 0.5 and abs(float_of(before) - float_of(now)) < 0.5
 
 
-#: Columns of the port ``forces_W`` of every law.
-FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
-
 _INPUTS = (
     Port("p_WS_estimated", 2, "m"),
     Port("target_valid", 1, "0 or 1"),
@@ -244,13 +241,8 @@ def ImpedanceController_(T):
             self.set_name("impedance_controller")
             round_ticks = sensors.round_ticks(tick_s)
             self.states = _slot_names(round_ticks)
-            force, arguments = law, (repulsion,)
-            if isinstance(law, Law):
-                force = law.force
-                arguments = law.arguments(repulsion, sensors.minimum_range_m)
             numbers = ImpedanceNumbers(
-                force,
-                arguments,
+                *_force_and_arguments(law, repulsion, sensors.minimum_range_m),
                 attraction,
                 robot.mass_kg,
                 robot.control_point_m,
@@ -266,6 +258,17 @@ def ImpedanceController_(T):
             return numbers.force(c, s, *numbers.arguments)
 
     return Impl
+
+
+def _force_and_arguments(
+    law: Law | Callable[..., Any],
+    repulsion: RepulsionParameters,
+    least_range_m: float,
+) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+    if not isinstance(law, Law):
+        return law, (repulsion,)
+    assert law.force is not None, f"{law.name} has no force"
+    return law.force, law.arguments(repulsion, least_range_m)
 
 
 def _slot_names(round_ticks: int) -> tuple[str, ...]:

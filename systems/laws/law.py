@@ -9,6 +9,9 @@ from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
 
+#: Columns of the port ``forces_W`` of a law's block.
+FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
+
 
 @dataclass(frozen=True)
 class Equation:

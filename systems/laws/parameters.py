@@ -34,3 +34,12 @@ class SharedRepulsion(Parameters):
 
     velocity_term: VelocityTerm = "printed"
     """s = |dC/dt| as printed, or ``closing``: the speed of approach only."""
+
+
+class MapParameters(Parameters):
+    """Of baselines that look at a map of echoes."""
+
+    clearance_m: NonNegativeLength = 0.05
+    """Distance kept from places of echoes, m."""
+    source_clearance_m: NonNegativeLength = 0.5
+    """Echoes within this distance of the target count as echoes of the target, m."""

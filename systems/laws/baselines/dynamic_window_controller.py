@@ -18,7 +18,7 @@ from systems.laws.baselines.baseline_controller import (
     half_size,
     speed_limits,
 )
-from systems.laws.baselines.dynamic_window import DynamicWindowParameters
+from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowNumbers, approach

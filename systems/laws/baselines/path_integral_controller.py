@@ -18,8 +18,8 @@ from systems.laws.baselines.baseline_controller import (
     half_size,
     speed_limits,
 )
-from systems.laws.baselines.path_integral import PathIntegralParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.path_integral import PathIntegralParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.carrot import find_carrot
 from systems.planning.following import FollowNumbers, wanted_speed

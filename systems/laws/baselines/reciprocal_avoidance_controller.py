@@ -16,8 +16,8 @@ from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
 )
-from systems.laws.baselines.reciprocal_avoidance import ReciprocalAvoidanceParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.reciprocal_avoidance import ReciprocalAvoidanceParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity

@@ -12,9 +12,9 @@ from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
 )
-from systems.laws.baselines.stop_when_near import StopWhenNearParameters
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
+from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards

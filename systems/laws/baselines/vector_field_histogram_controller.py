@@ -16,9 +16,9 @@ from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
 )
-from systems.laws.baselines.vector_field_histogram import VectorFieldHistogramParameters
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
+from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters

@@ -15,7 +15,7 @@ from systems.base.wheel_speed_command import (
 from systems.framework.block import Block_, Port, Step
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.laws.impedance_controller import FORCE_COLUMNS
+from systems.laws.law import FORCE_COLUMNS
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,

@@ -7,12 +7,12 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from systems.base.robot import RobotParameters
-from systems.laws.baselines.path_integral import PathIntegralParameters
 from systems.laws.baselines.path_integral_controller import (
     _roll_numbers,
     distance_field,
     roll_out,
 )
+from systems.laws.path_integral import PathIntegralParameters
 from systems.planning.parameters import FollowingParameters
 
 CELL_M = 0.05

@@ -12,8 +12,8 @@ from systems.framework.parameters import (
     Positive,
     Speed,
 )
-from systems.laws.baselines.parameters import MapParameters
 from systems.laws.law import Equation, Law
+from systems.laws.parameters import MapParameters
 
 
 class PathIntegralParameters(MapParameters):

@@ -10,8 +10,8 @@ from systems.framework.parameters import (
     NonNegativeLength,
     Positive,
 )
-from systems.laws.baselines.parameters import MapParameters
 from systems.laws.law import Equation, Law
+from systems.laws.parameters import MapParameters
 
 
 class DynamicWindowParameters(MapParameters):
