@@ -11,12 +11,15 @@ from .base.wheel_odometry import (
     WheelOdometry_ as WheelOdometry_,
 )
 from .base.wheel_speed_command import (
-    TwistWheelCommand as TwistWheelCommand,
-    TwistWheelCommand_ as TwistWheelCommand_,
-    VelocityWheelCommand as VelocityWheelCommand,
-    VelocityWheelCommand_ as VelocityWheelCommand_,
+    WheelCommand as WheelCommand,
+    WheelCommand_ as WheelCommand_,
     WheelSpeedCommand as WheelSpeedCommand,
-    WheelSpeedCommand_ as WheelSpeedCommand_,
+)
+from .framework.block import (
+    OBJECT as OBJECT,
+    Block as Block,
+    Port as Port,
+    Step as Step,
 )
 from .heading.compass import MagneticHeading as MagneticHeading
 from .heading.heading_controller import HeadingController as HeadingController

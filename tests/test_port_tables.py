@@ -20,8 +20,10 @@ pytestmark = pytest.mark.drake
 BLOCKS: dict[str, Any] = {
     name: value
     for name in systems.__all__
-    if inspect.isclass(value := getattr(systems, name))
+    if name != "WheelSpeedCommand"  # another name of WheelCommand
+    and inspect.isclass(value := getattr(systems, name))
     and issubclass(value, LeafSystem)
+    and value is not systems.Block
 } | {"SourceListener": SourceListener}
 #: Those that convert to other scalars.
 TEMPLATED = {name for name in BLOCKS if hasattr(systems, f"{name}_")}

@@ -188,7 +188,7 @@ def _stages(module: str, *, evals: bool) -> dict[str, list[str]]:
         block = re.search(r"from systems import ([^\n(]+|\([^)]*\))", text)
         by_block = package and block and package in block[1].lower()
         held = ("Parameters):" in code and test in PARAMETER_TESTS) or (
-            "LeafSystem" in code and "systems.__all__" in text
+            "(Block" in code and "systems.__all__" in text
         )
         if test != mirror and (names.search(text) or by_block or held):
             importers.append(test)

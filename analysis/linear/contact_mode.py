@@ -31,7 +31,7 @@ from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.base.wheel_speed_command import WheelSpeedCommand_
+from systems.base.wheel_speed_command import WheelCommand_
 
 #: Springs that are tried, N/m.
 _STIFFNESSES = np.geomspace(1e-3, 1e5, 400)
@@ -82,7 +82,7 @@ def _chain(
     continuous = Linearize(block, context, wheels.get_index(), pose.get_index())
     sampled = DiscreteTimeApproximation(continuous, period_s)
 
-    command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=period_s)
+    command = WheelCommand_[AutoDiffXd](robot=robot, tick_s=period_s)
     rest = [np.zeros(2), np.zeros(3)]
     update = block_model(command, np.zeros(4), rest, period_s=period_s)
     push = update.B[:, 0]

@@ -72,7 +72,7 @@ def has_known_space(result: RunResult) -> bool:
     scenario = result.scenario
     if result.several or scenario.own_guard is None:
         return False
-    own = {import_own(name, "blocks").FACTS.part for name in scenario.blocks}
+    own = {import_own(name, "blocks").part for name in scenario.blocks}
     columns = {
         *_POSE,
         *_WHEELS,

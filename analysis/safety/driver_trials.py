@@ -9,14 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
 from diagrams import RunResult, Scenario, simulate
 from systems.base.robot import body_radius
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock
 from systems.world.geometry import beyond_rectangle, rectangle_clearance
 
 #: How long a run lasts, s.
@@ -91,15 +89,7 @@ def wave(angle: float, edge: float, skew: float) -> float:
 
 
 def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Obeys a table of ``Row``.
-
-    Args:
-        tick: Number of the tick.
-        state: None.
-        inputs: Pose by the odometry, and the true pose.
-        outputs: Forward speed and yaw rate.
-        numbers: The table, row after row.
-    """
+    """Obeys a table of ``Row``: the rows one after the other."""
     (believed, true), (twist,), (table,) = inputs, outputs, numbers
     row = 0
     while row + _FIELDS < len(table) and tick > table[row]:
@@ -121,32 +111,26 @@ def drive_step(tick: int, state: Any, inputs: Any, outputs: Any, numbers: Any) -
     twist[1] = omega + swing_omega * wave(angle + phase, edge, skew)
 
 
-class Driver(LeafSystem, StepBlock):
+class Driver(Block):
     """Drives by a table and does not react to obstacles.
-
-    .. pydrake_system::
-
-        name: Driver
-        input_ports:
-        - pose_WB_estimated [m, m, rad]
-        - pose_WB [m, m, rad]
-        output_ports:
-        - twist_B [m/s, rad/s]
 
     Unlike a law, it may know the true pose: rows with ``by_truth`` steer by it.
     """
 
-    FACTS = BlockFacts("controller", "control")
+    part = "controller"
+    inputs = (
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("pose_WB", 3, "m, m, rad"),
+    )
+    outputs = (Port("twist_B", 2, "m/s, rad/s"),)
 
-    def __init__(self, tick_s: float) -> None:
+    def __init__(self, *, tick_s: float) -> None:
         super().__init__()
         self.set_name("driver")
-        step = Step(drive_step, (_NEXT[0],))
-        inputs = [("pose_WB_estimated", 3), ("pose_WB", 3)]
-        self.declare_step(float, step, inputs, [("twist_B", 2)], tick_s)
+        self.declare(Step(drive_step, (_NEXT[0],)), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """With the table of this run, whatever run the block was made for."""
+        """The step, with the table of the run."""
         return Step(drive_step, (_NEXT[0],))
 
 

@@ -244,7 +244,7 @@ def _latencies(scenario: Scenario) -> tuple[Latency, ...]:
     half, frame = tick / 2.0, f"middle of a {tick * 1e3:g} ms frame"
     sound, lag = scenario.sound, scenario.plant.motor_lag_s
     silent = max(sound.period_s - sound.on_s, 0.0)
-    hold = Latency("source", "velocity held for one tick", half, "WheelSpeedCommand")
+    hold = Latency("source", "velocity held for one tick", half, "WheelCommand")
     motor = Latency("source", "motor lag", lag, "first order")
     return (
         Latency("source", "sound collected", half, frame),
@@ -340,7 +340,7 @@ def _route_latencies(scenario: Scenario) -> tuple[Latency, ...]:
         row
         for path in ("target", "obstacle")
         for row in (
-            Latency(path, "velocity held for one tick", held, "WheelSpeedCommand"),
+            Latency(path, "velocity held for one tick", held, "WheelCommand"),
             Latency(path, "motor lag", scenario.plant.motor_lag_s, "first order"),
         )
     ]

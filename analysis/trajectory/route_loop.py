@@ -18,7 +18,7 @@ from diagrams.scenario.scenario import Scenario
 from systems import DiffDrivePlant
 from systems.base.parameters import OdometryParameters
 from systems.base.wheel_odometry import WheelOdometry_
-from systems.base.wheel_speed_command import WheelSpeedCommand_
+from systems.base.wheel_speed_command import WheelCommand_
 from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
@@ -225,7 +225,7 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     odometry = WheelOdometry_[AutoDiffXd](
         robot=robot, odometry=unrounded, plant=scenario.plant, tick_s=tick_s
     )
-    command = WheelSpeedCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
+    command = WheelCommand_[AutoDiffXd](robot=robot, tick_s=tick_s)
     # Eq. 6, which stops P, has no linear model.
     unblocked = own.model_copy(update={"block_distance_m": None})
     law = TrajectoryImpedanceController_[AutoDiffXd](

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
 from typing import Any
 
 from pydrake.systems.framework import LeafSystem
@@ -13,24 +12,14 @@ from diagrams.building.robots.routed_robot import make_trajectory_controller
 from diagrams.building.robots.searching_robot import search_controller
 from diagrams.scenario.own_code import asked_for, import_own, made
 from diagrams.scenario.scenario import Scenario
-from systems import (
-    RadialLawController,
-    TwistWheelCommand,
-    VelocityWheelCommand,
-    WheelSpeedCommand,
-)
+from systems import RadialLawController, WheelCommand
 from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS
 from systems.ranging.collision_vector import SLOTS
 
-#: What a controller may command, each of size 2, and the block that obeys.
-_COMMANDS: dict[str, Callable[..., Any]] = {
-    "acceleration_W": WheelSpeedCommand,
-    "velocity_W": VelocityWheelCommand,
-    "twist_B": TwistWheelCommand,
-}
 #: What it may tell the log besides, with sizes.
 _TOLD = {"forces_W": 4, "obstacle_speeds": SLOTS}
 
@@ -136,8 +125,7 @@ def make_command(
     Raises:
         InputError: The controller has none of them, or several.
     """
-    command = _COMMANDS[commanded(controller)]
-    return command(robot=robot, tick_s=tick_s)
+    return WheelCommand(command=commanded(controller), robot=robot, tick_s=tick_s)
 
 
 def commanded(controller: Any, name: str = "") -> str:
@@ -155,13 +143,13 @@ def commanded(controller: Any, name: str = "") -> str:
     """
     name = name or controller.get_name()
     sizes = _output_sizes(controller)
-    found = [port for port in _COMMANDS if port in sizes]
+    found = [port for port in COMMANDS if port in sizes]
     if len(found) == 1 and sizes[found[0]] == 2:
         return found[0]
     has = ", ".join(f"{port} of size {sizes[port]}" for port in found) or "none"
     raise InputError(
         "law",
-        f"{name!r} needs one output port of size 2 out of {', '.join(_COMMANDS)}, and "
+        f"{name!r} needs one output port of size 2 out of {', '.join(COMMANDS)}, and "
         f"has {has}; {'add one' if not found else 'leave one of size 2'}",
     )
 

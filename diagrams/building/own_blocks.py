@@ -6,10 +6,8 @@ import inspect
 from collections.abc import Mapping
 from typing import Any
 
-from pydrake.systems.framework import LeafSystem
-
 from diagrams.scenario.own_code import import_own, made
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block
 from systems.framework.input_error import InputError
 
 
@@ -34,7 +32,7 @@ def with_own_blocks(
     joined, own = dict(blocks), set()
     for name in names:
         block = _own_block(name, parts)
-        part = block.FACTS.part
+        part = block.part
         if part in own:
             raise InputError(
                 "blocks",
@@ -47,15 +45,15 @@ def with_own_blocks(
 
 def _own_block(name: str, parts: Mapping[str, Any]) -> Any:
     found = import_own(name, "blocks")
-    if not (inspect.isclass(found) and issubclass(found, LeafSystem)):
+    if not (inspect.isclass(found) and issubclass(found, Block)):
         raise InputError(
-            "blocks", f"{name!r} is not a LeafSystem; derive it from LeafSystem"
+            "blocks", f"{name!r} is not a Block; derive its class from systems.Block"
         )
-    if not isinstance(getattr(found, "FACTS", None), BlockFacts):
+    if not found.part:
         raise InputError(
             "blocks",
-            f"{name!r} does not state its part; give it an attribute FACTS, "
-            "BlockFacts(part, stage)",
+            f"{name!r} does not state its part; give the class an attribute part, "
+            'as part = "rear_sonar"',
         )
     block = made(name, "blocks", found, parts)
     if not block.get_name():

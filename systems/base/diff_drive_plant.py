@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from pydrake.systems.framework import BasicVector_, LeafSystem_
+from pydrake.systems.framework import BasicVector_
 
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.tyre_grip import GripNumbers, grip_accelerations
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.finite import check_finite, check_port
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step
 
 
 @register_jitable
@@ -46,10 +44,10 @@ def _rim_twist(left, right, separation):
 
 
 class PlantNumbers(NamedTuple):
-    """What the plant's motion hangs on, the last arguments of compiled code."""
+    """What the motion of the plant depends on: last arguments of compiled code."""
 
     left_rim_m: float
-    """Way of the left end of the axle for an angle of its wheel, m/rad."""
+    """Path of the left end of the axle per angle of its wheel, m/rad."""
     right_rim_m: float
     """The same of the right end, m/rad."""
     wheel_separation_m: float
@@ -212,6 +210,9 @@ def _velocities(state, numbers):
     return velocity, slip
 
 
+#: Columns of the port ``slip_velocities`` with friction.
+_SLIP_COLUMNS = "slip_left", "slip_right", "slip_sideways"
+
 #: Drake's integrators stretch a last step by this factor at most.
 _STRETCH = 1.01
 
@@ -237,12 +238,7 @@ class PlantStepNumbers(NamedTuple):
 def plant_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
     """Moves the robot on by one tick, by Drake's explicit Runge-Kutta steps.
 
-    Args:
-        tick: Number of the tick at which it begins.
-        state: As of ``plant_derivatives`` or ``slipping_derivatives``.
-        inputs: As the input port.
-        outputs: Left as they are: they follow from the state.
-        numbers: ``PlantStepNumbers``.
+    The state is that of ``plant_derivatives`` or ``slipping_derivatives``.
     """
     (commanded,) = inputs
     derivatives, of_plant = numbers.derivatives, numbers.of_plant
@@ -321,24 +317,13 @@ def _publish_plant(state, outputs, numbers):
 
 @define_for_scalars("DiffDrivePlant_", __name__)
 def DiffDrivePlant_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(Block_[T]):
         """Moves the robot: motor lag, saturation, wheels that roll or slip.
-
-        .. pydrake_system::
-
-            name: DiffDrivePlant
-            input_ports:
-            - wheel_speeds [rad/s, left and right, commanded]
-            output_ports:
-            - pose_WB [m, m, rad]
-            - velocity_WB [m/s, m/s, rad/s]
-            - wheel_angles [rad, left and right]
-            - slip_velocities [m/s, left and right rim less its ground, sideways]
 
         Continuous state: x, y, theta, two wheel angles, two wheel speeds; with
         ``plant.friction`` also forward and leftward speed and yaw rate of the
-        body, which else are those of the rims. The outputs are functions of the
-        state; no feedthrough. The heading is not wrapped.
+        body. Without friction these follow from the wheel speeds. The outputs are
+        functions of the state; no feedthrough. The heading is not wrapped.
 
         Args:
             robot: Dimensions and top speed.
@@ -352,89 +337,85 @@ def DiffDrivePlant_(T):
         Reference: Han 2019, table 6; the motor lag and the grip are ours.
         """
 
-        FACTS = BlockFacts(
-            "plant",
-            "robot",
-            columns={
-                "pose_WB": ("p_WB_x", "p_WB_y", "theta_WB"),
-                "velocity_WB": ("v_WB_x", "v_WB_y", "omega_WB"),
-            },
-            states=(
-                *("x", "y", "theta"),
-                *("angle_left", "angle_right", "speed_left", "speed_right"),
+        part, stage = "plant", "robot"
+        inputs = (Port("wheel_speeds", 2, "rad/s, left and right, commanded"),)
+        outputs = (
+            Port("pose_WB", 3, "m, m, rad", ("p_WB_x", "p_WB_y", "theta_WB")),
+            Port("velocity_WB", 3, "m/s, m/s, rad/s", ("v_WB_x", "v_WB_y", "omega_WB")),
+            Port("wheel_angles", 2, "rad, left and right"),
+            Port(
+                "slip_velocities",
+                3,
+                "m/s, left and right rim less its ground, sideways",
             ),
+        )
+        states = (
+            *("x", "y", "theta"),
+            *("angle_left", "angle_right", "speed_left", "speed_right"),
         )
 
         def _construct(
             self,
             *,
-            robot=None,
-            plant=None,
-            initial_pose=(0.0, 0.0, 0.0),
-            converter=None,
-        ):
+            robot: RobotParameters = RobotParameters(),
+            plant: PlantParameters = PlantParameters(),
+            initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._robot = robot or RobotParameters()
-            self._plant = plant or PlantParameters()
-            self._numbers: Any = PlantNumbers.of(self._robot, self._plant)
-            self._derivatives, self._checked = plant_derivatives, _checked_derivatives
-            body = 0
-            if self._plant.friction is not None:
-                self._numbers += (GripNumbers.of(self._robot, self._plant.friction),)
-                self._derivatives = slipping_derivatives
-                self._checked = _checked_slipping
-                self.FACTS = _slipping(self.FACTS)
-                body = 3
-            self._step_numbers = PlantStepNumbers(
-                self._derivatives,
-                tuple(self._numbers),
+            check_finite("DiffDrivePlant: initial_pose", initial_pose)
+            self.set_name("diff_drive_plant")
+            of_plant: Any = PlantNumbers.of(robot, plant)
+            derivatives, self._checked = plant_derivatives, _checked_derivatives
+            if plant.friction is not None:
+                of_plant += (GripNumbers.of(robot, plant.friction),)
+                derivatives, self._checked = slipping_derivatives, _checked_slipping
+                self.states = (*self.states, "forward", "leftward", "yaw_rate")
+                slip = self.outputs[-1]._replace(columns=_SLIP_COLUMNS)
+                self.outputs = (*self.outputs[:-1], slip)
+            self._numbers = PlantStepNumbers(
+                derivatives,
+                tuple(of_plant),
                 _third_order,
                 TICK_S,
                 TICK_S,
-                *self._numbers[:2],
-                self._robot.wheel_radius_m,
-                self._robot.wheel_separation_m,
+                *of_plant[:2],
+                robot.wheel_radius_m,
+                robot.wheel_separation_m,
             )
-            self._initial_pose = tuple(initial_pose)
-            check_finite("DiffDrivePlant: initial_pose", self._initial_pose)
-            self.set_name("diff_drive_plant")
-            self._wheel_speeds = self.DeclareVectorInputPort(
-                name="wheel_speeds", size=2
-            )
-            at_rest = [0] * (4 + body)
-            initial_state = [T(value) for value in (*self._initial_pose, *at_rest)]
-            self.DeclareContinuousState(BasicVector_[T](initial_state))
-            ticket = {self.xc_ticket()}
-            for name, size, calc in (
-                ("pose_WB", 3, self._pose),
-                ("velocity_WB", 3, self._velocity),
-                ("wheel_angles", 2, self._angles),
-                ("slip_velocities", 3, self._slip),
+            at_rest = [0.0] * (len(self.states) - 3)
+            state = [T(value) for value in (*initial_pose, *at_rest)]
+            self.DeclareContinuousState(BasicVector_[T](state))
+            self.declare_ports()
+            for name, calc in (
+                ("pose_WB", self._pose),
+                ("velocity_WB", self._velocity),
+                ("wheel_angles", self._angles),
+                ("slip_velocities", self._slip),
             ):
-                self.DeclareVectorOutputPort(
-                    name=name, size=size, calc=calc, prerequisites_of_calc=ticket
-                )
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                robot=other._robot,
-                plant=other._plant,
-                initial_pose=other._initial_pose,
-                converter=converter,
-            )
+                self.declare_output(name, calc, {self.xc_ticket()})
 
         def DoCalcTimeDerivatives(self, context, derivatives):
-            motion = self._state(context), self._wheel_speeds.Eval(context)
-            finite = False
+            (wheel_speeds,) = self._input_ports
+            motion = self._state(context), wheel_speeds.Eval(context)
+            of_plant, finite = self._numbers.of_plant, False
             if T is float:
-                rates, finite = self._checked(*motion, *self._numbers)
+                rates, finite = self._checked(*motion, *of_plant)
             else:
-                rates = self._derivatives.py_func(*motion, *self._numbers)
+                rates = self._numbers.derivatives.py_func(*motion, *of_plant)
             if not finite:
-                check_port(context, self._wheel_speeds, motion[1])
+                check_port(context, wheel_speeds, motion[1])
                 check_finite("DiffDrivePlant: state", motion[0])
             derivatives.SetFromVector(rates)
+
+        def step_for(self, run: RunFacts) -> Step:
+            """The step, with the initial pose and the integrator of the run."""
+            numbers = self._numbers._replace(
+                advance=SCHEMES[run.scheme], step_s=run.step_s, tick_s=run.tick_s
+            )
+            at_rest = [0.0] * (len(self.states) - 3)
+            state = [*run.initial_pose, *at_rest]
+            return Step(plant_step, numbers, state, _publish_plant)
 
         def _state(self, context):
             return context.get_continuous_state_vector().CopyToVector()
@@ -444,37 +425,16 @@ def DiffDrivePlant_(T):
 
         def _velocity(self, context, output):
             state = self._state(context).tolist()
-            output.SetFromVector(_velocities(state, self._step_numbers)[0])
-
-        def step_for(self, run):
-            """What the block does in each tick of a compiled loop, ``Step``."""
-            numbers = self._step_numbers._replace(
-                advance=SCHEMES[run.scheme],
-                step_s=run.step_s,
-                tick_s=run.tick_s,
-            )
-            at_rest = [0.0] * (7 if self._plant.friction is not None else 4)
-            state = [*run.initial_pose, *at_rest]
-            return Step(plant_step, numbers, state, _publish_plant)
-
-        def _slip(self, context, output):
-            state = self._state(context).tolist()
-            output.SetFromVector(_velocities(state, self._step_numbers)[1])
+            output.SetFromVector(_velocities(state, self._numbers)[0])
 
         def _angles(self, context, output):
             output.SetFromVector(self._state(context)[3:5])
+
+        def _slip(self, context, output):
+            state = self._state(context).tolist()
+            output.SetFromVector(_velocities(state, self._numbers)[1])
 
     return Impl
 
 
 DiffDrivePlant = DiffDrivePlant_[None]
-
-
-def _slipping(facts: BlockFacts) -> BlockFacts:
-    """What a plant with friction has besides."""
-    slip = {"slip_velocities": ("slip_left", "slip_right", "slip_sideways")}
-    return replace(
-        facts,
-        columns={**facts.columns, **slip},
-        states=(*facts.states, "forward", "leftward", "yaw_rate"),
-    )

@@ -6,18 +6,16 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.diff_drive_plant import body_twist, saturated
 from systems.base.lagged_motion import LaggedMotion, advance_pose, lagged_motion
 from systems.base.parameters import OdometryParameters, PlantParameters
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.finite import check_finite
 from systems.framework.input_error import InputError
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 
 
 @register_jitable
@@ -40,25 +38,17 @@ class OdometryNumbers(NamedTuple):
 
     robot: RobotParameters
     pulses: int
-    """A revolution; 0 where angles are not rounded."""
+    """Per revolution; 0: angles are not rounded."""
     motion: LaggedMotion
     """Of the wheels in a tick."""
     lost_tick: int = -1
-    """At which the pose is lost; -1: never."""
+    """Tick at which the pose is lost; -1: never."""
 
 
 def odometry_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Pose and velocity of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Its number.
-        state: Pose, m and rad, and left and right encoder angle, rad, at the last tick.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``OdometryNumbers``.
-    """
+    """Continues pose and encoder angles, the state, to the present angles."""
     left, right = inputs[0][0], inputs[0][1]
     if numbers.pulses > 0:
         left = encoder_angle(left, numbers.pulses)
@@ -87,27 +77,18 @@ def odometry_step(
 
 @define_for_scalars("WheelOdometry_", __name__)
 def WheelOdometry_(T):
-    class Impl(LeafSystem_[T], StepBlock):
+    class Impl(Block_[T]):
         """Estimates pose and velocity from the wheels' encoders.
 
-        .. pydrake_system::
+        The block assumes that between two ticks the wheels approach their command
+        with the motors' nominal lag: the encoders give the angles of both ends,
+        command and lag the motion in between. With rolling wheels of that lag and
+        exact angles the pose at a tick is exact. The mean heading over a tick is not
+        enough: forward speed in phase with the yaw acceleration gives errors that
+        add up.
 
-            name: WheelOdometry
-            input_ports:
-            - wheel_angles [rad, left and right]
-            - wheel_speeds [rad/s, left and right, commanded]
-            output_ports:
-            - pose_WB_estimated [m, m, rad]
-            - velocity_WB_estimated [m/s, m/s, rad/s]
-
-        Between two ticks it takes the wheels to approach their command with the
-        motors' nominal lag: the encoders give the angles of both ends, command and lag
-        the motion in between. With rolling wheels of that lag and exact angles the
-        pose at a tick is exact. The mean heading over a tick would not do: forward
-        speed in phase with the yaw acceleration gives errors that add up.
-
-        Of angles in whole pulses the place is off by (q/L) s + q at most: q is the way
-        of the rim for a pulse, L the wheel separation, s the mean way of both rims
+        With angles in whole pulses the position error is (q/L) s + q at most: q is the
+        path of the rim per pulse, L the wheel separation, s the mean path of both rims
         (docs/guard.md has the proof).
 
         Discrete state, every tick: pose and encoder angles at the last tick. The
@@ -127,72 +108,55 @@ def WheelOdometry_(T):
             ValueError: The initial pose is not finite.
         """
 
-        FACTS = BlockFacts(
-            "odometry",
-            "robot",
-            columns={
-                "pose_WB_estimated": (
-                    "p_WB_estimated_x",
-                    "p_WB_estimated_y",
-                    "theta_WB_estimated",
-                )
-            },
-            states=("x", "y", "theta", "angle_left", "angle_right"),
+        part, stage = "odometry", "robot"
+        inputs = (
+            Port("wheel_angles", 2, "rad, left and right"),
+            Port("wheel_speeds", 2, "rad/s, left and right, commanded"),
         )
+        outputs = (
+            Port(
+                "pose_WB_estimated",
+                3,
+                "m, m, rad",
+                ("p_WB_estimated_x", "p_WB_estimated_y", "theta_WB_estimated"),
+            ),
+            Port("velocity_WB_estimated", 3, "m/s, m/s, rad/s"),
+        )
+        states = "x", "y", "theta", "angle_left", "angle_right"
 
         def _construct(
             self,
             *,
-            robot=None,
-            odometry=None,
-            plant=None,
-            initial_pose=(0.0, 0.0, 0.0),
-            tick_s=TICK_S,
-            converter=None,
-        ):
+            robot: RobotParameters = RobotParameters(),
+            odometry: OdometryParameters = OdometryParameters(),
+            plant: PlantParameters = PlantParameters(),
+            initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
+            tick_s: float = TICK_S,
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._tick_s = tick_s
-            self._robot = robot or RobotParameters()
-            self._odometry = odometry or OdometryParameters()
-            self._plant = plant or PlantParameters()
-            self._initial_pose = tuple(initial_pose)
-            check_finite("WheelOdometry: initial_pose", self._initial_pose)
-            if self._odometry.rounding and T is not float:
+            check_finite("WheelOdometry: initial_pose", initial_pose)
+            if odometry.rounding and T is not float:
                 raise InputError(
                     "WheelOdometry",
                     "odometry.rounding is true, and a rounded angle "
                     "has no derivative; set odometry.rounding to false",
                 )
             self.set_name("wheel_odometry")
-            pulses = 0
-            if self._odometry.rounding:
-                pulses = self._odometry.pulses_per_revolution
-            lost_s = self._odometry.lost_at_s
-            lost_tick = -1 if lost_s is None else round(lost_s / tick_s)
-            motion = lagged_motion(tick_s, self._plant.motor_lag_s)
-            numbers = OdometryNumbers(self._robot, pulses, motion, lost_tick)
-            self.declare_step(
-                T,
-                Step(odometry_step, numbers, [*self._initial_pose, 0.0, 0.0]),
-                (("wheel_angles", 2), ("wheel_speeds", 2)),
-                (("pose_WB_estimated", 3), ("velocity_WB_estimated", 3)),
-                tick_s,
+            lost_s = odometry.lost_at_s
+            numbers = OdometryNumbers(
+                robot,
+                odometry.pulses_per_revolution if odometry.rounding else 0,
+                lagged_motion(tick_s, plant.motor_lag_s),
+                -1 if lost_s is None else round(lost_s / tick_s),
+            )
+            self.declare(
+                Step(odometry_step, numbers, [*initial_pose, 0.0, 0.0]), tick_s=tick_s
             )
 
-        def step_for(self, run):
-            """What the block does in each tick of a compiled loop, ``Step``."""
+        def step_for(self, run: RunFacts) -> Step:
+            """The step, with the initial pose of the run."""
             return self.step._replace(state=[*run.initial_pose, 0.0, 0.0])
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self,
-                robot=other._robot,
-                odometry=other._odometry,
-                plant=other._plant,
-                initial_pose=other._initial_pose,
-                tick_s=other._tick_s,
-                converter=converter,
-            )
 
     return Impl
 

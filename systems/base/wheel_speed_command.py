@@ -6,21 +6,13 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-import numpy as np
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import read_lists
+from systems.framework.block import Block_, Port, Step
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step
 from systems.world.geometry import rotate, safe_norm
-
-# Groups of the discrete state; numbers and arrays pass to Drake faster
-# than its own indices and lists.
-_V_WP, _WHEEL_SPEEDS = range(2)
 
 #: ``turned_off_back`` turns by no more than this.
 _ASIDE = math.tan(math.radians(5.0))
@@ -159,7 +151,7 @@ class CommandNumbers(NamedTuple):
 
     velocity: Callable[..., Any]
     """``velocity(v_WP, command, theta, robot, tick_s)``: the velocity of P from the
-    last one, what the port reads, and the heading."""
+    last one, the command of the law, and the heading."""
     robot: RobotParameters
     tick_s: float
 
@@ -167,15 +159,7 @@ class CommandNumbers(NamedTuple):
 def command_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Not used.
-        state: Velocity of P, m/s, x and y, and wheel speeds, rad/s, left and right.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``CommandNumbers``.
-    """
+    """Velocity of P, m/s, and wheel speeds, rad/s, of the next tick: the state."""
     command, pose = inputs
     robot, theta = numbers.robot, pose[2]
     before = state[0], state[1]
@@ -205,8 +189,8 @@ def _at_twist(v_WP, twist_B, theta, robot, tick_s):
     return clamped_velocity(vx, vy, robot.top_speed_m_s)
 
 
-#: What a law may command, each of size 2, and the velocity of P that comes of it, as of
-#: ``CommandNumbers``.
+#: Output ports by which a law commands, each of size 2, and for each port how the
+#: velocity of P follows, as ``CommandNumbers.velocity``.
 COMMANDS: Mapping[str, Callable[..., Any]] = {
     "acceleration_W": _accelerated,
     "velocity_W": _at_velocity,
@@ -214,75 +198,24 @@ COMMANDS: Mapping[str, Callable[..., Any]] = {
 }
 
 
-class _WheelCommand:
-    """Ports, state and limits of the command, whatever it is that is commanded.
+@define_for_scalars("WheelCommand_", __name__)
+def WheelCommand_(T):
+    class Impl(Block_[T]):
+        """Commands the wheels so that P moves as a law commands.
 
-    A mix-in beside ``LeafSystem_[T]``. A twist is a velocity of P as well, whose axes
-    turn with B: one limit of speed serves them all.
-    """
+        An acceleration is integrated: it moves the virtual mass at P. A velocity of P
+        and a twist of the body are obeyed at once. Beyond top speed the velocity of P
+        keeps its direction, which for a twist is the curvature of the path; beyond a
+        wheel's limit the path keeps its curvature.
 
-    FACTS = BlockFacts(
-        "command",
-        "control",
-        columns={
-            "wheel_speeds": WHEEL_SPEED_COLUMNS,
-            "v_WP": ("v_WP_x", "v_WP_y"),
-        },
-        states=("v_WP_x", "v_WP_y", "wheel_left", "wheel_right"),
-    )
-
-    def _declare_command(self, name, port, velocity, robot, tick_s):
-        self._tick_s = tick_s
-        self._robot = robot or RobotParameters()
-        numbers = CommandNumbers(velocity, self._robot, tick_s)
-        self.step = Step(command_step, numbers, [0.0] * 4, _publish_command)
-        self.set_name(name)
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in ((port, 2), ("pose_WB_estimated", 3))
-        ]
-        v_WP = self.DeclareDiscreteState(2)
-        wheel_speeds = self.DeclareDiscreteState(2)
-        self.DeclareStateOutputPort("wheel_speeds", wheel_speeds)
-        self.DeclareStateOutputPort("v_WP", v_WP)
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=tick_s, offset_sec=0.0, update=self._update
-        )
-
-    def step_for(self, run):
-        """What the block does in each tick of a compiled loop, ``Step``."""
-        return self.step
-
-    def _update(self, context, discrete_state):
-        inputs, state = read_lists(context, self._inputs), []
-        for group in (_V_WP, _WHEEL_SPEEDS):
-            state += context.get_discrete_state(group).CopyToVector().tolist()
-        command_step(0, state, inputs, (), self.step.numbers)
-        discrete_state.set_value(_V_WP, np.array(state[:2]))
-        discrete_state.set_value(_WHEEL_SPEEDS, np.array(state[2:]))
-
-
-@define_for_scalars("WheelSpeedCommand_", __name__)
-def WheelSpeedCommand_(T):
-    class Impl(LeafSystem_[T], _WheelCommand):
-        """Integrates the virtual mass at P and commands the wheels.
-
-        .. pydrake_system::
-
-            name: WheelSpeedCommand
-            input_ports:
-            - acceleration_W [m/s^2]
-            - pose_WB_estimated [m, m, rad]
-            output_ports:
-            - wheel_speeds [rad/s, left and right]
-            - v_WP [m/s]
-
-        Discrete state, every tick: the outputs, a group each.
-        An update at t uses the acceleration at t and acts from t on: from
-        echo to wheels 0 ms, from the end of an audio frame to the wheels
-        one tick (the estimator's). Outputs are state; no feedthrough.
+        Discrete state, every tick: velocity of P and wheel speeds, the outputs. An
+        update at t uses the inputs at t and acts from t on: from echo to wheels 0 ms,
+        from the end of an audio frame to the wheels one tick (the estimator's). No
+        feedthrough.
 
         Args:
+            command: Name of the law's port: ``acceleration_W``, ``velocity_W`` or
+                ``twist_B``.
             robot: Dimensions and top speed.
             tick_s: Period of the command, s.
 
@@ -290,95 +223,36 @@ def WheelSpeedCommand_(T):
         wheel speeds.
         """
 
-        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
-            super().__init__(converter=converter)
-            self._declare_command(
-                "wheel_speed_command", "acceleration_W", _accelerated, robot, tick_s
-            )
+        part = "command"
+        inputs = (
+            Port("acceleration_W", 2, "m/s^2, or another command of the law"),
+            Port("pose_WB_estimated", 3, "m, m, rad"),
+        )
+        outputs = (
+            Port("wheel_speeds", 2, "rad/s, left and right", WHEEL_SPEED_COLUMNS),
+            Port("v_WP", 2, "m/s", ("v_WP_x", "v_WP_y")),
+        )
+        states = "v_WP_x", "v_WP_y", "wheel_left", "wheel_right"
 
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self, robot=other._robot, tick_s=other._tick_s, converter=converter
+        def _construct(
+            self,
+            *,
+            command: str = "acceleration_W",
+            robot: RobotParameters = RobotParameters(),
+            tick_s: float = TICK_S,
+            converter: Any = None,
+        ) -> None:
+            super().__init__(converter=converter)
+            self.set_name("wheel_command")
+            self.inputs = (self.inputs[0]._replace(name=command), *self.inputs[1:])
+            numbers = CommandNumbers(COMMANDS[command], robot, tick_s)
+            self.declare(
+                Step(command_step, numbers, [0.0] * 4, _publish_command), tick_s=tick_s
             )
 
     return Impl
 
 
-@define_for_scalars("VelocityWheelCommand_", __name__)
-def VelocityWheelCommand_(T):
-    class Impl(LeafSystem_[T], _WheelCommand):
-        """Commands the wheels so that P moves at the velocity that a law wants.
-
-        .. pydrake_system::
-
-            name: VelocityWheelCommand
-            input_ports:
-            - velocity_W [m/s, of P]
-            - pose_WB_estimated [m, m, rad]
-            output_ports:
-            - wheel_speeds [rad/s, left and right]
-            - v_WP [m/s, the wanted one, limited]
-
-        State, latency and limits are those of ``WheelSpeedCommand``: faster than
-        top speed, the velocity keeps its direction; beyond a wheel's limit, the
-        path its curvature.
-
-        Args:
-            robot: Dimensions and top speed.
-            tick_s: Period of the command, s.
-        """
-
-        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
-            super().__init__(converter=converter)
-            self._declare_command(
-                "velocity_wheel_command", "velocity_W", _at_velocity, robot, tick_s
-            )
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self, robot=other._robot, tick_s=other._tick_s, converter=converter
-            )
-
-    return Impl
-
-
-@define_for_scalars("TwistWheelCommand_", __name__)
-def TwistWheelCommand_(T):
-    class Impl(LeafSystem_[T], _WheelCommand):
-        """Commands the wheels so that the body moves with the twist of a law.
-
-        .. pydrake_system::
-
-            name: TwistWheelCommand
-            input_ports:
-            - twist_B [m/s, rad/s]
-            - pose_WB_estimated [m, m, rad]
-            output_ports:
-            - wheel_speeds [rad/s, left and right]
-            - v_WP [m/s, the wanted one, limited]
-
-        State, latency and limits are those of ``WheelSpeedCommand``: either limit
-        scales forward speed and yaw rate together, and keeps the curvature.
-
-        Args:
-            robot: Dimensions and top speed.
-            tick_s: Period of the command, s.
-        """
-
-        def _construct(self, *, robot=None, tick_s=TICK_S, converter=None):
-            super().__init__(converter=converter)
-            self._declare_command(
-                "twist_wheel_command", "twist_B", _at_twist, robot, tick_s
-            )
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(
-                self, robot=other._robot, tick_s=other._tick_s, converter=converter
-            )
-
-    return Impl
-
-
-WheelSpeedCommand = WheelSpeedCommand_[None]
-VelocityWheelCommand = VelocityWheelCommand_[None]
-TwistWheelCommand = TwistWheelCommand_[None]
+WheelCommand = WheelCommand_[None]
+#: The command of a law that accelerates P.
+WheelSpeedCommand = WheelCommand

@@ -19,6 +19,7 @@ from pydrake.systems.framework import LeafSystem, LeafSystem_
 
 from systems.framework.cache import declare_cache
 from systems.framework.finite import read_arrays, read_lists
+from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, tick_noise
 from systems.framework.scalar_math import float_of
 
@@ -144,7 +145,7 @@ def copied(state: Any) -> Any:
 class _Declared:
     """The declaration of a block, and what is made of it."""
 
-    part: ClassVar[str] = "controller"
+    part: ClassVar[str] = ""
     """The role of the block in its robot, as ``plant`` or ``tracker``. A block replaces
     another one by having the same part."""
     stage: ClassVar[Stage] = "control"
@@ -264,6 +265,16 @@ class _Declared:
                 period_sec=tick_s, offset_sec=0.0, update=self._replace_arrays
             )
             sources.add(self.xa_ticket())
+            if step.publish is not None:
+                # Drake replaces abstract states before the blocks that have a discrete
+                # state read their inputs, which must be those of the tick before.
+                # Therefore published values are a discrete state, too.
+                published = self._publish(step.state)
+                self._ends = np.cumsum(self._output_sizes)[:-1]
+                self.DeclareDiscreteState(np.concatenate(published))
+                self.DeclarePeriodicDiscreteUpdateEvent(
+                    period_sec=tick_s, offset_sec=0.0, update=self._replace_published
+                )
         elif len(step.state):
             self.DeclareDiscreteState([self._scalar(x) for x in step.state])
             self.DeclarePeriodicDiscreteUpdateEvent(
@@ -273,7 +284,7 @@ class _Declared:
         self._computed = declare_cache(self, "step", self._compute, sources)
         shown = self._computed
         if step.publish is not None:
-            state = {self.xa_ticket() if has_arrays(step.state) else self.xd_ticket()}
+            state = {self.xd_ticket()}
             shown = declare_cache(self, "published", self._published, state)
         index = 0
         for port in self._outputs:
@@ -301,7 +312,16 @@ class _Declared:
 
         Returns:
             The step, with a state of its own and the noise of the run.
+
+        Raises:
+            InputError: The block has no step.
         """
+        if not hasattr(self, "step"):
+            raise InputError(
+                "engine",
+                f"{self.get_name()} has no step, which a compiled loop needs; declare "
+                "one, or run with engine drake",
+            )
         step: Step = self.step
         if isinstance(getattr(step.numbers, "noise", None), TickNoise):
             noise = tick_noise(run.seed_of(self.get_name()))
@@ -361,16 +381,17 @@ class _Declared:
         step.step(tick, state, self._read(context), outputs, step.numbers)
         return outputs, state
 
-    def _published(self: Any, context: Any) -> tuple[Any, None]:
+    def _publish(self: Any, state: Any) -> list[Any]:
         step: Step = self.step
         assert step.publish is not None
-        if has_arrays(step.state):
-            state = context.get_abstract_state(0).get_value()[1]
-        else:
-            state = self._state(context)
-        outputs = self._blank_outputs()
+        outputs: list[Any] = self._blank_outputs()
         step.publish(state, outputs, step.numbers)
-        return outputs, None
+        return outputs
+
+    def _published(self: Any, context: Any) -> tuple[Any, None]:
+        if has_arrays(self.step.state):
+            return np.split(self._state(context), self._ends), None
+        return self._publish(self._state(context)), None
 
     def _state(self: Any, context: Any) -> Any:
         state = context.get_discrete_state(0).CopyToVector()
@@ -378,6 +399,10 @@ class _Declared:
 
     def _replace_state(self: Any, context: Any, discrete_state: Any) -> None:
         discrete_state.set_value(0, np.array(self._computed.Eval(context)[1]))
+
+    def _replace_published(self: Any, context: Any, discrete_state: Any) -> None:
+        state = context.get_abstract_state(0).get_value()[1]
+        discrete_state.set_value(0, np.concatenate(self._publish(state)))
 
     def _replace_arrays(self: Any, context: Any, state: Any) -> None:
         outputs, arrays = self._computed.Eval(context)
@@ -405,8 +430,8 @@ def _field_at(state: Any, name: str, _tick: int) -> Any:
 
 
 def part_of(system: Any) -> str:
-    """The part of a system; that of a system that is no ``Block`` is ``controller``."""
-    return str(getattr(system, "part", _Declared.part))
+    """The part of a system; that of a system that states none is ``controller``."""
+    return getattr(system, "part", "") or "controller"
 
 
 def _with_port_table(cls: Any) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from systems.framework.block import STAGES as STAGES, Stage as Stage, _Declared
+from systems.framework.block import STAGES as STAGES, Stage as Stage, _Declared, part_of
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,9 @@ class BlockFacts:
 def block_facts(block: Any) -> BlockFacts:
     """What a block says of itself; of a block without facts, that it controls."""
     if isinstance(block, _Declared):
-        return BlockFacts(block.part, block.stage, block.columns, tuple(block.states))
+        return BlockFacts(
+            part_of(block), block.stage, block.columns, tuple(block.states)
+        )
     facts = getattr(block, "FACTS", None)
     if isinstance(facts, BlockFacts):
         return facts

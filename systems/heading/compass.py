@@ -6,12 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.heading.parameters import CompassParameters
 
 
@@ -69,15 +67,7 @@ class CompassNumbers(NamedTuple):
 def magnetic_heading_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: CompassNumbers
 ) -> None:
-    """Heading of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``CompassNumbers``.
-    """
+    """The heading that the compass measures."""
     hx, hy = field_in_body(inputs[0][2], numbers.own)
     heading = heading_of_field(hx, hy)
     if numbers.own.noise_deg > 0.0:
@@ -86,50 +76,34 @@ def magnetic_heading_step(
     outputs[0][0] = wrapped_deg(heading)
 
 
-class MagneticHeading(LeafSystem, StepBlock):
-    """Measures the heading by the earth's magnetic field.
+class MagneticHeading(Block):
+    """Measures the heading by the magnetic field of the earth.
 
-    .. pydrake_system::
-
-        name: MagneticHeading
-        input_ports:
-        - pose_WB [m, m, rad]
-        output_ports:
-        - heading_deg [deg, clockwise from north]
-
-    Song's headings are clockwise; this block and ``HeadingController`` are the only
-    ones that turn between them and the counter-clockwise angles of W.
+    Song's headings are clockwise. Only this block and ``HeadingController`` convert
+    between them and the counter-clockwise angles of W.
 
     No state; noise is drawn every tick. Latency: none.
 
     Args:
         parameters: ``CompassParameters``.
-        seed: Of the noise.
+        seed: Seed of the noise.
         tick_s: Period of the robot, s.
 
     Reference: Song 2011, eq. 7, by an arctangent of two arguments.
     """
 
-    FACTS = BlockFacts("compass", "control", columns={"heading_deg": ("heading_deg",)})
+    part = "compass"
+    inputs = (Port("pose_WB", 3, "m, m, rad"),)
+    outputs = (Port("heading_deg", 1, "deg, clockwise from north", "heading_deg"),)
 
     def __init__(
         self,
         *,
-        parameters: CompassParameters | None = None,
+        parameters: CompassParameters = CompassParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        numbers = CompassNumbers(parameters or CompassParameters(), tick_noise(seed))
         self.set_name("magnetic_heading")
-        self.declare_step(
-            float,
-            Step(magnetic_heading_step, numbers),
-            (("pose_WB", 3),),
-            (("heading_deg", 1),),
-            tick_s,
-        )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return reseeded(self, run)
+        numbers = CompassNumbers(parameters, tick_noise(seed))
+        self.declare(Step(magnetic_heading_step, numbers), tick_s=tick_s)

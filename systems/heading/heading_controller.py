@@ -5,11 +5,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.heading.compass import wrapped_deg
 from systems.heading.parameters import HeadingControlParameters
 
@@ -91,14 +89,9 @@ class HeadingNumbers(NamedTuple):
 def heading_controller_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: HeadingNumbers
 ) -> None:
-    """Duties of one tick; see ``systems.framework.step_block.Step``.
+    """The duties of the motors.
 
-    Args:
-        tick: Not used.
-        state: Integral, deviation at the last tick, both in deg, and whether it moved.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``HeadingNumbers``.
+    State: integral, deg; deviation at the last tick, deg; whether the robot moved.
     """
     expected, heading, move = inputs
     duty = outputs[0]
@@ -115,27 +108,17 @@ def heading_controller_step(
     duty[0], duty[1] = _limited(left, 1.0), _limited(right, 1.0)
 
 
-class HeadingController(LeafSystem, StepBlock):
+class HeadingController(Block):
     """Turns the robot to a heading, and drives it on as it comes near to it.
 
-    .. pydrake_system::
+    The block has a PID controller of the deviation, and maps its output to the duties
+    of the motors; while ``move`` is 0 the duties are 0. The change of the deviation is
+    wrapped. At the first tick of a move it is 0, so that the differential part has no
+    kick, and the integral starts again at 0.
 
-        name: HeadingController
-        input_ports:
-        - expected_heading_deg [deg, clockwise from north]
-        - heading_deg [deg, clockwise from north]
-        - move [0 or 1]
-        output_ports:
-        - duty [1, left and right, -1 to 1]
-
-    A PID of the deviation, and a map from its output to the motors' duties; while
-    ``move`` is 0 they rest. The deviation's change is wrapped, and 0 at the first tick
-    of a move, so that the differential part has no kick there; the integral begins
-    anew.
-
-    Discrete state, every tick: integral, last deviation, and whether it moved. Latency:
-    none. The paper's period is 10 ms; the tick's 25 ms cost a degree of margin
-    (``analysis.linear.heading_loop``).
+    Discrete state, every tick: integral, last deviation, and whether the robot moved.
+    Latency: none. The paper's period is 10 ms; our tick of 25 ms costs a degree of
+    margin (``analysis.linear.heading_loop``).
 
     Args:
         parameters: ``HeadingControlParameters``.
@@ -144,24 +127,24 @@ class HeadingController(LeafSystem, StepBlock):
     Reference: Song 2011, 2.3.2, tables 1 to 3, with the errata of docs/errata.md.
     """
 
-    FACTS = BlockFacts(
-        "heading", "control", columns={"duty": ("duty_left", "duty_right")}
+    part = "heading"
+    inputs = (
+        Port("expected_heading_deg", 1, "deg, clockwise from north"),
+        Port("heading_deg", 1, "deg, clockwise from north"),
+        Port("move", 1, "0 or 1"),
+    )
+    outputs = (
+        Port("duty", 2, "1, left and right, -1 to 1", ("duty_left", "duty_right")),
     )
 
     def __init__(
         self,
         *,
-        parameters: HeadingControlParameters | None = None,
+        parameters: HeadingControlParameters = HeadingControlParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or HeadingControlParameters()
-        numbers = HeadingNumbers(own, PULSE_WIDTHS.index(own.pulse_widths), tick_s)
         self.set_name("heading_controller")
-        self.declare_step(
-            float,
-            Step(heading_controller_step, numbers, [0.0] * 3),
-            (("expected_heading_deg", 1), ("heading_deg", 1), ("move", 1)),
-            (("duty", 2),),
-            tick_s,
-        )
+        kind = PULSE_WIDTHS.index(parameters.pulse_widths)
+        numbers = HeadingNumbers(parameters, kind, tick_s)
+        self.declare(Step(heading_controller_step, numbers, [0.0] * 3), tick_s=tick_s)

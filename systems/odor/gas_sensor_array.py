@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
-from systems.framework.finite import read_arrays
 from systems.framework.noise import (
     BEFORE_THE_RUN,
     TickNoise,
@@ -21,7 +20,6 @@ from systems.framework.noise import (
     tick_normals,
 )
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock
 from systems.odor.odor_plume import PLUME_SIZE, concentration
 from systems.odor.parameters import GAS_SENSORS, GasSensorParameters
 
@@ -66,14 +64,9 @@ def _concentrations(
 def gas_sensor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: GasNumbers
 ) -> None:
-    """Readings of one tick; see ``systems.framework.step_block.Step``.
+    """The readings of the sensors.
 
-    Args:
-        tick: Number of the tick.
-        state: Ratio of each sensor without its noise, and its last reading.
-        inputs: As the input ports, as arrays.
-        outputs: As the output ports.
-        numbers: ``GasNumbers``.
+    State: ratio of each sensor without noise, then its last reading.
     """
     ratios, truths = outputs
     gas = np.empty(3)
@@ -95,96 +88,83 @@ def gas_sensor_step(
         ratios[k], truths[k] = value, gas[k]
 
 
-class GasSensorArray(LeafSystem, StepBlock):
-    """Smells at three places.
+class GasSensorArray(Block):
+    """Measures the concentration of gas at three places.
 
-    .. pydrake_system::
+    A reading is Rs/R0: 1 in clean air, less in gas. It follows
+    (1 + C/C1)^-exponent with a first-order lag, which is faster when the concentration
+    grows than when it falls. ``gas_concentration`` is the true C/C1.
 
-        name: GasSensorArray
-        input_ports:
-        - plume [number, many, see systems.odor.odor_plume]
-        - pose_WB [m, m, rad]
-        output_ports:
-        - gas_ratio [1, right front, rear and left front]
-        - gas_concentration [1, shares of C1, in the same order]
-
-    A reading is Rs/R0: 1 in clean air, less in gas. It goes to
-    (1 + C/C1)^-exponent as a first order lag, faster where gas comes than where it
-    goes. ``gas_concentration`` is the truth behind it.
-
-    Discrete state, every tick: each sensor's ratio, and its last reading. Latency: none
-    but the lag.
+    Discrete state, every tick: ratio and last reading of each sensor. Latency: the lag
+    only.
 
     Args:
         parameters: ``GasSensorParameters``.
-        seed: Of noise and mismatch.
+        seed: Seed of noise and mismatch.
         tick_s: Period of the robot, s.
 
     Reference: Song 2011, 2.1, 2.3.3; power law and times of the TGS2620 from GADEN.
     """
 
-    FACTS = BlockFacts(
-        "gas",
-        "obstacle sensing",
-        columns={
-            "gas_ratio": ("gas_right", "gas_rear", "gas_left"),
-            "gas_concentration": (
-                "concentration_right",
-                "concentration_rear",
-                "concentration_left",
-            ),
-        },
+    part, stage = "gas", "obstacle sensing"
+    inputs = (
+        Port("plume", PLUME_SIZE, "number, many, see systems.odor.odor_plume"),
+        Port("pose_WB", 3, "m, m, rad"),
+    )
+    outputs = (
+        Port(
+            "gas_ratio",
+            GAS_SENSORS,
+            "1, right front, rear and left front",
+            ("gas_right", "gas_rear", "gas_left"),
+        ),
+        Port(
+            "gas_concentration",
+            GAS_SENSORS,
+            "1, shares of C1, in the same order",
+            ("concentration_right", "concentration_rear", "concentration_left"),
+        ),
     )
 
     def __init__(
         self,
         *,
-        parameters: GasSensorParameters | None = None,
+        parameters: GasSensorParameters = GasSensorParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._own, self._period_s = parameters or GasSensorParameters(), tick_s
         self.set_name("gas_sensor_array")
-        self.declare_step(
-            float,
-            self._step(seed),
-            (("plume", PLUME_SIZE), ("pose_WB", 3)),
-            (("gas_ratio", GAS_SENSORS), ("gas_concentration", GAS_SENSORS)),
-            tick_s,
+        self._numbers_of = partial(_numbers, parameters, tick_s)
+        state = [1.0] * (2 * GAS_SENSORS)
+        self.declare(
+            Step(gas_sensor_step, self._numbers_of(seed), state),
+            tick_s=tick_s,
+            arrays=True,
         )
-
-    def _step(self, seed: int) -> Step:
-        own, tick_s = self._own, self._period_s
-        drawn = standard_normals((2, GAS_SENSORS), seed, BEFORE_THE_RUN).astype(float)
-        faults = np.zeros((GAS_SENSORS, 2))
-        for fault in own.faults:
-            kind = _DEAD if fault.kind == "dead" else _STUCK
-            faults[fault.sensor - 1] = kind, fault.start_s
-        numbers = GasNumbers(
-            np.array(own.positions_m),
-            own.height_m,
-            1.0 + own.mismatch * drawn[0],
-            own.exponent * (1.0 + own.slope_mismatch * drawn[1]),
-            -math.expm1(-tick_s / own.response_s),
-            -math.expm1(-tick_s / own.recovery_s),
-            own.noise,
-            own.drift_per_h / _HOUR_S,
-            faults,
-            tick_s,
-            tick_noise(seed),
-        )
-        return Step(gas_sensor_step, numbers, [1.0] * (2 * GAS_SENSORS))
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return self._step(run.seed_of(self.get_name()))
+        """The step, with noise and mismatch of the run."""
+        numbers = self._numbers_of(run.seed_of(self.get_name()))
+        return self.step._replace(numbers=numbers)
 
-    def _do_step(self, context: Any) -> tuple[Any, Any]:
-        # As arrays: lists of a plume's puffs would cost more than all the rest.
-        inputs = read_arrays(context, self._inputs)
-        state = context.get_discrete_state(0).value().tolist()
-        outputs = [[0.0] * size for size in self._sizes]
-        tick = round(context.get_time() / self._tick_s)
-        gas_sensor_step(tick, state, inputs, outputs, self.step.numbers)
-        return outputs, state
+
+def _numbers(own: GasSensorParameters, tick_s: float, seed: int) -> GasNumbers:
+    drawn = standard_normals((2, GAS_SENSORS), seed, BEFORE_THE_RUN)
+    faults = np.zeros((GAS_SENSORS, 2))
+    for fault in own.faults:
+        kind = _DEAD if fault.kind == "dead" else _STUCK
+        faults[fault.sensor - 1] = kind, fault.start_s
+    return GasNumbers(
+        np.array(own.positions_m),
+        own.height_m,
+        1.0 + own.mismatch * drawn[0],
+        own.exponent * (1.0 + own.slope_mismatch * drawn[1]),
+        -math.expm1(-tick_s / own.response_s),
+        -math.expm1(-tick_s / own.recovery_s),
+        own.noise,
+        own.drift_per_h / _HOUR_S,
+        faults,
+        tick_s,
+        tick_noise(seed),
+    )

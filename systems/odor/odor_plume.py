@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
-from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.odor.parameters import OdorParameters, WindParameters
 from systems.odor.steady_plume import steady_concentration
 from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_velocity
@@ -192,50 +190,44 @@ def _advance(
 def plume_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeNumbers
 ) -> None:
-    """The plume after a tick; see ``systems.framework.step_block.Step``.
+    """The plume after a tick.
 
-    Args:
-        tick: Number of the tick.
-        state: (PLUME_SIZE,) array of the port; changed.
-        inputs: As the input ports, as arrays.
-        outputs: Left as they are: they are state.
-        numbers: ``PlumeNumbers``.
+    State: the output port ``plume``.
     """
     if tick % numbers.period == 0:
         _advance(state, inputs[0], tick, numbers)
 
 
+@njit(cache=True)
+def _copy(values: Any, into: Any) -> None:  # pragma: no cover  (compiled)
+    """Copies (n,) numbers; in Python the loop would take longer than the step."""
+    for k in range(len(values)):
+        into[k] = values[k]
+
+
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: PlumeNumbers) -> None:
     """The output of ``plume_step``'s state."""
-    for k in range(len(state)):
-        outputs[0][k] = state[k]
+    _copy(state, outputs[0])
 
 
-class OdorPlume(LeafSystem):
-    """The odour over the whole floor.
+class OdorPlume(Block):
+    """The odor over the whole floor.
 
-    .. pydrake_system::
+    ``concentration`` gives the odor at a point. A puff moves with the wind at its
+    center plus a velocity of its own, and grows with the distance that it has traveled.
+    The floor reflects the odor, walls do not, and robots leave no wake. When a run
+    begins, the source has released odor for ``age_s``.
 
-        name: OdorPlume
-        input_ports:
-        - wind [number, nine of them, see systems.odor.wind]
-        output_ports:
-        - plume [number, many, see systems.odor.odor_plume]
-
-    ``concentration`` tells it at a point. A puff goes with the wind at its middle and a
-    velocity of its own, and grows with its way; the floor reflects it, walls do not,
-    and robots leave no wake. When a run begins the plume has been there for ``age_s``.
-
-    Discrete state, every 0.1 s: the output, which is what has come of the wind a period
-    ago.
+    Discrete state: the output, which changes every 0.1 s and depends on the wind of
+    0.1 s before.
 
     Args:
         parameters: ``OdorParameters``.
-        wind: For the plume at the begin of a run, and the mean.
-        p_WO: Place of the source in W, m.
-        seed: Of the puffs' own velocities.
-        tick_s: Period of the robots; 0.1 s is a multiple of it.
+        wind: Wind before the run, and wind of a steady plume.
+        p_WO: Position of the source in W, m.
+        seed: Seed of the puffs' own velocities.
+        tick_s: Period of the robots, s; 0.1 s is a multiple of it.
 
     Raises:
         InputError: A steady plume has no wind.
@@ -243,92 +235,82 @@ class OdorPlume(LeafSystem):
     Reference: Song 2011, 2.2, eq. 1 to 6; puffs and all numbers are ours.
     """
 
-    FACTS = BlockFacts("plume", "world")
+    part, stage = "plume", "world"
+    inputs = (Port("wind", WIND_SIZE, "number, nine of them, see systems.odor.wind"),)
+    outputs = (Port("plume", PLUME_SIZE, "number, many, see systems.odor.odor_plume"),)
 
     def __init__(
         self,
         *,
-        parameters: OdorParameters | None = None,
-        wind: WindParameters | None = None,
+        parameters: OdorParameters = OdorParameters(),
+        wind: WindParameters = WindParameters(),
         p_WO: tuple[float, float] = (0.0, 0.0),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._own, self._wind = parameters or OdorParameters(), wind or WindParameters()
-        self._p_WO, self._tick_s = p_WO, tick_s
-        if self._own.kind == "steady" and self._wind.speed_m_s < _STEADY_M_S:
+        if parameters.kind == "steady" and wind.speed_m_s < _STEADY_M_S:
             raise InputError(
                 "wind.speed_m_s",
-                f"is {self._wind.speed_m_s:g}, but a steady plume (odor.kind) is "
+                f"is {wind.speed_m_s:g}, but a steady plume (odor.kind) is "
                 "unbounded without wind; set it to 0.5 or more, or odor.kind to "
                 "puffs",
             )
         self.set_name("odor_plume")
-        self._port = self.DeclareVectorInputPort(name="wind", size=WIND_SIZE)
-        self.step = self._step(seed)
-        state: Any = np.array(self.step.state)
-        self.DeclareStateOutputPort("plume", self.DeclareDiscreteState(state))
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=self.step.numbers.period_s, offset_sec=0.0, update=self._update
-        )
-
-    def _step(self, seed: int) -> Step:
-        own, period = self._own, max(1, round(WIND_PERIOD_S / self._tick_s))
-        period_s = period * self._tick_s
-        numbers = PlumeNumbers(
-            *self._p_WO,
-            release_rate(own),
-            own.puffs_per_s,
-            own.level_growth,
-            own.upright_growth,
-            own.own_intensity,
-            math.exp(-period_s / own.own_time_s),
-            own.reach_m,
-            own.room_volume_m3 or 0.0,
-            period,
-            period_s,
-            own.kind == "steady",
-            tick_noise(seed),
-        )
-        state = np.zeros(PLUME_SIZE)
-        state[_HEIGHT], state[_AGE] = own.height_m, own.age_s
-        if numbers.steady:
-            direction, speed = (
-                math.radians(self._wind.direction_deg),
-                self._wind.speed_m_s,
-            )
-            state[_STEADY] = 1.0
-            steady = state[PUFFS_BEGIN:]
-            steady[:6] = (
-                *self._p_WO,
-                math.cos(direction),
-                math.sin(direction),
-                numbers.rate,
-                speed,
-            )
-            steady[6:8] = own.mean_intensity * speed, own.upright_growth * speed
-        else:
-            self._spin_up(state, numbers, seed)
-        return Step(plume_step, numbers, state.tolist(), _publish)
-
-    def _spin_up(
-        self, state: NDArray[np.float64], numbers: PlumeNumbers, seed: int
-    ) -> None:
-        """What has been released before the run, in a wind of its own."""
-        wind = initial_wind(self._wind, seed)
-        periods = round(min(self._own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)
-        for k in range(periods):
-            _advance(state, wind, -1 - k, numbers)
-        state[_AGE] = self._own.age_s
+        self._step_of = partial(_step, parameters, wind, p_WO, tick_s)
+        self.declare(self._step_of(seed), tick_s=tick_s, arrays=True)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return self._step(run.seed_of(self.get_name()))
+        """The step, with noise and initial plume of the run."""
+        return self._step_of(run.seed_of(self.get_name()))
 
-    def _update(self, context: Any, discrete_state: Any) -> None:
-        state = context.get_discrete_state(0).CopyToVector()
-        tick = round(context.get_time() / self._tick_s)
-        inputs = read_arrays(context, [self._port])
-        plume_step(tick, state, inputs, (), self.step.numbers)
-        discrete_state.set_value(0, state)
+
+def _step(
+    own: OdorParameters,
+    wind: WindParameters,
+    p_WO: tuple[float, float],
+    tick_s: float,
+    seed: int,
+) -> Step:
+    period = max(1, round(WIND_PERIOD_S / tick_s))
+    period_s = period * tick_s
+    numbers = PlumeNumbers(
+        *p_WO,
+        release_rate(own),
+        own.puffs_per_s,
+        own.level_growth,
+        own.upright_growth,
+        own.own_intensity,
+        math.exp(-period_s / own.own_time_s),
+        own.reach_m,
+        own.room_volume_m3 or 0.0,
+        period,
+        period_s,
+        own.kind == "steady",
+        tick_noise(seed),
+    )
+    plume = np.zeros(PLUME_SIZE)
+    plume[_HEIGHT] = own.height_m
+    if numbers.steady:
+        direction, speed = math.radians(wind.direction_deg), wind.speed_m_s
+        plume[_STEADY] = 1.0
+        steady = plume[PUFFS_BEGIN:]
+        steady[:4] = *p_WO, math.cos(direction), math.sin(direction)
+        steady[4:6] = numbers.rate, speed
+        steady[6:8] = own.mean_intensity * speed, own.upright_growth * speed
+    else:
+        _spin_up(plume, initial_wind(wind, seed), own, numbers)
+    plume[_AGE] = own.age_s
+    return Step(plume_step, numbers, plume, _publish)
+
+
+def _spin_up(
+    plume: NDArray[np.float64],
+    wind: NDArray[np.float64],
+    own: OdorParameters,
+    numbers: PlumeNumbers,
+) -> None:
+    """Releases the puffs of the time before the run, in a wind that does not change."""
+    plume[_AGE] = own.age_s
+    for k in range(round(min(own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)):
+        _advance(plume, wind, -1 - k, numbers)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.noise import (
     BEFORE_THE_RUN,
@@ -19,7 +19,6 @@ from systems.framework.noise import (
     tick_normals,
 )
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.odor.parameters import WindParameters
 
 #: Size of the port ``wind``: whether it is a jet; mean and unsteady velocity, each x
@@ -77,14 +76,9 @@ class WindNumbers(NamedTuple):
 def wind_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: WindNumbers
 ) -> None:
-    """The wind after a tick; see ``systems.framework.step_block.Step``.
+    """The wind after a tick.
 
-    Args:
-        tick: Number of the tick.
-        state: (WIND_SIZE,) of the port; changed.
-        inputs: None.
-        outputs: Left as they are: they are state.
-        numbers: ``WindNumbers``.
+    State: the output port ``wind``.
     """
     if tick % numbers.period != 0 or numbers.spread == 0.0:
         return
@@ -129,63 +123,43 @@ def _spread(own: WindParameters) -> float:
     return 0.0 if own.kind == "uniform" else own.meander_intensity * own.speed_m_s
 
 
-class WindField(LeafSystem):
+class WindField(Block):
     """The wind over the whole floor.
 
-    .. pydrake_system::
+    ``wind_velocity`` gives the wind at a point. Each component of the unsteady velocity
+    is an Ornstein-Uhlenbeck process, advanced exactly.
 
-        name: WindField
-        output_ports:
-        - wind [number, nine of them, see systems.odor.wind]
-
-    ``wind_velocity`` tells it at a point. The unsteady velocity is an
-    Ornstein-Uhlenbeck process in each component, advanced exactly.
-
-    Discrete state, every 0.1 s: the output. Nothing acts back on it.
+    Discrete state: the output, which changes every 0.1 s. Nothing affects the wind.
 
     Args:
         parameters: ``WindParameters``.
-        seed: Of the unsteady part.
-        tick_s: Period of the robots; 0.1 s is a multiple of it.
+        seed: Seed of the unsteady velocity.
+        tick_s: Period of the robots, s; 0.1 s is a multiple of it.
 
     Reference: Song 2011, 4.1, for the speeds; the rest is ours.
     """
 
-    FACTS = BlockFacts("wind", "world")
+    part, stage = "wind", "world"
+    outputs = (Port("wind", WIND_SIZE, "number, nine of them, see systems.odor.wind"),)
 
     def __init__(
         self,
         *,
-        parameters: WindParameters | None = None,
+        parameters: WindParameters = WindParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._own = parameters or WindParameters()
-        self._tick_s = tick_s
         self.set_name("wind_field")
-        self.step = self._step(seed)
-        state: Any = np.array(self.step.state)
-        self.DeclareStateOutputPort("wind", self.DeclareDiscreteState(state))
-        self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=max(1, round(WIND_PERIOD_S / tick_s)) * tick_s,
-            offset_sec=0.0,
-            update=self._update,
+        period = max(1, round(WIND_PERIOD_S / tick_s))
+        keep = math.exp(-period * tick_s / parameters.meander_time_s)
+        numbers = WindNumbers(_spread(parameters), keep, period, tick_noise(seed))
+        self._initial = partial(initial_wind, parameters)
+        self.declare(
+            Step(wind_step, numbers, self._initial(seed), _publish), tick_s=tick_s
         )
 
-    def _step(self, seed: int) -> Step:
-        period = max(1, round(WIND_PERIOD_S / self._tick_s))
-        keep = math.exp(-period * self._tick_s / self._own.meander_time_s)
-        numbers = WindNumbers(_spread(self._own), keep, period, tick_noise(seed))
-        state = initial_wind(self._own, seed).tolist()
-        return Step(wind_step, numbers, state, _publish)
-
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return self._step(run.seed_of(self.get_name()))
-
-    def _update(self, context: Any, discrete_state: Any) -> None:
-        state = context.get_discrete_state(0).CopyToVector()
-        tick = round(context.get_time() / self._tick_s)
-        wind_step(tick, state, (), (), self.step.numbers)
-        discrete_state.set_value(0, state)
+        """The step, with noise and initial wind of the run."""
+        wind = self._initial(run.seed_of(self.get_name()))
+        return super().step_for(run)._replace(state=wind)

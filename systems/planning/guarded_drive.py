@@ -28,9 +28,9 @@ from systems.safety.free_space import ROLLED, FreeSpace, edge_cells
 
 #: What the robot does.
 WAITING, DRIVING, LOOKING, BACKING, GIVING_UP = range(5)
-#: Places in ``DriveNumbers.memory``; times in s, places in m, headings in rad.
+#: Places in ``DriveState.memory``; times in s, places in m, headings in rad.
 (
-    AT_TICK,
+    HAS_BEGUN,
     SPEED,
     TURN,
     MODE,
@@ -84,14 +84,18 @@ _HELD_S = 0.4
 _MOST_CELLS = 1_000
 
 
+class DriveState(NamedTuple):
+    """What the robot remembers from tick to tick."""
+
+    memory: NDArray[np.float64]
+    """(1, MEMORY), see ``MEMORY``."""
+    way: Way
+    hazards: Hazards
+
+
 class DriveNumbers(NamedTuple):
     """What a tick depends on."""
 
-    memory: NDArray[np.float64]
-    """(1, MEMORY) of the last tick; changed."""
-    way: Way
-    """Changed."""
-    space: FreeSpace
     own: Any
     """``GuardedParameters``."""
     following: Any
@@ -99,12 +103,10 @@ class DriveNumbers(NamedTuple):
     follow_distance_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
-    hazards: Hazards
-    """Changed."""
     sensors: HazardSensors
     evasion: EvasionNumbers
     radius_m: float
-    """Of the disc for which ways are sought, m."""
+    """Of the disc for which ways are searched, m."""
     tick_s: float
 
 
@@ -114,35 +116,41 @@ def _within(value: float, limit: float) -> float:  # pragma: no cover  (compiled
 
 
 @register_jitable
-def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
+def drive_guarded(
+    tick: int, state: DriveState, inputs: Any, numbers: DriveNumbers
+) -> None:
     """Decides what the robot wants in a tick: ``SPEED`` and ``TURN`` of the memory.
 
     Args:
         tick: Its number.
+        state: Changed.
         inputs: Place and velocity of the target, m and m/s, whether there is one, pose
-            of the robot, m and rad, the guard's report, and ranges, echoes and ages of
-            the range sensors; more are not read.
-        numbers: ``DriveNumbers``; its memory and way are changed.
+            of the robot, m and rad, the guard's report, ranges, echoes and ages of the
+            range sensors, and the free space.
+        numbers: What the tick depends on.
     """
     target, velocity, valid = inputs[0], inputs[1], inputs[2][0]
-    pose, report = inputs[3], inputs[4]
-    m, own, time = numbers.memory, numbers.own, tick * numbers.tick_s
-    if m[0, AT_TICK] < 0.0:
+    pose, report, space = inputs[3], inputs[4], inputs[8]
+    m, own, time = state.memory, numbers.own, tick * numbers.tick_s
+    if m[0, HAS_BEGUN] < 0.5:
         m[0, PLANNED_S], m[0, BLOCKED_S], m[0, PASSABLE_S] = -np.inf, time, time
         _stays(m, pose, time)
-    m[0, AT_TICK] = tick
+        m[0, HAS_BEGUN] = 1.0
     _remember_held(m, report, time)
     m[0, SPEED], m[0, TURN] = 0.0, 0.0
     nowhere = np.inf, np.inf
     x, y = (target[0], target[1]) if valid > 0.5 else nowhere
     followed = x, y, own.source_radius_m
-    _track(time, pose, (inputs[5], inputs[6], inputs[7]), followed, numbers)
+    readings = inputs[5], inputs[6], inputs[7]
+    track_hazards(state.hazards, time, pose, readings, space, followed, numbers.sensors)
     if valid < 0.5:
         m[0, MODE], m[0, BLOCKED_S], m[0, PASSABLE_S] = WAITING, time, time
         _stays(m, pose, time)
-        _evade(time, pose, 0.0, 0.0, numbers)
+        _evade(time, pose, 0.0, 0.0, state, numbers)
         return
-    wanted, error, there = _find_heading(time, target, velocity, pose, numbers)
+    wanted, error, there = _find_heading(
+        time, target, velocity, pose, state, space, numbers
+    )
     if math.hypot(pose[0] - m[0, STAYS_X], pose[1] - m[0, STAYS_Y]) > _STAYS_M or there:
         _stays(m, pose, time)
     if report[0] < TURNED or there or wanted <= 0.0:
@@ -150,18 +158,18 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
     if time - m[0, PASSABLE_S] > own.search_way_s and not there:
         m[0, MODE], m[0, BLOCKED_S] = GIVING_UP, time
         _stays(m, pose, time)
-        _evade(time, pose, 0.0, 0.0, numbers)
+        _evade(time, pose, 0.0, 0.0, state, numbers)
         return
     if m[0, MODE] == WAITING or m[0, MODE] == GIVING_UP:
         m[0, MODE] = DRIVING
     if m[0, MODE] == DRIVING:
-        _begin_look(time, pose, pose[2] + error, numbers)
+        _begin_look(time, pose, pose[2] + error, state, space, numbers)
     if m[0, MODE] == LOOKING:
-        _look(time, pose, report, numbers)
+        _look(time, pose, report, state, numbers)
     if m[0, MODE] == DRIVING and time - m[0, STAYS_S] > own.give_up_s:
         ahead, at = pose[2] + error, numbers.radius_m + 0.1
         place = pose[0] + at * math.cos(ahead), pose[1] + at * math.sin(ahead)
-        mark_blocked(numbers.way, place, time + own.mark_s)
+        mark_blocked(state.way, place, time + own.mark_s)
         m[0, MODE], m[0, BACKED_S], m[0, PLANNED_S] = BACKING, time, -np.inf
     if m[0, MODE] == BACKING:
         m[0, SPEED] = -numbers.following.back_speed_m_s
@@ -169,8 +177,8 @@ def drive_guarded(tick: int, inputs: Any, numbers: DriveNumbers) -> None:
             m[0, MODE], m[0, BLOCKED_S] = DRIVING, time
             _stays(m, pose, time)
     if m[0, MODE] == DRIVING:
-        _drive(time, velocity, wanted, error, there, numbers)
-    _evade(time, pose, wanted, error, numbers)
+        _drive(time, velocity, wanted, error, there, state, numbers)
+    _evade(time, pose, wanted, error, state, numbers)
 
 
 @njit(cache=True)
@@ -185,15 +193,9 @@ def _remember_held(
 
 
 @register_jitable
-def _track(time, pose, readings, followed, numbers):  # type: ignore[no-untyped-def]
-    hazards, space, sensors = numbers.hazards, numbers.space, numbers.sensors
-    track_hazards(hazards, time, pose, readings, space, followed, sensors)
-
-
-@register_jitable
-def _evade(time, pose, wanted, error, numbers):  # type: ignore[no-untyped-def]
-    """Goes otherwise than wanted where a body may come near."""
-    m, hazards = numbers.memory, numbers.hazards
+def _evade(time, pose, wanted, error, state, numbers):  # type: ignore[no-untyped-def]
+    """Changes speed and turn where a body may come near."""
+    m, hazards = state.memory, state.hazards
     count = pick_hazards(hazards, time, pose, _NEAR_M)
     if count == 0:
         return
@@ -217,17 +219,19 @@ def _stays(m: Any, pose: Any, time: float) -> None:  # pragma: no cover  (compil
 
 
 @register_jitable
-def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-untyped-def]
+def _find_heading(  # type: ignore[no-untyped-def]
+    time, target, velocity, pose, state, space, numbers
+):
     """Wanted speed, m/s, error of the heading, rad, and whether the robot is there."""
-    m, own, way = numbers.memory, numbers.own, numbers.way
+    m, own, way, hazards = state.memory, numbers.own, state.way, state.hazards
     x, y, theta = pose[0], pose[1], pose[2]
     if time - m[0, PLANNED_S] >= own.replan_s - 0.5 * numbers.tick_s:
         goal = target[0], target[1]
-        clear = np.empty((1 + len(numbers.hazards.tracks), 3))
+        clear = np.empty((1 + len(hazards.tracks), 3))
         clear[0, 0], clear[0, 1], clear[0, 2] = *goal, own.source_clearance_m
-        count = 1 + find_movers(numbers.hazards, time, clear[1:])
+        count = 1 + find_movers(hazards, time, clear[1:])
         radius = numbers.radius_m
-        find_way(way, numbers.space, (x, y), goal, time, radius, clear[:count])
+        find_way(way, space, (x, y), goal, time, radius, clear[:count])
         m[0, PLANNED_S] = time
         if way.facts[0, 2] < OCCUPIED:
             m[0, PASSABLE_S] = time
@@ -252,15 +256,17 @@ def _find_heading(time, target, velocity, pose, numbers):  # type: ignore[no-unt
 
 
 @register_jitable
-def _begin_look(time, pose, ahead, numbers):  # type: ignore[no-untyped-def]
-    """Before it first moves, and where the guard lets it not go on, the robot looks."""
-    m, x, y = numbers.memory, pose[0], pose[1]
+def _begin_look(  # type: ignore[no-untyped-def]
+    time, pose, ahead, state, space, numbers
+):
+    """The robot looks before it first moves, and where the guard stops it."""
+    m, x, y = state.memory, pose[0], pose[1]
     half = _FIRST_LOOK_RAD
     if m[0, HAS_LOOKED] > 0.5:
         if time - m[0, BLOCKED_S] <= numbers.own.patience_s:
             return
         offset, half = numbers.control_point_m, _LOOK_RAD
-        block = _blocking(numbers.space, x, y, pose[2], numbers.radius_m)
+        block = _blocking(space, x, y, pose[2], numbers.radius_m)
         m[0, BLOCK_X], m[0, BLOCK_Y] = block
         px, py = x + offset * math.cos(pose[2]), y + offset * math.sin(pose[2])
         ahead = math.atan2(block[1] - py, block[0] - px)
@@ -272,9 +278,9 @@ def _begin_look(time, pose, ahead, numbers):  # type: ignore[no-untyped-def]
 
 
 @register_jitable
-def _look(time, pose, report, numbers):  # type: ignore[no-untyped-def]
-    """Turns to one side and to the other of what blocks, until that is seen free."""
-    m, own = numbers.memory, numbers.own
+def _look(time, pose, report, state, numbers):  # type: ignore[no-untyped-def]
+    """Turns to both sides of the cell that blocks, until that is seen free."""
+    m, own = state.memory, numbers.own
     first = m[0, HAS_LOOKED] < 0.5
     heading = m[0, FIRST_LOOK] if m[0, LOOKS_DONE] < 0.5 else m[0, SECOND_LOOK]
     to = wrapped(heading - pose[2])
@@ -285,7 +291,7 @@ def _look(time, pose, report, numbers):  # type: ignore[no-untyped-def]
     if m[0, LOOKS_DONE] > 1.5 or seen:
         if not first and not seen:
             place = m[0, BLOCK_X], m[0, BLOCK_Y]
-            mark_blocked(numbers.way, place, time + own.mark_s)
+            mark_blocked(state.way, place, time + own.mark_s)
         m[0, MODE], m[0, BLOCKED_S], m[0, PLANNED_S] = DRIVING, time, -np.inf
         m[0, HAS_LOOKED] = 1.0
 
@@ -308,9 +314,11 @@ def _blocking(
 
 
 @register_jitable
-def _drive(time, velocity, wanted, error, there, numbers):  # type: ignore[no-untyped-def]
+def _drive(  # type: ignore[no-untyped-def]
+    time, velocity, wanted, error, there, state, numbers
+):
     """Towards the carrot, weaving, so that the sensors sweep what lies beside."""
-    m, own = numbers.memory, numbers.own
+    m, own = state.memory, numbers.own
     if there:
         m[0, SPEED], m[0, TURN] = wanted, 0.5 * numbers.following.turn_gain * error
         return
@@ -318,8 +326,8 @@ def _drive(time, velocity, wanted, error, there, numbers):  # type: ignore[no-un
     if wanted > 0.0:
         width, period = own.weave_rad, own.weave_period_s
         moves = math.hypot(velocity[0], velocity[1]) > _RESTS_M_S
-        narrow = numbers.way.facts[0, 2] >= NEAR
-        recent = time - numbers.hazards.memory[0, MOVED_S] < _MOVES_S
+        narrow = state.way.facts[0, 2] >= NEAR
+        recent = time - state.hazards.memory[0, MOVED_S] < _MOVES_S
         if recent or (moves and not narrow):
             behind = m[0, WAY_LEFT] - numbers.follow_distance_m - _LITTLE_BEHIND_M
             part = min(max(behind / (_FAR_BEHIND_M - _LITTLE_BEHIND_M), 0.0), 1.0)

@@ -108,10 +108,6 @@ class Hazards(NamedTuple):
     """(n, 7) particles that stand for all, from ``pick_hazards``; their weights are
     numbers of bodies."""
 
-    def copy(self) -> Hazards:
-        """The same in arrays of its own."""
-        return Hazards(*(np.copy(values) for values in self))
-
 
 def make_hazards(sensors: int) -> Hazards:
     """Nothing that moves.

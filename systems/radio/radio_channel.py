@@ -7,13 +7,10 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.framework.state_block import StateOutputs
-from systems.framework.step_block import RunFacts, Step, reseeded
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES
 from systems.radio.parameters import RadioParameters
 
@@ -60,14 +57,9 @@ def _send(state: Any, place: int, frames: Any, numbers: Any, random: Any) -> Non
 def radio_channel_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ChannelNumbers
 ) -> None:
-    """What is on the air after a tick; see ``systems.framework.step_block.Step``.
+    """What is on the air after a tick.
 
-    Args:
-        tick: Number of the tick.
-        state: ``delay`` rows of the size of ``air``, the next one first; changed.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``ChannelNumbers``.
+    State: ``delay`` rows of the size of ``air``, the next one first.
     """
     for k in range((numbers.delay - 1) * AIR_SIZE):
         state[k] = state[k + AIR_SIZE]
@@ -91,54 +83,48 @@ def _publish(state: Any, outputs: Any, numbers: ChannelNumbers) -> None:
         air[k] = state[k]
 
 
-class RadioChannel(LeafSystem, StateOutputs):
+class RadioChannel(Block):
     """Brings what each robot sends to all radios.
 
-    .. pydrake_system::
+    For each robot that sends, the block has an input port ``frames_<robot>`` (number of
+    frames, and nine bytes each). All radios hear the same bytes, and a robot hears its
+    own frames, too: frames contain addresses. By chance a frame is lost as a whole, or
+    one of its bytes is changed.
 
-        name: RadioChannel
-        output_ports:
-        - air [number of bytes, and bytes]
-
-    For each robot that sends it has an input port ``frames_<robot>`` (number of frames,
-    and nine bytes each). All radios hear the same, the sender's own included: frames
-    bear addresses. A frame is lost as a whole, or a byte of it is changed; both by
-    chance.
-
-    Discrete state, every tick: what is on its way. Latency: ``latency_s``, rounded to
-    ticks, at least one.
+    Discrete state, every tick: the bytes on their way. Latency: ``latency_s``, rounded
+    to ticks, at least one.
 
     Args:
         parameters: ``RadioParameters``.
-        robots: Names of those that send.
-        seed: Of losses and errors.
+        robots: Names of the robots that send.
+        seed: Seed of losses and errors.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, 3.3; latency and losses are ours.
     """
 
-    FACTS = BlockFacts("radio", "world")
+    part, stage = "radio", "world"
+    outputs = (Port("air", AIR_SIZE, "number of bytes, and bytes"),)
 
     def __init__(
         self,
         *,
-        parameters: RadioParameters | None = None,
+        parameters: RadioParameters = RadioParameters(),
         robots: Sequence[str] = (),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or RadioParameters()
-        delay = max(1, round(own.latency_s / tick_s))
-        numbers = ChannelNumbers(delay, own.loss, own.byte_error, tick_noise(seed))
         self.set_name("radio_channel")
-        self.declare_state_outputs(
-            Step(radio_channel_step, numbers, [0.0] * (delay * AIR_SIZE), _publish),
-            [(f"frames_{name}", FRAMES_SIZE) for name in robots],
-            (("air", AIR_SIZE),),
-            tick_s,
+        self.inputs = [
+            Port(f"frames_{name}", FRAMES_SIZE, "number, and nine bytes each")
+            for name in robots
+        ]
+        delay = max(1, round(parameters.latency_s / tick_s))
+        numbers = ChannelNumbers(
+            delay, parameters.loss, parameters.byte_error, tick_noise(seed)
         )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return reseeded(self, run)
+        self.declare(
+            Step(radio_channel_step, numbers, [0.0] * (delay * AIR_SIZE), _publish),
+            tick_s=tick_s,
+        )

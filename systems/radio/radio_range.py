@@ -6,12 +6,10 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.radio.parameters import RadioParameters
 
 #: Levels are measured so often, s.
@@ -65,14 +63,9 @@ class RangeNumbers(NamedTuple):
 def radio_range_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: RangeNumbers
 ) -> None:
-    """Level of one tick; see ``systems.framework.step_block.Step``.
+    """The level that the radio hears.
 
-    Args:
-        tick: Number of the tick.
-        state: The last level, dBm.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``RangeNumbers``.
+    State: the last level, dBm.
     """
     if tick % numbers.period == 0:
         pose, other = inputs
@@ -83,20 +76,11 @@ def radio_range_step(
     outputs[0][0] = state[0]
 
 
-class RadioRange(LeafSystem, StepBlock):
-    """Measures the level of what the robot comes to.
+class RadioRange(Block):
+    """Measures the level of the radio that the robot approaches.
 
-    .. pydrake_system::
-
-        name: RadioRange
-        input_ports:
-        - pose_WB [m, m, rad]
-        - pose_WS [m, m, rad]
-        output_ports:
-        - rssi_dbm [dBm]
-
-    A level is drawn every 0.1 s about that of the distance of the two bodies' middles,
-    with a normal error. Discrete state: the last one. Latency: none.
+    Every 0.1 s it draws a level: that of the distance between the centers of the two
+    bodies, plus a normal error. Discrete state: the last level. Latency: none.
 
     Args:
         parameters: Levels and fading.
@@ -106,33 +90,24 @@ class RadioRange(LeafSystem, StepBlock):
     Reference: Song 2011, eq. 8.
     """
 
-    FACTS = BlockFacts("radio_range", "hearing", columns={"rssi_dbm": ("rssi_dbm",)})
+    part, stage = "radio_range", "hearing"
+    inputs = (Port("pose_WB", 3, "m, m, rad"), Port("pose_WS", 3, "m, m, rad"))
+    outputs = (Port("rssi_dbm", 1, "dBm", "rssi_dbm"),)
 
     def __init__(
         self,
         *,
-        parameters: RadioParameters | None = None,
+        parameters: RadioParameters = RadioParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or RadioParameters()
         numbers = RangeNumbers(
-            own.level_at_1_m_dbm,
-            own.path_loss_exponent,
-            own.fading_db,
+            parameters.level_at_1_m_dbm,
+            parameters.path_loss_exponent,
+            parameters.fading_db,
             max(1, round(_PERIOD_S / tick_s)),
             tick_noise(seed),
         )
         self.set_name("radio_range")
-        self.declare_step(
-            float,
-            Step(radio_range_step, numbers, [0.0]),
-            (("pose_WB", 3), ("pose_WS", 3)),
-            (("rssi_dbm", 1),),
-            tick_s,
-        )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return reseeded(self, run)
+        self.declare(Step(radio_range_step, numbers, [0.0]), tick_s=tick_s)

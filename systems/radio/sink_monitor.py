@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.state_block import StateOutputs
-from systems.framework.step_block import Step
 from systems.radio.radio_channel import AIR_SIZE
 from systems.radio.stream import PARSER_SIZE, parse_byte
 
@@ -37,20 +33,15 @@ class SinkNumbers(NamedTuple):
 def sink_monitor_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SinkNumbers
 ) -> None:
-    """What is known after a tick; see ``systems.framework.step_block.Step``.
+    """What is known of each robot after a tick.
 
-    Args:
-        tick: Not used.
-        state: What is known of each robot, then the parser's; changed.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``SinkNumbers``.
+    State: ``SINK_FIELDS`` of each robot, then the state of the parser.
     """
     air, fields, robots = inputs[0], 5, len(numbers.addresses)
     for robot in range(robots):
         state[robot * fields + _AGE] += numbers.tick_s
     first = robots * fields
-    parser = state[first : first + PARSER_SIZE]
+    parser = state[first:]
     for k in range(int(air[0])):
         good, address, function, value = parse_byte(parser, air[1 + k])
         if not good:
@@ -64,8 +55,6 @@ def sink_monitor_step(
                 state[place + _AGE] = 0.0
                 if function in (12, 16):
                     state[place + _RESULT] = value
-    for k in range(PARSER_SIZE):  # of a list, the slice was a copy
-        state[first + k] = parser[k]
 
 
 @register_jitable
@@ -76,18 +65,11 @@ def _publish(state: Any, outputs: Any, numbers: SinkNumbers) -> None:
         status[k] = state[k]
 
 
-class SinkMonitor(LeafSystem, StateOutputs):
-    """Listens to all frames, and keeps the last of each robot.
+class SinkMonitor(Block):
+    """Listens to all frames, and keeps the last frame of each robot.
 
-    .. pydrake_system::
-
-        name: SinkMonitor
-        input_ports:
-        - air [number of bytes, and bytes]
-        output_ports:
-        - sink_status [number, five for each robot, see SINK_FIELDS]
-
-    Discrete state, every tick: the output, and the parser's. Latency: a tick.
+    Discrete state, every tick: the output, and the state of the parser. Latency: a
+    tick.
 
     Args:
         robots: Addresses of the robots, by name.
@@ -96,21 +78,24 @@ class SinkMonitor(LeafSystem, StateOutputs):
     Reference: Song 2011, 3.3 and 4.1.
     """
 
-    FACTS = BlockFacts("sink", "world")
+    part, stage = "sink", "world"
+    inputs = (Port("air", AIR_SIZE, "number of bytes, and bytes"),)
+    outputs = (
+        Port("sink_status", "5 robots", "number, five for each robot, see SINK_FIELDS"),
+    )
 
     def __init__(
-        self, *, robots: Mapping[str, int] | None = None, tick_s: float = TICK_S
+        self, *, robots: Mapping[str, int] = {}, tick_s: float = TICK_S
     ) -> None:
         super().__init__()
-        robots = robots or {}
-        names = [f"{name}.{field}" for name in robots for field in SINK_FIELDS]
-        self.FACTS = replace(SinkMonitor.FACTS, columns={"sink_status": tuple(names)})
+        self.set_name("sink_monitor")
+        names = tuple(f"{name}.{field}" for name in robots for field in SINK_FIELDS)
+        self.outputs = (self.outputs[0]._replace(columns=names),)
         state = [0.0, -1.0, 0.0, 0.0, -1.0] * len(robots) + [0.0] * PARSER_SIZE
         addresses = np.array([*robots.values()], dtype=np.int64)
-        self.set_name("sink_monitor")
-        self.declare_state_outputs(
+        self.declare(
             Step(sink_monitor_step, SinkNumbers(addresses, tick_s), state, _publish),
-            (("air", AIR_SIZE),),
-            (("sink_status", len(names)),),
-            tick_s,
+            tick_s=tick_s,
+            sizes={"robots": len(robots)},
+            arrays=True,
         )

@@ -7,13 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import ContactParameters
 from systems.world.geometry import beyond_rectangle
 
@@ -65,17 +63,8 @@ def _feel(
 def contact_switches_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SwitchNumbers
 ) -> None:
-    """Switches of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``SwitchNumbers``.
-    """
+    """Which switches are closed, and what the robot touches."""
     pose, poses, sizes, followed = inputs
-    here = np.asarray(pose)
     bodies = len(poses) // 3
     touched, left, right = -1, False, False
     body = np.empty(5)
@@ -88,7 +77,7 @@ def contact_switches_step(
             for k in range(3):
                 body[k] = followed[k]
             body[3], body[4] = numbers.length_m, numbers.width_m
-        felt = _feel(here, body, numbers.points, numbers.middle_m, numbers.reach_m)
+        felt = _feel(pose, body, numbers.points, numbers.middle_m, numbers.reach_m)
         if felt[0] or felt[1]:
             touched = number
         left, right = left or felt[0], right or felt[1]
@@ -102,78 +91,65 @@ def contact_switches_step(
     outputs[1][0] = float(touched)
 
 
-class ContactSwitches(LeafSystem, StepBlock):
-    """Feels what the front of the robot touches.
+class ContactSwitches(Block):
+    """Detects what the front of the robot touches.
 
-    .. pydrake_system::
-
-        name: ContactSwitches
-        input_ports:
-        - pose_WB [m, m, rad]
-        - poses_WO [m, m, rad each]
-        - sizes [m, m each]
-        - pose_WS [m, m, rad]
-        output_ports:
-        - contact [0 or 1, left and right]
-        - touched [number of a body, -1 none]
-
-    A switch closes where a body is within its reach of its half of the front edge; in
-    the middle both do. Flanks and rear feel nothing. ``touched`` is the truth behind
-    them: the body's number, that of ``pose_WS`` being the last. The switches cannot
-    tell a source from a wall.
+    A switch closes when a body is within its reach of its half of the front edge; in
+    the middle of the edge both switches close. Flanks and rear have no switches.
+    ``touched`` is the true number of the body; the body at ``pose_WS`` is the last one.
+    The switches cannot tell a source from a wall.
 
     No state. Rate: every tick; latency: none.
 
     Args:
         parameters: ``ContactParameters``.
-        robot: Its size.
+        robot: Size of the robot.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        source_size: Length and width of what stands at ``pose_WS``, m.
+        source_size: Length and width of the body at ``pose_WS``, m.
         tick_s: Period of the robot, s.
 
     Reference: Song 2011, 2.1, 4.2.
     """
 
-    FACTS = BlockFacts(
-        "contact",
-        "obstacle sensing",
-        columns={"contact": ("contact_left", "contact_right"), "touched": ("touched",)},
+    part, stage = "contact", "obstacle sensing"
+    inputs = (
+        Port("pose_WB", 3, "m, m, rad"),
+        Port("poses_WO", "3 bodies", "m, m, rad each"),
+        Port("sizes", "2 bodies", "m, m each"),
+        Port("pose_WS", 3, "m, m, rad"),
+    )
+    outputs = (
+        Port("contact", 2, "0 or 1, left and right", ("contact_left", "contact_right")),
+        Port("touched", 1, "number of a body, -1 none", "touched"),
     )
 
     def __init__(
         self,
         *,
-        parameters: ContactParameters | None = None,
-        robot: RobotParameters | None = None,
+        parameters: ContactParameters = ContactParameters(),
+        robot: RobotParameters = RobotParameters(),
         bodies: int = 0,
         source_size: tuple[float, float] = (0.08, 0.08),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own, robot = parameters or ContactParameters(), robot or RobotParameters()
+        self.set_name("contact_switches")
         y = 0.5 * robot.width_m * np.arange(_POINTS, -_POINTS - 1, -1) / _POINTS
         front = np.column_stack([np.full_like(y, 0.5 * robot.length_m), y])
         numbers = SwitchNumbers(
             front,
             _MIDDLE * robot.width_m,
-            own.reach_m,
+            parameters.reach_m,
             *source_size,
-            _since(own, "stuck_open"),
-            _since(own, "stuck_closed"),
+            _since(parameters, "stuck_open"),
+            _since(parameters, "stuck_closed"),
             tick_s,
         )
-        self.set_name("contact_switches")
-        self.declare_step(
-            float,
+        self.declare(
             Step(contact_switches_step, numbers),
-            (
-                ("pose_WB", 3),
-                ("poses_WO", 3 * bodies),
-                ("sizes", 2 * bodies),
-                ("pose_WS", 3),
-            ),
-            (("contact", 2), ("touched", 1)),
-            tick_s,
+            tick_s=tick_s,
+            sizes={"bodies": bodies},
+            arrays=True,
         )
 
 

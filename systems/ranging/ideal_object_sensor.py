@@ -8,17 +8,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.input_error import InputError
 from systems.framework.noise import TickNoise, tick_noise, tick_normals
 from systems.framework.signals import TICK_S, whole
-from systems.framework.step_block import RunFacts, Step, StepBlock, reseeded
 from systems.ranging.objects import (
     KNOWN,
+    OBJECTS_PORT,
+    OBJECTS_SIZE,
     RADIUS,
     ROBOT,
     THERE,
@@ -153,18 +153,13 @@ def _seen(
 def ideal_object_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ObjectNumbers
 ) -> None:
-    """Objects of one tick; see ``systems.framework.step_block.Step``.
+    """The objects that the sensor reports.
 
-    Args:
-        tick: Number of the tick.
-        state: Whether there was a tick before, poses then, and rows seen, oldest first.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``ObjectNumbers``.
+    State: whether there was a tick before, the poses of the bodies then, and the
+    objects that are not reported yet, oldest first.
     """
-    size = OBJECT_SLOTS * OBJECT_SIZE
-    kept, pose = np.asarray(state), np.asarray(inputs[0])
-    seen = _seen(kept, pose, np.asarray(inputs[1]), np.asarray(inputs[2]), numbers)
+    pose, poses, sizes = inputs
+    seen = _seen(state, pose, poses, sizes, numbers)
     normals = tick_normals(numbers.noise, tick, OBJECT_SLOTS, 4)
     for k in range(OBJECT_SLOTS):
         if seen[k, THERE] > 0.5:
@@ -172,71 +167,67 @@ def ideal_object_step(
                 seen[k, X + j] += numbers.noise_m * normals[k, j]
                 if seen[k, KNOWN] > 0.5:
                     seen[k, VX + j] += numbers.velocity_noise_m_s * normals[k, 2 + j]
-    first = len(kept) - numbers.delay * size
-    for k in range(size):
+    first = len(state) - numbers.delay * OBJECTS_SIZE
+    last = len(state) - OBJECTS_SIZE
+    for k in range(OBJECTS_SIZE):
         value = seen[k // OBJECT_SIZE, k % OBJECT_SIZE]
-        outputs[0][k] = kept[first + k] if numbers.delay > 0 else value
-        for row in range(numbers.delay - 1):
-            kept[first + row * size + k] = kept[first + (row + 1) * size + k]
+        outputs[0][k] = state[first + k] if numbers.delay > 0 else value
+        for at in range(first + k, last, OBJECTS_SIZE):
+            state[at] = state[at + OBJECTS_SIZE]
         if numbers.delay > 0:
-            kept[first + (numbers.delay - 1) * size + k] = value
-    for k in range(len(kept)):
-        state[k] = kept[k]
+            state[last + k] = value
 
 
-class IdealObjectSensor(LeafSystem, StepBlock):
-    """Gives places and velocities of the bodies about P, in all directions.
+class IdealObjectSensor(Block):
+    """Gives positions and velocities of the bodies around P, in all directions.
 
-    .. pydrake_system::
+    The output has the eight nearest bodies within the range. A body at rest is its
+    rectangle: x and y lead to its nearest point. A moving body is the disc around its
+    center that contains it, of ``RADIUS``, with the velocity of its center. A long
+    moving body, or one whose disc contains P, is its nearest point with the velocity of
+    this point, and a disc of half its width behind it. Velocities are known from the
+    second tick on, from the poses of the tick before.
 
-        name: IdealObjectSensor
-        input_ports:
-        - pose_WB [m, m, rad]
-        - poses_WO [m, m, rad each]
-        - sizes [m, m each]
-        output_ports:
-        - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
-
-    The eight nearest bodies within the range. One that rests is its rectangle: x and y
-    lead to its nearest point. One that moves is the disc about its middle that holds
-    it, of ``RADIUS``, with the velocity of its middle; a long one, or one whose disc
-    holds P, is its nearest point with that point's velocity, and a disc of half its
-    width behind it. Velocities are known from the second tick on, from the poses of a
-    tick ago.
-
-    Discrete state: poses of a tick ago and, with ``latency_s``, what was seen since
-    then; places are from P as it was. Else a function of the present input: no latency.
-    Noise is drawn once a tick.
+    Discrete state: poses of the tick before and, with ``latency_s``, the objects since
+    then; their positions are relative to P at their tick. Without ``latency_s`` there
+    is no latency. Noise is drawn once per tick.
 
     Args:
         parameters: ``ObjectSensorParameters``.
         robot: Place of P.
         bodies: Number of bodies on ``poses_WO`` and ``sizes``.
-        robots: Numbers of those that are robots.
-        seed: Of the noise.
+        robots: Numbers of the bodies that are robots.
+        seed: Seed of the noise.
         tick_s: Period of the robot, s.
 
     Raises:
         InputError: The latency is no multiple of the tick.
 
-    Reference: ours, in the place of the scan of Engelbrecht, Steyn and Djouani (2021),
-    who print neither how beams become obstacles nor whence their velocities come.
+    Reference: ours. It replaces the scan of Engelbrecht, Steyn and Djouani (2021), who
+    print neither how beams become obstacles nor how they get the velocities.
     """
 
-    FACTS = BlockFacts("objects", "obstacle sensing")
+    part, stage = "objects", "obstacle sensing"
+    inputs = (
+        Port("pose_WB", 3, "m, m, rad"),
+        Port("poses_WO", "3 bodies", "m, m, rad each"),
+        Port("sizes", "2 bodies", "m, m each"),
+    )
+    outputs = (OBJECTS_PORT,)
 
     def __init__(
         self,
         *,
-        parameters: ObjectSensorParameters | None = None,
-        robot: RobotParameters | None = None,
+        parameters: ObjectSensorParameters = ObjectSensorParameters(),
+        robot: RobotParameters = RobotParameters(),
         bodies: int = 0,
         robots: Sequence[int] = (),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or ObjectSensorParameters()
+        self.set_name("ideal_object_sensor")
+        own = parameters
         if own.latency_s > 0.0 and not whole(own.latency_s / tick_s):
             raise InputError(
                 "objects.latency_s",
@@ -249,22 +240,16 @@ class IdealObjectSensor(LeafSystem, StepBlock):
             own.noise_m,
             own.velocity_noise_m_s,
             own.occlusion,
-            (robot or RobotParameters()).control_point_m,
+            robot.control_point_m,
             np.isin(np.arange(bodies), list(robots)),
             tick_noise(seed),
             delay,
             tick_s,
         )
-        size = OBJECT_SLOTS * OBJECT_SIZE
-        self.set_name("ideal_object_sensor")
-        self.declare_step(
-            float,
-            Step(ideal_object_step, numbers, [0.0] * (1 + 3 * bodies + delay * size)),
-            (("pose_WB", 3), ("poses_WO", 3 * bodies), ("sizes", 2 * bodies)),
-            (("objects_W", size),),
-            tick_s,
+        state = [0.0] * (1 + 3 * bodies + delay * OBJECTS_SIZE)
+        self.declare(
+            Step(ideal_object_step, numbers, state),
+            tick_s=tick_s,
+            sizes={"bodies": bodies},
+            arrays=True,
         )
-
-    def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        return reseeded(self, run)

@@ -7,13 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.ranging.beam_groups import BeamNumbers, group_beams
 from systems.ranging.object_tracks import (
     TRACK_SIZE,
@@ -21,9 +19,9 @@ from systems.ranging.object_tracks import (
     TrackNumbers,
     track_objects,
 )
+from systems.ranging.objects import OBJECTS_PORT, OBJECTS_SIZE
 from systems.ranging.parameters import (
     OBJECT_SIZE,
-    OBJECT_SLOTS,
     ObjectDetectorParameters,
     UltrasonicParameters,
 )
@@ -93,58 +91,38 @@ def _detect(
 def object_detector_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DetectorNumbers
 ) -> None:
-    """Objects of one tick; see ``systems.framework.step_block.Step``.
+    """The objects that the beams hit.
 
-    Args:
-        tick: Not used.
-        state: Last hit of each beam and the tracks.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``DetectorNumbers``.
+    State: last hit of each beam, and the tracks.
     """
-    kept = np.asarray(state)
-    ranges, echo, ages = np.asarray(inputs[0]), np.asarray(inputs[1]), inputs[2]
-    found = _detect(
-        kept, ranges, echo, np.asarray(ages), np.asarray(inputs[3]), numbers
-    )
-    for k in range(OBJECT_SLOTS * OBJECT_SIZE):
+    ranges, echo, ages, pose = inputs
+    found = _detect(state, ranges, echo, ages, pose, numbers)
+    for k in range(OBJECTS_SIZE):
         outputs[0][k] = found[k // OBJECT_SIZE, k % OBJECT_SIZE]
-    for k in range(len(kept)):
-        state[k] = kept[k]
 
 
-class ObjectDetector(LeafSystem, StepBlock):
-    """Makes objects of what beams hit, and follows them for their velocities.
+class ObjectDetector(Block):
+    """Groups the hits of beams into objects, and tracks them for their velocities.
 
-    .. pydrake_system::
+    It replaces ``IdealObjectSensor`` and has the same output port. Hits of neighboring
+    beams that are near enough are one object; a hollow surface is several objects. Of
+    each object the block gives the vector to the nearest point of the hits and of the
+    lines between them at this tick; the filtered velocity, once it has tracked the
+    object for long enough; and as the radius half of its width, or 0 if it is wide. An
+    object that is no longer seen stays for a while, because narrow beams lose what is
+    between them. The beams do not show whether an object is a robot.
 
-        name: ObjectDetector
-        input_ports:
-        - ranges [m]
-        - echo [0 or 1]
-        - range_ages [s]
-        - pose_WB_estimated [m, m, rad]
-        output_ports:
-        - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
-
-    Stands in for ``IdealObjectSensor`` with the output port of that. Hits of
-    neighbouring beams that are near enough are one object, a hollow surface several.
-    What it gives of each: the vector to the nearest point of the hits and of the lines
-    between them, as it is at this tick; the velocity, filtered, once it was followed
-    for long enough; half of its width as the radius, none of a wide one. What is not
-    seen any more stays for a while, for narrow beams lose what is between them. Whether
-    an object is a robot, beams do not tell.
-
-    Beams know what they hit alone: between 7 of them a disc 0.2 m wide is surely seen
-    within 0.4 m of P only. Motion along a surface shows by its edges alone, as coarsely
-    as the beams are apart. A second after boxes have come into view that cross at 0.15
-    to 0.3 m/s, 1 m off, half of the velocities are wrong by more than 25 % with 36
-    beams all around, 15 % with 72 and 7 % with 360, and what rests seems to move at up
-    to 0.3, 0.12 and 0 m/s while the robot turns. Where beams are farther apart than
-    ``coarse_m``, as the 7 from 0.48 m on, none is known.
+    Beams detect only what they hit: with 7 beams a disc 0.2 m wide is sure to be seen
+    only within 0.4 m of P. Motion along a surface shows only at its edges, and only as
+    finely as the beams are spaced. For boxes that cross at 0.15 to 0.3 m/s at a
+    distance of 1 m, a second after they have come into view, half of the velocities
+    have an error of more than 25 % with 36 beams all around, 15 % with 72 and 7 % with
+    360. While the robot turns, bodies at rest seem to move at up to 0.3, 0.12 and 0
+    m/s. Where the beams are farther apart than ``coarse_m``, as the 7 beams from 0.48 m
+    on, no velocity is known.
 
     Discrete state, every tick: hits and tracks. The output is a function of state and
-    inputs: no latency, but the velocity follows a change within some 0.5 s.
+    inputs: no latency, but the velocity takes about 0.5 s to follow a change.
 
     Args:
         parameters: ``ObjectDetectorParameters``.
@@ -153,38 +131,36 @@ class ObjectDetector(LeafSystem, StepBlock):
         tick_s: Period of the robot, s.
 
     Reference: ours. Engelbrecht, Steyn and Djouani (2021) print neither how beams
-    become obstacles nor whence their velocities come; sums over beams add up to more
-    damping than a tick can bear.
+    become obstacles nor how they get the velocities; a sum over beams gives more
+    damping than is stable at this tick.
     """
 
-    FACTS = BlockFacts("objects", "obstacle sensing")
+    part, stage = "objects", "obstacle sensing"
+    inputs = (
+        Port("ranges", "sensors", "m"),
+        Port("echo", "sensors", "0 or 1"),
+        Port("range_ages", "sensors", "s"),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+    )
+    outputs = (OBJECTS_PORT,)
 
     def __init__(
         self,
         *,
-        parameters: ObjectDetectorParameters | None = None,
-        sensors: UltrasonicParameters | None = None,
-        robot: RobotParameters | None = None,
+        parameters: ObjectDetectorParameters = ObjectDetectorParameters(),
+        sensors: UltrasonicParameters = UltrasonicParameters(),
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or ObjectDetectorParameters()
-        sensors = sensors or UltrasonicParameters()
         self.set_name("object_detector")
-        numbers = _numbers(own, sensors, robot or RobotParameters(), tick_s)
-        count = sensors.count
-        size = _BEAM_SIZE * count + TRACKS * TRACK_SIZE
-        self.declare_step(
-            float,
+        numbers = _numbers(parameters, sensors, robot, tick_s)
+        size = _BEAM_SIZE * sensors.count + TRACKS * TRACK_SIZE
+        self.declare(
             Step(object_detector_step, numbers, [0.0] * size),
-            (
-                ("ranges", count),
-                ("echo", count),
-                ("range_ages", count),
-                ("pose_WB_estimated", 3),
-            ),
-            (("objects_W", OBJECT_SLOTS * OBJECT_SIZE),),
-            tick_s,
+            tick_s=tick_s,
+            sizes={"sensors": sensors.count},
+            arrays=True,
         )
 
 

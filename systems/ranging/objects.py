@@ -17,10 +17,19 @@ from typing import Any
 
 import numpy as np
 
+from systems.framework.block import Port
 from systems.framework.compiling import njit
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 
 THERE, X, Y, VX, VY, KNOWN, RADIUS, ROBOT = range(8)
+#: Size of the port.
+OBJECTS_SIZE = OBJECT_SLOTS * OBJECT_SIZE
+#: Output port of every block that senses objects.
+OBJECTS_PORT = Port(
+    "objects_W",
+    OBJECTS_SIZE,
+    "number, m and m/s in eight slots, see systems.ranging.objects",
+)
 
 
 @njit(cache=True)

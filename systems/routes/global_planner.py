@@ -1,22 +1,19 @@
-"""The route to the goal: planned from the map, and anew where the robot stalls."""
+"""The route to the goal: planned from the map, and again where the robot stalls."""
 
 from __future__ import annotations
 
 import math
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, RunFacts, Step
 from systems.framework.compiling import njit
-from systems.framework.finite import read_arrays
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
 from systems.routes.occupancy_grid import (
     OccupancyGrid,
@@ -26,7 +23,13 @@ from systems.routes.occupancy_grid import (
     make_occupancy_grid,
 )
 from systems.routes.parameters import RouteParameters
-from systems.routes.route import ROUTE_SIZE, fill_route, find_route, plan_route
+from systems.routes.route import (
+    ROUTE_SIZE,
+    ROUTE_UNIT,
+    fill_route,
+    find_route,
+    plan_route,
+)
 from systems.routes.seen_points import (
     SeenPoints,
     discs_to_avoid,
@@ -35,11 +38,9 @@ from systems.routes.seen_points import (
 )
 from systems.world.geometry import control_point
 
-#: Places in the state after the route.
-REPLANS, SINCE_S, FROM_M = range(ROUTE_SIZE, ROUTE_SIZE + 3)
-#: Sizes of its groups: the route, how often it was planned anew, and since when, s, and
-#: from where along the route, m, P has been making no way.
-_SIZES = ROUTE_SIZE, 1, 2
+#: Places in ``PlannerState.progress``: number of new routes, and since when, s, and
+#: from where along the route, m, P has not advanced.
+REPLANS, SINCE_S, FROM_M = range(3)
 
 
 class PlannerNumbers(NamedTuple):
@@ -49,97 +50,86 @@ class PlannerNumbers(NamedTuple):
     """With the cells blocked that are too near to known obstacles."""
     rectangles: NDArray[np.float64]
     """(k, 5) known obstacles in W."""
-    seen: SeenPoints
-    """Changed."""
     goal: tuple[float, float]
     clearance_m: float
     stall_m: float
     stalled_s: float
-    """Infinite: it never plans anew."""
+    """Infinite: the planner makes no new routes."""
     arrived_m: float
     control_point_m: float
     """Distance of P ahead of the axle, m."""
     tick_s: float
 
 
+class PlannerState(NamedTuple):
+    """The state of ``GlobalPlanner``."""
+
+    route: NDArray[np.float64]
+    """(ROUTE_SIZE,) as the port ``route``."""
+    progress: NDArray[np.float64]
+    """(3,) ``REPLANS``, ``SINCE_S`` and ``FROM_M``."""
+    seen: SeenPoints
+
+
 @njit(cache=True)
-def _find_anew(
-    numbers: PlannerNumbers, objects: Any, p_WP: tuple[float, float]
+def _find_route_again(
+    numbers: PlannerNumbers, seen: SeenPoints, objects: Any, p_WP: tuple[float, float]
 ) -> Any:  # pragma: no cover  (compiled)
     """Points of a route from P past all that is known, has been seen or rests."""
     grid, clearance = numbers.grid, numbers.clearance_m
-    discs = discs_to_avoid(numbers.seen, objects, p_WP)
+    discs = discs_to_avoid(seen, objects, p_WP)
     now = OccupancyGrid(grid.blocked.copy(), grid.low, grid.cell_m)
     block_discs(now, discs, clearance)
     return find_route(now, p_WP, numbers.goal, numbers.rectangles, discs, clearance)
 
 
 def planner_step(
-    tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlannerNumbers
+    tick: int, state: PlannerState, inputs: Any, outputs: Any, numbers: PlannerNumbers
 ) -> None:
-    """The route for the next tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: (ROUTE_SIZE + 3,) array: the route, and ``REPLANS``, ``SINCE_S``,
-            ``FROM_M``.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``PlannerNumbers``.
-    """
+    """The route of the next tick."""
     if numbers.stalled_s == math.inf:
         return
-    objects, pose, progress = inputs
+    objects, pose, route_progress = inputs
+    seen, progress, reached = state.seen, state.progress, route_progress[1]
     x, y = control_point((pose[0], pose[1], pose[2]), numbers.control_point_m)
-    remember_objects(numbers.seen, numbers.grid, numbers.rectangles, objects, (x, y))
+    remember_objects(seen, numbers.grid, numbers.rectangles, objects, (x, y))
     time = tick * numbers.tick_s
     away = math.hypot(numbers.goal[0] - x, numbers.goal[1] - y)
-    if progress[1] >= state[FROM_M] + numbers.stall_m or away <= numbers.arrived_m:
-        state[FROM_M], state[SINCE_S] = progress[1], time
+    if reached >= progress[FROM_M] + numbers.stall_m or away <= numbers.arrived_m:
+        progress[FROM_M], progress[SINCE_S] = reached, time
     # Half a tick is more than the rounding of times.
-    if time - state[SINCE_S] < numbers.stalled_s - 0.5 * numbers.tick_s:
+    if time - progress[SINCE_S] < numbers.stalled_s - 0.5 * numbers.tick_s:
         return
-    state[SINCE_S], state[FROM_M] = time, progress[1]
-    points = _find_anew(numbers, objects, (x, y))
+    progress[SINCE_S], progress[FROM_M] = time, reached
+    points = _find_route_again(numbers, seen, objects, (x, y))
     if len(points) > 0:
-        fill_route(state, points)
-        state[REPLANS] += 1.0
-        state[FROM_M] = 0.0
+        fill_route(state.route, points)
+        progress[REPLANS] += 1.0
+        progress[FROM_M] = 0.0
 
 
-def _publish_route(state: Any, outputs: Any, numbers: PlannerNumbers) -> None:
+def _publish_route(state: PlannerState, outputs: Any, numbers: PlannerNumbers) -> None:
     """The outputs of ``planner_step``'s state."""
     route, replans = outputs
     for k in range(len(route)):
-        route[k] = state[k]
-    replans[0] = state[REPLANS]
+        route[k] = state.route[k]
+    replans[0] = state.progress[REPLANS]
 
 
-class GlobalPlanner(LeafSystem):
-    """Gives the route to the goal, and plans it anew where the robot stalls.
+class GlobalPlanner(Block):
+    """Gives the route to the goal, and plans a new one where the robot stalls.
 
-    .. pydrake_system::
+    The first route leads from the place of P at the start past the known obstacles
+    (``plan_route``). The planner remembers the nearest points of objects that are not
+    known to move, one per cell of the grid. If P advances by less than ``stall_m``
+    along the route in ``stalled_s``, and is farther from the goal than ``arrived_m``,
+    the block plans a route from the place of P, which also avoids these points and
+    robots at rest. If there is none, the old route stays, and the block tries again
+    after ``stalled_s``.
 
-        name: GlobalPlanner
-        input_ports:
-        - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
-        - pose_WB_estimated [m, m, rad]
-        - route_progress [m, m]
-        output_ports:
-        - route [number of points, then in m their spacing, and x and y of each]
-        - replans [number of routes that were planned anew]
-
-    The first route leads from where P starts past the known obstacles (``plan_route``).
-    The nearest points of objects that are not known to move are remembered, one a cell
-    of the grid. Where P comes less than ``stall_m`` farther along the route in
-    ``stalled_s``, and is farther from the goal than ``arrived_m``, a route is planned
-    from where P is, past these points and robots at rest, too. If there is none, the
-    old one stays, and it tries again after as long.
-
-    Discrete state, every tick: route and number of replans, which are the outputs, and
-    since when and from where P makes no way; abstract state: ``SeenPoints``. An update
-    at t reads the inputs at t, and its route is there from t on: for other updates at
-    the next tick. Outputs are state; no feedthrough.
+    State, every tick: ``PlannerState``. An update at t reads the inputs at t, and its
+    route is published from t on: other updates read it at the next tick. The outputs
+    are state; no feedthrough.
 
     Args:
         parameters: ``RouteParameters``.
@@ -151,113 +141,82 @@ class GlobalPlanner(LeafSystem):
     Raises:
         InputError: There is no route.
 
-    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2: A* plans the path. That it
-    plans anew is ours.
+    Reference: Engelbrecht, Steyn and Djouani (2021), sec. 2: A* plans the path. The
+    replanning is ours.
     """
 
-    FACTS = BlockFacts("global_planner", "control", columns={"replans": ("replans",)})
+    part = "global_planner"
+    inputs = (
+        Port(
+            "objects_W",
+            OBJECT_SLOTS * OBJECT_SIZE,
+            "number, m and m/s in eight slots, see systems.ranging.objects",
+        ),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("route_progress", 2, "m, m"),
+    )
+    outputs = (
+        Port("route", ROUTE_SIZE, ROUTE_UNIT),
+        Port("replans", 1, "number of new routes", ("replans",)),
+    )
 
     def __init__(
         self,
         *,
-        parameters: RouteParameters | None = None,
+        parameters: RouteParameters = RouteParameters(),
         known: ArrayLike = (),
         initial_pose: tuple[float, float, float] = (0.0, 0.0, 0.0),
-        robot: RobotParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        self._parameters = parameters or RouteParameters()
-        self._robot, self._tick_s = robot or RobotParameters(), tick_s
-        self._known: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 5)
         self.set_name("global_planner")
-        goal = self._parameters.goal_m
-        self.step = self._make_step(initial_pose, goal, self._known)
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=size)
-            for name, size in (
-                ("objects_W", OBJECT_SLOTS * OBJECT_SIZE),
-                ("pose_WB_estimated", 3),
-                ("route_progress", 2),
-            )
-        ]
-        state: NDArray[np.float64] = np.array(self.step.state)
-        groups: Any = np.split(state, np.cumsum(_SIZES)[:-1])
-        route, replans, _ = [self.DeclareDiscreteState(values) for values in groups]
-        self.DeclareStateOutputPort("route", route)
-        self.DeclareStateOutputPort("replans", replans)
-        self.DeclareAbstractState(Value(self.step.numbers.seen.copy()))
-        if self._parameters.replan:
-            # Before the discrete update of the same tick, which finds the memory so.
-            self.DeclarePeriodicUnrestrictedUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._remember
-            )
-            self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._update
-            )
+        self._goal = parameters.goal_m
+        self._make_step = partial(_make_step, parameters, robot, tick_s)
+        step = self._make_step(initial_pose, self._goal, known)
+        self.declare(step, tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop.
+        """The step, with start, goal and map of the run."""
+        return self._make_step(run.initial_pose, run.goal or self._goal, run.mapped)
 
-        Start, goal and map are those of the run.
-        """
-        goal = run.goal or self._parameters.goal_m
-        return self._make_step(run.initial_pose, goal, np.reshape(run.mapped, (-1, 5)))
 
-    def _make_step(
-        self,
-        initial_pose: tuple[float, float, float],
-        goal: tuple[float, float],
-        known: NDArray[np.float64],
-    ) -> Step:
-        own, epsilon = self._parameters, self._robot.control_point_m
-        start = control_point(initial_pose, epsilon)
-        try:
-            route = plan_route(
-                start,
-                goal,
-                known,
-                clearance_m=own.clearance_m,
-                cell_m=own.cell_m,
-                arena_margin_m=own.arena_margin_m,
-            )
-        except InputError as error:
-            field = "start.position_m" if error.field == "start" else error.field
-            group = "" if error.field == "start" else "route."
-            raise InputError(f"{group}{field}", error.message) from error
-        arena = arena_about([start, goal], known, own.arena_margin_m)
-        grid = make_occupancy_grid(arena, own.cell_m, own.clearance_m)
-        block_rectangles(grid, known, own.clearance_m)
-        numbers = PlannerNumbers(
-            grid,
-            known,
-            make_seen_points(grid),
+def _make_step(
+    parameters: RouteParameters,
+    robot: RobotParameters,
+    tick_s: float,
+    initial_pose: tuple[float, float, float],
+    goal: tuple[float, float],
+    known: ArrayLike,
+) -> Step:
+    rectangles: NDArray[np.float64] = np.array(known, dtype=float).reshape(-1, 5)
+    start = control_point(initial_pose, robot.control_point_m)
+    try:
+        route = plan_route(
+            start,
             goal,
-            own.clearance_m,
-            own.stall_m,
-            own.stalled_s if own.replan else math.inf,
-            own.arrived_m,
-            epsilon,
-            self._tick_s,
+            rectangles,
+            clearance_m=parameters.clearance_m,
+            cell_m=parameters.cell_m,
+            arena_margin_m=parameters.arena_margin_m,
         )
-        state = [*route.numbers.tolist(), 0.0, 0.0, 0.0]
-        return Step(planner_step, numbers, state, _publish_route)
-
-    def _remember(self, context: Any, state: Any) -> None:
-        objects, pose, _ = read_arrays(context, self._inputs)
-        seen: Any = context.get_abstract_state(0).get_value().copy()
-        p_WP = control_point(pose.tolist(), self._robot.control_point_m)
-        numbers = self.step.numbers
-        remember_objects(seen, numbers.grid, numbers.rectangles, objects, p_WP)
-        state.get_mutable_abstract_state(0).set_value(seen)
-
-    def _update(self, context: Any, discrete_state: Any) -> None:
-        inputs = read_arrays(context, self._inputs)
-        groups = range(len(_SIZES))
-        state = np.concatenate([context.get_discrete_state(k).value() for k in groups])
-        seen: Any = context.get_abstract_state(0).get_value().copy()
-        tick = round(context.get_time() / self._tick_s)
-        numbers = self.step.numbers._replace(seen=seen)
-        planner_step(tick, state, inputs, (), numbers)
-        for k, values in enumerate(np.split(state, np.cumsum(_SIZES)[:-1])):
-            discrete_state.set_value(k, values)
+    except InputError as error:
+        field = "start.position_m" if error.field == "start" else error.field
+        group = "" if error.field == "start" else "route."
+        raise InputError(f"{group}{field}", error.message) from error
+    arena = arena_about([start, goal], rectangles, parameters.arena_margin_m)
+    grid = make_occupancy_grid(arena, parameters.cell_m, parameters.clearance_m)
+    block_rectangles(grid, rectangles, parameters.clearance_m)
+    numbers = PlannerNumbers(
+        grid,
+        rectangles,
+        goal,
+        parameters.clearance_m,
+        parameters.stall_m,
+        parameters.stalled_s if parameters.replan else math.inf,
+        parameters.arrived_m,
+        robot.control_point_m,
+        tick_s,
+    )
+    state = PlannerState(route.numbers, np.zeros(3), make_seen_points(grid))
+    return Step(planner_step, numbers, state, _publish_route)

@@ -7,25 +7,21 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.routes.parameters import PathTargetParameters
-from systems.routes.route import ROUTE_SIZE
+from systems.routes.route import ROUTE_SIZE, ROUTE_UNIT
 from systems.world.geometry import control_point
 
 #: Places in the state; of lengths along the route, m, speed in m/s.
 ALONG, SPEED, REACHED, FINGERPRINT = range(4)
-_STATES = 3 + 4
-#: P is looked for so far behind where it was, and so far ahead of the target, m: a
-#: route may come near to itself.
+#: The point nearest to P is looked for this far behind the last one, and this far
+#: ahead of the target, m: a route may come near to itself.
 _BEHIND_M, _AHEAD_M = 1.0, 0.5
-#: So near to the goal the target is there, m.
+#: Nearer to the goal than this, the target has arrived, m.
 _THERE_M = 1e-6
 
 
@@ -153,15 +149,10 @@ def next_speed(
 def path_target_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TargetNumbers
 ) -> None:
-    """The target at one tick; see ``systems.framework.step_block.Step``.
+    """The target at one tick.
 
-    Args:
-        tick: Not used.
-        state: Arc length, m, and speed, m/s, of the target, arc length of the point
-            that is nearest to P, m, and fingerprint of the route.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``TargetNumbers``.
+    State: arc length, m, and speed, m/s, of the target, arc length of the point that is
+    nearest to P, m, and fingerprint of the route.
     """
     route, (target, progress, valid) = np.asarray(inputs[0]), outputs
     valid[0] = 1.0
@@ -201,31 +192,20 @@ def path_target_step(
     state[ALONG], state[SPEED], state[REACHED] = along, after, reached
 
 
-class PathTarget(LeafSystem, StepBlock):
+class PathTarget(Block):
     """Moves a target along the route, from rest to rest at the goal.
 
-    .. pydrake_system::
-
-        name: PathTarget
-        input_ports:
-        - route [number of points, then in m their spacing, and x and y of each]
-        - pose_WB_estimated [m, m, rad]
-        output_ports:
-        - target_state [m, m, m/s, m/s]
-        - route_progress [m, m]
-        - target_valid [0 or 1]
-
     ``target_state``: place and velocity in W. ``route_progress``: arc lengths of the
-    target and of the point of the route that is nearest to P; of several, near where P
-    was or between it and the target.
+    target and of the point of the route that is nearest to P; of several such points,
+    the one near the last one or between it and the target.
 
-    With ``timing: timed`` the speed rises, stays and falls with the clock, whatever the
-    robot does. With ``waiting`` the target brakes so that it is never farther ahead
-    than ``lead_m``, unless P goes back. A route that is new begins where it is nearest
-    to P, at rest.
+    With ``timing: timed`` the speed follows the clock, whatever the robot does: it
+    rises, stays constant, and falls. With ``waiting`` the target brakes so that it is
+    never farther ahead than ``lead_m``, unless P goes back. On a new route the target
+    begins at rest, at the point nearest to P.
 
     Discrete state: arc length and speed of the target, arc length of P, and four
-    numbers that tell a new route. Rate and latency: a function of state and present
+    numbers that identify the route. Rate and latency: a function of state and present
     inputs, at every tick; no latency.
 
     Args:
@@ -237,48 +217,48 @@ class PathTarget(LeafSystem, StepBlock):
     its timing is not printed. That it waits is ours.
     """
 
-    FACTS = BlockFacts(
-        "tracker",
-        "control",
-        columns={
-            "target_valid": ("target_valid",),
-            "target_state": ("target_x", "target_y", "target_vx", "target_vy"),
-            "route_progress": ("target_along", "robot_along"),
-        },
-        states=(
-            "target_along",
-            "target_speed",
-            "robot_along",
-            "route_points",
-            "route_spacing",
-            "route_moment_x",
-            "route_moment_y",
+    part = "tracker"
+    inputs = (
+        Port("route", ROUTE_SIZE, ROUTE_UNIT),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+    )
+    outputs = (
+        Port(
+            "target_state",
+            4,
+            "m, m, m/s, m/s",
+            ("target_x", "target_y", "target_vx", "target_vy"),
         ),
+        Port("route_progress", 2, "m, m", ("target_along", "robot_along")),
+        Port("target_valid", 1, "0 or 1", ("target_valid",)),
+    )
+    states = (
+        "target_along",
+        "target_speed",
+        "robot_along",
+        "route_points",
+        "route_spacing",
+        "route_moment_x",
+        "route_moment_y",
     )
 
     def __init__(
         self,
         *,
-        parameters: PathTargetParameters | None = None,
-        robot: RobotParameters | None = None,
+        parameters: PathTargetParameters = PathTargetParameters(),
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or PathTargetParameters()
+        self.set_name("path_target")
         numbers = TargetNumbers(
-            own.speed_m_s,
-            own.acceleration_m_s2,
-            own.timing == "waiting",
-            own.lead_m,
-            (robot or RobotParameters()).control_point_m,
+            parameters.speed_m_s,
+            parameters.acceleration_m_s2,
+            parameters.timing == "waiting",
+            parameters.lead_m,
+            robot.control_point_m,
             tick_s,
         )
-        self.set_name("path_target")
-        blank: NDArray[np.float64] = np.zeros(_STATES)
-        self.declare_step(
-            float,
-            Step(path_target_step, numbers, blank.tolist()),
-            (("route", ROUTE_SIZE), ("pose_WB_estimated", 3)),
-            (("target_state", 4), ("route_progress", 2), ("target_valid", 1)),
-            tick_s,
+        self.declare(
+            Step(path_target_step, numbers, [0.0] * len(self.states)), tick_s=tick_s
         )

@@ -28,6 +28,8 @@ from systems.world.geometry import beyond_rectangle, segment_clearance
 #: are, their spacing, and x and y of each.
 ROUTE_POINTS = 200
 ROUTE_SIZE = 2 + 2 * ROUTE_POINTS
+#: Units of these numbers.
+ROUTE_UNIT = "number of points, then in m their spacing, and x and y of each"
 
 #: Spacing at which a pulled way is rounded, m.
 _FINE_M = 0.01
@@ -90,7 +92,7 @@ def fill_route(numbers: Any, points: Any) -> None:  # pragma: no cover  (compile
     """Sets what the port ``route`` carries.
 
     Args:
-        numbers: (ROUTE_SIZE,) or more; the first ones are changed.
+        numbers: (ROUTE_SIZE,) changed.
         points: (n, 2) of equal spacing, m.
     """
     for k in range(ROUTE_SIZE):

@@ -30,10 +30,6 @@ class SeenPoints(NamedTuple):
     added: NDArray[np.int64]
     """(1,) how many were remembered: the oldest is replaced."""
 
-    def copy(self) -> SeenPoints:
-        """A memory of its own."""
-        return SeenPoints(self.points.copy(), self.taken.copy(), self.added.copy())
-
 
 def make_seen_points(grid: OccupancyGrid) -> SeenPoints:
     """An empty memory for a grid."""

@@ -103,12 +103,12 @@ def _publish_guard(state, outputs, numbers):  # type: ignore[no-untyped-def]
 class MotionGuard(Block):
     """Obeys a law as far as the robot can be braked to rest in free space.
 
-    It replaces ``WheelSpeedCommand``, ``VelocityWheelCommand`` or
-    ``TwistWheelCommand``: it has the same input and does the same work. It passes the
-    resulting wheel speeds if the robot, one tick later, can brake to rest so that the
-    disc about the axle that holds the body stays ``margin_m`` away from everything that
-    was never seen free. Otherwise it passes lower speeds along the same curve, or the
-    turn alone, or it brakes. The virtual mass moves by what the guard passes.
+    It replaces ``WheelCommand``: it has the same input and does the same work. It
+    passes the resulting wheel speeds if the robot, one tick later, can brake to rest so
+    that the disc about the axle that holds the body stays ``margin_m`` away from
+    everything that was never seen free. Otherwise it passes lower speeds along the same
+    curve, or the turn alone, or it brakes. The virtual mass moves by what the guard
+    passes.
 
     With ``obstacle_speed_m_s`` the same applies to everything in the sensors' view that
     may come nearer at that speed, unless the robot withdraws from it.
@@ -123,7 +123,7 @@ class MotionGuard(Block):
 
     Discrete state, every tick: velocity of P, wheel speeds, report, and the wheel
     speeds that follow by the lag of the motors. Rate and latency are those of
-    ``WheelSpeedCommand``.
+    ``WheelCommand``.
 
     Args:
         parameters: ``GuardParameters``.

@@ -1,4 +1,4 @@
-"""Whether what a guard relies on can be so: range sensors and odometry."""
+"""A monitor of what a guard relies on: range sensors and odometry."""
 
 from __future__ import annotations
 
@@ -6,15 +6,13 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.ranging.parameters import UltrasonicParameters
 
-#: What can be found, by its number on the port.
+#: The faults, by their numbers on the port.
 SENSING_FAULTS = "none", "odometry lost", "silent", "frozen", "noisy"
 _NONE, _LOST, _SILENT, _FROZEN, _NOISY = range(5)
 
@@ -88,14 +86,9 @@ def _judged(state, at, range_, heading, slow, numbers):  # type: ignore[no-untyp
 def monitor_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """What is wrong in one tick; see ``systems.framework.step_block.Step``.
+    """The fault of one tick.
 
-    Args:
-        tick: Its number.
-        state: Pose, m and rad; whether it was lost; eight numbers of each sensor.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``MonitorNumbers``.
+    State: pose, m and rad; whether it was lost; eight numbers of each sensor.
     """
     pose, ranges, echo, ages = inputs
     turned = pose[2] - state[_POSE + 2]
@@ -127,32 +120,26 @@ def monitor_step(
     outputs[0][0], outputs[0][1] = kind, sensor
 
 
-class SensingMonitor(LeafSystem, StepBlock):
+class SensingMonitor(Block):
     """Finds range sensors and odometry that cannot be right, so that a guard stops.
 
-    .. pydrake_system::
+    The faults by their numbers, ``SENSING_FAULTS``:
 
-        name: SensingMonitor
-        input_ports:
-        - pose_WB_estimated [m, m, rad]
-        - ranges [m]
-        - echo [0 or 1]
-        - range_ages [s, since each sensor fired]
-        output_ports:
-        - sensing_fault [number of what is wrong, and of the sensor, from 1]
+    1. The pose of the odometry has moved farther in a tick than twice what the wheels
+       can. This fault stays for the rest of the run.
+    2. A sensor has not fired for three rounds and 0.2 s.
+    3. The echoes of a sensor stay equal, 12 times although it has noise, or while the
+       robot turns by more than its aperture.
+    4. While the robot turns slowly, half of the late echoes of a sensor have moved by
+       more than bodies and the stated noise can move them.
 
-    By their numbers, ``SENSING_FAULTS``: 1, the odometry's pose has moved farther in a
-    tick than twice what the wheels can: for good. 2, a sensor has not fired for three
-    rounds and 0.2 s. 3, its echoes stay equal, 12 times although it has noise, or while
-    the robot turns by more than its aperture. 4, while the robot turns slowly half of
-    its late echoes have moved by more than bodies and the stated noise move them. The
-    last three count for 2 s after their last sign.
+    Faults 2 to 4 count for 2 s after their last sign.
 
-    A sensor that goes on saying that there is no echo cannot be told from one that
-    looks where nothing is.
+    The monitor cannot distinguish a sensor that always reports no echo from one that
+    points at empty space.
 
     Discrete state, every tick: pose, whether it was lost, and of each sensor its last
-    two ranges, what was counted, and what was found until when. The output is a
+    two ranges, the counts, the fault found, and until when it counts. The output is a
     function of state and inputs: no latency.
 
     Args:
@@ -163,21 +150,30 @@ class SensingMonitor(LeafSystem, StepBlock):
     Reference: ours; docs/guard.md.
     """
 
-    FACTS = BlockFacts(
-        "sensing_monitor",
-        "obstacle sensing",
-        columns={"sensing_fault": ("sensing_fault", "faulty_sensor")},
+    part, stage = "sensing_monitor", "obstacle sensing"
+    inputs = (
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("ranges", "sensors", "m"),
+        Port("echo", "sensors", "0 or 1"),
+        Port("range_ages", "sensors", "s, since each sensor fired"),
+    )
+    outputs = (
+        Port(
+            "sensing_fault",
+            2,
+            "number of the fault, and of the sensor, from 1",
+            ("sensing_fault", "faulty_sensor"),
+        ),
     )
 
     def __init__(
         self,
         *,
-        sensors: UltrasonicParameters | None = None,
-        robot: RobotParameters | None = None,
+        sensors: UltrasonicParameters = UltrasonicParameters(),
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        sensors, robot = sensors or UltrasonicParameters(), robot or RobotParameters()
         self.set_name("sensing_monitor")
         way = _FASTER * robot.top_wheel_speed * robot.wheel_radius_m * tick_s
         round_s = sensors.round_ticks(tick_s) * tick_s
@@ -190,16 +186,9 @@ class SensingMonitor(LeafSystem, StepBlock):
             _STEP_M + _STEP_M_S2 * round_s**2 + _SIGMAS * sensors.noise_m,
             tick_s,
         )
-        count = sensors.count
-        self.declare_step(
-            float,
-            Step(monitor_step, numbers, [0.0] * (_SENSORS + _EACH * count)),
-            (
-                ("pose_WB_estimated", 3),
-                ("ranges", count),
-                ("echo", count),
-                ("range_ages", count),
-            ),
-            (("sensing_fault", 2),),
-            tick_s,
+        state = [0.0] * (_SENSORS + _EACH * sensors.count)
+        self.declare(
+            Step(monitor_step, numbers, state),
+            tick_s=tick_s,
+            sizes={"sensors": sensors.count},
         )

@@ -6,12 +6,9 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.state_block import StateOutputs, ticks_of
-from systems.framework.step_block import Step
 from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
 from systems.search.parameters import (
@@ -22,7 +19,6 @@ from systems.search.search_ending import (
     NO_NOSE,
     NO_TOUCH,
     REFUSED,
-    REPORT_COLUMNS,
     STEPS_GONE,
     UNDECIDED,
 )
@@ -41,6 +37,8 @@ from systems.search.search_state import (
     add_frame,
     clear_frames,
     publish_search,
+    search_ports,
+    ticks_of,
 )
 from systems.search.song_rules import song2011_turn
 from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
@@ -154,8 +152,6 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     blown = state[_MEAN + 3], state[_MEAN + 4]
     memory = state[_MEMORY : _MEMORY + RULE_MEMORY]
     turn, phase, ended = numbers.turn(mean, blown, memory, numbers.rules)
-    for k in range(RULE_MEMORY):  # of a list, the slice was a copy
-        state[_MEMORY + k] = memory[k]
     state[PHASE] = phase
     if ended != UNDECIDED:
         _end(state, ended)
@@ -220,15 +216,7 @@ def _tell(state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers) ->
 def plume_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: PlumeSearchNumbers
 ) -> None:
-    """One tick of the search; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: Activity and what it holds, see the places above; changed.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``PlumeSearchNumbers``.
-    """
+    """One tick of the search."""
     gas, airflow, headings, contact = inputs
     heading = headings[0]
     if state[STARTED] < 0.5:
@@ -259,63 +247,47 @@ def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
     publish_search(state, outputs, _FRAMES)
 
 
-class PlumeSearch(LeafSystem, StateOutputs):
-    """Finds an odour source step by step: waits, smells, turns and moves.
+class PlumeSearch(Block):
+    """Finds an odor source step by step: waits, smells, turns and moves.
 
-    .. pydrake_system::
+    In each step the robot rests for ``wait_s`` until the gas sensors have settled,
+    averages their readings for ``sense_s``, chooses a heading by its rules, and turns
+    and drives for ``move_s``. A touch ends the search at once: where it smells, the
+    source is found and the robot calls; elsewhere the touch is refused. The numbers of
+    endings and faults are in ``systems.search.search_ending``. A gas sensor whose
+    readings do not change during a whole stop counts as dead, and gets the mean of the
+    others. A switch that is closed at the start counts as stuck, and is ignored; the
+    block does not notice a switch that is stuck open. The phases of ``song2011`` are
+    those of the paper; in ``upwind_gradient`` 1 is upwind, 2 across.
 
-        name: PlumeSearch
-        input_ports:
-        - gas_ratio [1, right front, rear and left front]
-        - airflow [1, left and right]
-        - heading_deg [deg, clockwise from north]
-        - contact [0 or 1, left and right]
-        output_ports:
-        - expected_heading_deg [deg, clockwise from north]
-        - move [0 or 1]
-        - calling [0 or 1]
-        - search_report [number of the ending, phase, steps, sum of faults]
-        - frames [number, and nine bytes each, see systems.radio]
-
-    A step rests for ``wait_s`` until the gas sensors have settled, averages for
-    ``sense_s``, decides on a heading by its rules, and lets the robot turn and drive
-    for ``move_s``. A touch ends the search at once: as a find where it smells, and
-    then the robot calls; else as refused. Endings and faults are those of
-    ``systems.search.search_ending``: a gas sensor whose readings do not stir in a
-    whole stop is dead, and smells as the others do; a switch that is closed at the
-    start is stuck, and not heeded; one that is stuck open is not noticed. Phases of
-    ``song2011`` are the paper's; of ``upwind_gradient`` 1 is upwind, 2 across.
-
-    Discrete state, every tick: the outputs, what a stop has measured so far, and what
-    the rules remember. Latency: a tick.
+    Discrete state, every tick: the outputs, the measurements of the stop, and the
+    memory of the rules. Latency: a tick.
 
     Args:
         parameters: ``PlumeSearchParameters``.
         tick_s: Period of the update, s.
 
-    Reference: Song 2011, 2.3.3 and 4.2; the gate, and rules of our own.
+    Reference: Song 2011, 2.3.3 and 4.2; the gate and ``upwind_gradient`` are ours.
     """
 
-    FACTS = BlockFacts(
-        "controller",
-        "control",
-        columns={
-            "expected_heading_deg": ("expected_heading_deg",),
-            "move": ("move",),
-            "calling": ("calling",),
-            "search_report": REPORT_COLUMNS,
-        },
+    part = "controller"
+    inputs = (
+        Port("gas_ratio", 3, "1, right front, rear and left front"),
+        Port("airflow", 2, "1, left and right"),
+        Port("heading_deg", 1, "deg, clockwise from north"),
+        Port("contact", 2, "0 or 1, left and right"),
     )
+    outputs = search_ports("calling", "0 or 1")
 
     def __init__(
         self,
         *,
-        parameters: PlumeSearchParameters | None = None,
+        parameters: PlumeSearchParameters = PlumeSearchParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or PlumeSearchParameters()
-        printed = own.rules == "song2011"
+        self.set_name("plume_search")
+        own, printed = parameters, parameters.rules == "song2011"
         numbers = PlumeSearchNumbers(
             song2011_turn if printed else upwind_gradient_turn,
             own.song2011 if printed else own.upwind_gradient,
@@ -328,16 +300,8 @@ class PlumeSearch(LeafSystem, StateOutputs):
             own.gate_share,
             own.address,
         )
-        self.set_name("plume_search")
-        self.declare_state_outputs(
+        self.declare(
             Step(plume_search_step, numbers, [0.0] * _SIZE, _publish),
-            (("gas_ratio", 3), ("airflow", 2), ("heading_deg", 1), ("contact", 2)),
-            (
-                ("expected_heading_deg", 1),
-                ("move", 1),
-                ("calling", 1),
-                ("search_report", len(REPORT_COLUMNS)),
-                ("frames", FRAMES_SIZE),
-            ),
-            tick_s,
+            tick_s=tick_s,
+            arrays=True,
         )

@@ -6,7 +6,9 @@ from typing import Any
 
 from numba.extending import register_jitable
 
-from systems.radio.codec import FRAME_BYTES, MOST_FRAMES, write_frame
+from systems.framework.block import Port
+from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES, write_frame
+from systems.search.search_ending import REPORT_COLUMNS
 
 #: Places in the state: what the robot is at, for how many ticks, whether it has begun;
 #: its outputs: heading, whether it moves, whether it calls or what it listens to, and
@@ -24,6 +26,49 @@ from systems.radio.codec import FRAME_BYTES, MOST_FRAMES, write_frame
     FAULT,
     OWN,
 ) = range(11)
+
+
+def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
+    """A time as a number of ticks.
+
+    Args:
+        time_s: s.
+        tick_s: Period of a tick, s.
+        least: Smallest number that is returned.
+
+    Returns:
+        The nearest number.
+    """
+    return max(least, round(time_s / tick_s))
+
+
+def search_ports(flag: str, unit: str) -> tuple[Port, ...]:
+    """Output ports of a search.
+
+    Args:
+        flag: Name of the port that says whether it calls or what it listens to.
+        unit: Unit of this port.
+
+    Returns:
+        The ports, in the order of ``publish_search``.
+    """
+    return (
+        Port(
+            "expected_heading_deg",
+            1,
+            "deg, clockwise from north",
+            "expected_heading_deg",
+        ),
+        Port("move", 1, "0 or 1", "move"),
+        Port(flag, 1, unit, flag),
+        Port(
+            "search_report",
+            len(REPORT_COLUMNS),
+            "number of the ending, phase, steps, sum of faults",
+            REPORT_COLUMNS,
+        ),
+        Port("frames", FRAMES_SIZE, "number, and nine bytes each, see systems.radio"),
+    )
 
 
 @register_jitable

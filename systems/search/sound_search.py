@@ -6,12 +6,9 @@ import math
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.state_block import StateOutputs, ticks_of
-from systems.framework.step_block import Step
 from systems.heading.compass import wrapped_deg
 from systems.radio.codec import FRAMES_SIZE
 from systems.radio.parameters import RadioParameters
@@ -26,7 +23,6 @@ from systems.search.search_ending import (
     FOUND,
     NOT_CALLED,
     NOT_HEARD,
-    REPORT_COLUMNS,
     STEPS_GONE,
 )
 from systems.search.search_state import (
@@ -44,6 +40,8 @@ from systems.search.search_state import (
     add_frame,
     clear_frames,
     publish_search,
+    search_ports,
+    ticks_of,
 )
 
 #: What the robot is at; ``search_phase`` in its report.
@@ -116,8 +114,6 @@ def _receive(state: Any, air: Any, own: Any) -> None:
             state[_CALLED] = 1.0 if value > 0.5 else -1.0
         if good and address == own.waits_for and function == _FN_RESULT:
             state[_ARRIVED] = 1.0
-    for k in range(PARSER_SIZE):  # of a list, the slice was a copy
-        state[_PARSER + k] = parser[k]
 
 
 @register_jitable
@@ -245,15 +241,7 @@ def _end_activity(
 def sound_search_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: SoundSearchNumbers
 ) -> None:
-    """One tick of the search; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: Activity and what it holds, see the places above; changed.
-        inputs: As the input ports.
-        outputs: Left as they are: they are state.
-        numbers: ``SoundSearchNumbers``.
-    """
+    """One tick of the search."""
     bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
     heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
     heading = headings[0]
@@ -281,72 +269,57 @@ def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
     publish_search(state, outputs, _FRAMES)
 
 
-class SoundSearch(LeafSystem, StateOutputs):
+class SoundSearch(Block):
     """Finds a calling robot step by step: listens, turns and moves.
 
-    .. pydrake_system::
+    The robot listens to the noise for ``noise_s``, then waits for the call of
+    ``caller``: a frame that says that the odor source is found. In each step the robot
+    listens for ``listen_s``, computes for ``compute_s``, and turns and drives for
+    ``move_s``, or for less when the source is near. Two robots approach one caller one
+    after the other: the robot that ``waits_for`` the other holds near the caller until
+    the other has reported its result, found or not, or ``hold_s`` are over. The robot
+    does not follow a sound that fits several directions; it listens again, and gives up
+    after ``tries``. The numbers of endings and faults are in
+    ``systems.search.search_ending``. The phase is the activity: 1 waiting, 2 holding, 3
+    listening, 4 computing, 5 moving, 6 over.
 
-        name: SoundSearch
-        input_ports:
-        - source_bearing [rad]
-        - source_range [m]
-        - detected [0 or 1]
-        - range_valid [0 or 1]
-        - ambiguous [0 or 1]
-        - lost_microphone [number, 0 none]
-        - rssi_dbm [dBm]
-        - heading_deg [deg, clockwise from north]
-        - air [number of bytes, and bytes, see systems.radio]
-        output_ports:
-        - expected_heading_deg [deg, clockwise from north]
-        - move [0 or 1]
-        - listening [number, 0 nothing, 1 noise, 2 sound]
-        - search_report [number of the ending, activity, steps, sum of faults]
-        - frames [number, and nine bytes each, see systems.radio]
-
-    It hears the noise for ``noise_s``, then waits for the call of ``caller``: a frame
-    that says that the odour source is found. A step listens for ``listen_s``, computes
-    for ``compute_s`` and lets the robot turn and drive for ``move_s``, less where the
-    source is near. Two robots that come to one caller go one after the other: the
-    one that ``waits_for`` the other holds near the caller until that one has
-    reported its result, found or not, or ``hold_s`` are over. Sound that fits several
-    directions is not followed; it listens again, and gives up after ``tries``.
-    Endings and faults are those of ``systems.search.search_ending``. The activity is 1
-    waiting, 2 holding, 3 listening, 4 computing, 5 moving, 6 over.
-
-    Discrete state, every tick: the outputs, the radio's parser, and what the step
-    has measured so far. Latency: a tick.
+    Discrete state, every tick: the outputs, the parser of the radio, and the
+    measurements of the step. Latency: a tick.
 
     Args:
         parameters: ``SoundSearchParameters``.
-        radio: By which a level becomes a distance.
+        radio: Path loss, by which a level becomes a distance.
         speed_m_s: Of the robot at full duty, m/s.
         tick_s: Period of the update, s.
 
     Reference: Song 2011, 3.2.3 and 4.3; the stop by range, and who waits, are ours.
     """
 
-    FACTS = BlockFacts(
-        "controller",
-        "control",
-        columns={
-            "expected_heading_deg": ("expected_heading_deg",),
-            "move": ("move",),
-            "listening": ("listening",),
-            "search_report": REPORT_COLUMNS,
-        },
+    part = "controller"
+    inputs = (
+        Port("source_bearing", 1, "rad"),
+        Port("source_range", 1, "m"),
+        Port("detected", 1, "0 or 1"),
+        Port("range_valid", 1, "0 or 1"),
+        Port("ambiguous", 1, "0 or 1"),
+        Port("lost_microphone", 1, "number, 0 none"),
+        Port("rssi_dbm", 1, "dBm"),
+        Port("heading_deg", 1, "deg, clockwise from north"),
+        Port("air", AIR_SIZE, "number of bytes, and bytes, see systems.radio"),
     )
+    outputs = search_ports("listening", "number, 0 nothing, 1 noise, 2 sound")
 
     def __init__(
         self,
         *,
-        parameters: SoundSearchParameters | None = None,
-        radio: RadioParameters | None = None,
+        parameters: SoundSearchParameters = SoundSearchParameters(),
+        radio: RadioParameters = RadioParameters(),
         speed_m_s: float = 0.14,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own, radio = parameters or SoundSearchParameters(), radio or RadioParameters()
+        self.set_name("sound_search")
+        own = parameters
         numbers = SoundSearchNumbers(
             own,
             ticks_of(own.noise_s, tick_s, least=0),
@@ -361,26 +334,8 @@ class SoundSearch(LeafSystem, StateOutputs):
             radio.path_loss_exponent,
             tick_s,
         )
-        self.set_name("sound_search")
-        single = (
-            "source_bearing",
-            "source_range",
-            "detected",
-            "range_valid",
-            "ambiguous",
-            "lost_microphone",
-            "rssi_dbm",
-            "heading_deg",
-        )
-        self.declare_state_outputs(
+        self.declare(
             Step(sound_search_step, numbers, [0.0] * _SIZE, _publish),
-            (*((name, 1) for name in single), ("air", AIR_SIZE)),
-            (
-                ("expected_heading_deg", 1),
-                ("move", 1),
-                ("listening", 1),
-                ("search_report", len(REPORT_COLUMNS)),
-                ("frames", FRAMES_SIZE),
-            ),
-            tick_s,
+            tick_s=tick_s,
+            arrays=True,
         )

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
 from analysis.arrays.voting.listening_plan import vote_plan
 from analysis.arrays.voting.source_listener import (
@@ -15,7 +14,7 @@ from analysis.arrays.voting.source_listener import (
     hear_sources,
 )
 from systems.base.robot import RobotParameters, microphones_B
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import OBJECT, Block, Port
 from systems.hearing.audio_port import check_rate, read_audio
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
@@ -31,69 +30,56 @@ class _Heard(NamedTuple):
         return self
 
 
-class SourceListener(LeafSystem):
-    """Follows every source that the microphones hear, each with an identity.
-
-    .. pydrake_system::
-
-        name: SourceListener
-        input_ports:
-        - audio [AudioFrame]
-        output_ports:
-        - sources [TrackedSources]
+class SourceListener(Block):
+    """Tracks every source that the microphones hear, each with an identity.
 
     Bearings are in the robot's frame B, seen from the centroid of the microphones;
-    those of a row are on the side of +x. Each frame goes through ``hear_sources``, as
-    the blocks of a stream do in ``phonotaxis listen``; the frame that ends at t = 0 is
-    of before the start and does not count.
+    those of a row of microphones are on the side of +x. ``hear_sources`` takes each
+    frame, as it takes the blocks of a stream in ``phonotaxis listen``. The frame that
+    ends at t = 0 was recorded before the start and does not count.
 
     State (abstract): ``ListenerMemory``, and the sources of the last step.
     Rate and latency: the state is updated every ``frame_s``, the sources every
-    ``step_s`` of the parameters; they are heard in the last ``window_s``.
+    ``step_s`` of the parameters; they are those of the last ``window_s``.
 
     Args:
         parameters: How votes become tracks.
         robot: Places of the microphones.
         acoustics: Speed of sound.
         microphones: Rate and length of the frames.
-        band_hz: Lowest and highest frequency that counts, Hz.
+        band_hz: Lowest and highest frequency that is used, Hz.
 
     Raises:
-        InputError: The array tells no bearings.
+        InputError: The array gives no bearings.
     """
 
-    FACTS = BlockFacts("listener", "hearing")
+    part, stage = "listener", "hearing"
+    inputs = (Port("audio", OBJECT, "AudioFrame"),)
+    outputs = (Port("sources", OBJECT, "TrackedSources"),)
 
     def __init__(
         self,
         *,
-        parameters: ListenerParameters | None = None,
-        robot: RobotParameters | None = None,
-        acoustics: AcousticParameters | None = None,
-        microphones: MicArrayParameters | None = None,
+        parameters: ListenerParameters = ListenerParameters(),
+        robot: RobotParameters = RobotParameters(),
+        acoustics: AcousticParameters = AcousticParameters(),
+        microphones: MicArrayParameters = MicArrayParameters(),
         band_hz: tuple[float, float] = (200.0, 8_000.0),
     ) -> None:
         super().__init__()
-        self._parameters = parameters or ListenerParameters()
-        microphones = microphones or MicArrayParameters()
+        self._parameters = parameters
         self._plan = vote_plan(
-            ArrayShape.of(microphones_B(robot or RobotParameters())),
-            (acoustics or AcousticParameters()).c,
+            ArrayShape.of(microphones_B(robot)),
+            acoustics.c,
             microphones.sample_rate_hz,
             band_hz,
         )
         self.set_name("source_listener")
-        self._audio = self.DeclareAbstractInputPort(
-            name="audio", model_value=Value(object())
-        )
+        self.declare_ports()
         blank = _Heard(ListenerMemory.blank(self._plan), TrackedSources(0.0, ()))
         state = self.DeclareAbstractState(Value(blank))
-        self.DeclareAbstractOutputPort(
-            name="sources",
-            alloc=lambda: Value(object()),
-            calc=self._tell,
-            prerequisites_of_calc={self.abstract_state_ticket(state)},
-        )
+        ticket = self.abstract_state_ticket(state)
+        self.declare_output("sources", self._publish, {ticket})
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             period_sec=microphones.frame_s,
             offset_sec=0.0,
@@ -101,10 +87,10 @@ class SourceListener(LeafSystem):
         )
 
     def _hear(self, context: Any, state: Any) -> None:
-        audio = read_audio(context, self._audio, "SourceListener")
+        audio = read_audio(context, self.GetInputPort("audio"), "SourceListener")
         check_rate(audio, self._plan.sample_rate_hz, "SourceListener")
         if context.get_time() == 0.0:
-            return  # of before the start
+            return  # recorded before the start
         before: _Heard = context.get_abstract_state(0).get_value()
         steps, memory = hear_sources(
             audio.counts, before.memory, self._plan, self._parameters
@@ -112,6 +98,6 @@ class SourceListener(LeafSystem):
         sources = steps[-1] if steps else before.sources
         state.get_mutable_abstract_state(0).set_value(_Heard(memory, sources))
 
-    def _tell(self, context: Any, output: Any) -> None:
+    def _publish(self, context: Any, output: Any) -> None:
         heard: _Heard = context.get_abstract_state(0).get_value()
         output.set_value(heard.sources)

@@ -161,9 +161,28 @@ def _compilable(function: FunctionType) -> Any:
     """A function for compiled code, without what checks it for Drake's sake.
 
     Known to numba by its type alone: a compiled function within a named tuple would
-    be a pointer, and code with pointers is not kept.
+    be a pointer, and code with pointers is not kept. The plain functions of a user's
+    own modules that it calls are made known, too.
     """
-    return register_jitable(inspect.unwrap(function))
+    plain = inspect.unwrap(function)
+    for called in _users_helpers(plain, set()):
+        register_jitable(called)
+    return register_jitable(plain)
+
+
+def _users_helpers(
+    function: FunctionType, known: set[FunctionType]
+) -> set[FunctionType]:
+    """The plain functions of a user's own modules that a function of theirs calls."""
+    if _is_ours(function):
+        return set()
+    for name in function.__code__.co_names:
+        called = function.__globals__.get(name)
+        new = isinstance(called, FunctionType) and called not in {function, *known}
+        if new and digests_of(sys.modules[called.__module__]):
+            known.add(called)
+            _users_helpers(called, known)
+    return known
 
 
 def compiled_part(source: str, names: Mapping[str, Any]) -> Any:

@@ -19,7 +19,7 @@ from diagrams import build_sound_follower, make_simulator, simulate
 from diagrams.building.builder import SoundFollower
 from diagrams.building.robot import block_seed, connect_by_name
 from diagrams.scenario.scenario import Scenario
-from systems import DiffDrivePlant, WheelOdometry, WheelSpeedCommand
+from systems import DiffDrivePlant, WheelCommand, WheelOdometry
 from systems.framework.block_facts import block_facts
 from systems.laws.catalogue import FORCE_LAWS
 
@@ -39,7 +39,7 @@ COMMON_BLOCKS = {
     "diff_drive_plant",
     "source_tracker",
     "wheel_odometry",
-    "wheel_speed_command",
+    "wheel_command",
 }
 
 
@@ -206,7 +206,7 @@ def connect(*blocks: Any) -> None:
 
 def test_a_quantity_nobody_publishes_is_an_error():
     with pytest.raises(ValueError, match="0 blocks publish 'acceleration_W'"):
-        connect(WheelSpeedCommand())
+        connect(WheelCommand())
 
 
 def test_two_publishers_of_a_quantity_are_an_error():

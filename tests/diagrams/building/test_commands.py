@@ -165,7 +165,7 @@ def test_a_block_that_commands_nothing_gets_no_wheels():
 def test_our_laws_command_an_acceleration(law):
     scenario = Scenario(law=law)
     command = make_command(make_controller(scenario), scenario.robot)
-    assert command.get_name() == "wheel_speed_command"
+    assert command.get_name() == "wheel_command"
 
 
 def test_linear_models_are_refused(constants):

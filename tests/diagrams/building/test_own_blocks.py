@@ -26,8 +26,8 @@ PUSHED_BACK = [
 
 
 ASKS_FOR_WHEELS = """
-class Mine(LeafSystem):
-    FACTS = BlockFacts("mine", "control")
+class Mine(Block):
+    part = "mine"
     def __init__(self, wheels): super().__init__()
 """
 
@@ -69,7 +69,7 @@ def test_the_pages_block_stands_in_the_place_of_ours(folder):
     assert result.columns["rear_range"].min() == pytest.approx(0.2, abs=0.05)
     follower = build_sound_follower(result.full_scenario)
     assert follower.blocks["command"].get_name() == "careful_command"
-    assert not follower.robots["robot"].diagram.HasSubsystemNamed("wheel_speed_command")
+    assert not follower.robots["robot"].diagram.HasSubsystemNamed("wheel_command")
 
 
 def test_a_sweep_knows_the_files_of_blocks(folder):
@@ -80,8 +80,8 @@ def test_a_sweep_knows_the_files_of_blocks(folder):
     ("code", "message"),
     [
         ("Mine = 3", r"has no function or class 'Mine'"),
-        ("def Mine(): pass", r"is not a LeafSystem; derive"),
-        ("class Mine(LeafSystem): pass", r"does not state its part; give it .* FACTS"),
+        ("def Mine(): pass", r"is not a Block; derive"),
+        ("class Mine(Block): pass", r"does not state its part; give the class .* part"),
         (
             ASKS_FOR_WHEELS,
             r"cannot be made \(TypeError: .*'wheels'.*\); it may take scenario, ro",
@@ -91,10 +91,7 @@ def test_a_sweep_knows_the_files_of_blocks(folder):
 )
 def test_bad_blocks(tmp_path, code, message):
     path = tmp_path / "mine.py"
-    path.write_text(
-        "from pydrake.systems.framework import LeafSystem\n"
-        f"from systems.framework.block_facts import BlockFacts\n{code}\n"
-    )
+    path.write_text(f"from systems import Block\n{code}\n")
     scenario = load_scenario("default", [f"blocks=['{path}:Mine']"])
     with pytest.raises(InputError, match=rf"^blocks: .*{message}"):
         build_sound_follower(scenario)

@@ -30,30 +30,32 @@ def wordy(c, s, repulsion):
 OWN_BLOCKS = """
 import math
 
-from pydrake.systems.framework import LeafSystem
+from systems import Block, Port, Step
 
-from systems.framework.block_facts import BlockFacts
-from systems.framework.step_block import Step, StepBlock
+
+def speed_of(velocity):
+    return math.sqrt(velocity[0] ** 2 + velocity[1] ** 2)
 
 
 def speed_step(tick, state, inputs, outputs, numbers):
     (velocity,), (mean,) = inputs, outputs
-    state[0] += numbers[0] * (math.sqrt(velocity[0] ** 2 + velocity[1] ** 2) - state[0])
+    state[0] += numbers[0] * (speed_of(velocity) - state[0])
     mean[0] = state[0]
 
 
-class Speedometer(LeafSystem, StepBlock):
-    FACTS = BlockFacts("speedometer", "robot", columns={"mean": ("mean_speed",)})
+class Speedometer(Block):
+    part, stage = "speedometer", "robot"
+    inputs = (Port("velocity_WB", 3, "m/s, m/s, rad/s"),)
+    outputs = (Port("mean", 1, "m/s", ("mean_speed",)),)
 
     def __init__(self, tick_s):
         super().__init__()
         self.set_name("speedometer")
-        step = Step(speed_step, (tick_s / 0.5,), [0.0])
-        self.declare_step(float, step, [("velocity_WB", 3)], [("mean", 1)], tick_s)
+        self.declare(Step(speed_step, (tick_s / 0.5,), [0.0]), tick_s=tick_s)
 
 
-class Stepless(LeafSystem):
-    FACTS = BlockFacts("stepless", "robot")
+class Stepless(Block):
+    part, stage = "stepless", "robot"
 
     def __init__(self):
         super().__init__()
@@ -136,7 +138,7 @@ def test_a_users_block_joins_by_its_step(own_blocks):
 
 def test_a_users_block_without_a_step_is_named(own_blocks):
     block = f"blocks=[{own_blocks}:Stepless]"
-    with pytest.raises(InputError, match=r"engine: stepless has no method step_for"):
+    with pytest.raises(InputError, match=r"engine: stepless has no step"):
         list(both("default", block, "duration_s=0.1"))
 
 

@@ -174,7 +174,6 @@ def test_every_column_is_of_what_is_done_at_its_row(name):
 WITHOUT_STEP = {
     "diff_drive_plant": False,
     "source_tracker": False,
-    "guarded_controller": False,
     "ideal_source_sensor": True,
     "tdoa_estimator": True,
     "cross_power_estimator": True,

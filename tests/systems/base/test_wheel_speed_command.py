@@ -14,9 +14,7 @@ from systems.base.diff_drive_plant import PlantNumbers, body_twist, plant_deriva
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import (
-    TwistWheelCommand,
-    VelocityWheelCommand,
-    WheelSpeedCommand,
+    WheelCommand,
     clamped_velocity,
     hand_position_twist,
     hand_position_velocity,
@@ -108,9 +106,7 @@ def test_a_full_turn_to_the_side_is_scaled():
 
 
 def test_acts_from_the_tick_on_and_not_before(bench):
-    at = bench(
-        WheelSpeedCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0]
-    )
+    at = bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
     np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
     at.tick()
     np.testing.assert_allclose(at.output("v_WP"), [0.05, 0.0])
@@ -118,9 +114,7 @@ def test_acts_from_the_tick_on_and_not_before(bench):
 
 
 def test_constant_push_does_not_wind_up(bench):
-    at = bench(
-        WheelSpeedCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0]
-    )
+    at = bench(WheelCommand(), acceleration_W=[2.0, 0.0], pose_WB_estimated=[0, 0, 0])
     for _ in range(100):
         at.tick()
     assert at.output("v_WP")[0] == pytest.approx(0.72)
@@ -134,7 +128,7 @@ def test_own_dimensions_are_used(bench):
         wheel_radius_m=0.1, wheel_separation_m=0.5, control_point_m=0.25
     )
     at = bench(
-        WheelSpeedCommand(robot=robot),
+        WheelCommand(robot=robot),
         acceleration_W=[4.0, 2.0],
         pose_WB_estimated=[0, 0, 0],
     ).tick()
@@ -163,11 +157,12 @@ def test_gradient(bench, check_gradient, point):
         return [*at.updated(), *at.output("v_WP")]
 
     robot = RobotParameters(control_point_m=0.2, top_speed_m_s=0.7)
-    check_gradient(WheelSpeedCommand(robot=robot), respond, point)
+    check_gradient(WheelCommand(robot=robot), respond, point)
 
 
-def commanded(bench, block, port, command, theta=0.7):
+def commanded(bench, port, command, theta=0.7):
     """Velocity of P and wheel speeds after a tick with a command."""
+    block = WheelCommand(command=port)
     at = bench(block, **{port: command}, pose_WB_estimated=[0.3, -0.1, theta])
     np.testing.assert_array_equal(at.output("wheel_speeds"), [0.0, 0.0])
     at.tick()
@@ -175,22 +170,20 @@ def commanded(bench, block, port, command, theta=0.7):
 
 
 def test_velocity_is_obeyed_at_once(bench):
-    v_WP, wheels = commanded(bench, VelocityWheelCommand(), "velocity_W", [0.1, -0.1])
+    v_WP, wheels = commanded(bench, "velocity_W", [0.1, -0.1])
     np.testing.assert_allclose(v_WP, [0.1, -0.1])
     np.testing.assert_allclose(wheels, wheels_for((0.1, -0.1), 0.7))
 
 
 def test_velocity_beyond_top_speed_keeps_its_direction(bench):
-    v_WP, wheels = commanded(bench, VelocityWheelCommand(), "velocity_W", [3.0, 4.0])
+    v_WP, wheels = commanded(bench, "velocity_W", [3.0, 4.0])
     np.testing.assert_allclose(v_WP, [0.6 * 0.72, 0.8 * 0.72])
     assert max(abs(wheels)) <= 12.0 + 1e-12
 
 
 def test_twist_is_obeyed_at_once_whatever_the_heading(bench):
     for theta in (0.0, 0.7, -2.5):
-        v_WP, wheels = commanded(
-            bench, TwistWheelCommand(), "twist_B", [0.3, 0.5], theta
-        )
+        v_WP, wheels = commanded(bench, "twist_B", [0.3, 0.5], theta)
         twist = body_twist(wheels, ROBOT)
         assert twist == pytest.approx((0.3, 0.5))
         assert np.linalg.norm(v_WP) == pytest.approx(math.hypot(0.3, 0.175 * 0.5))
@@ -198,7 +191,7 @@ def test_twist_is_obeyed_at_once_whatever_the_heading(bench):
 
 @pytest.mark.parametrize("twist", [[2.0, 1.0], [0.5, 6.0], [-1.0, 2.0], [0.0, 9.0]])
 def test_twist_beyond_the_limits_keeps_its_curvature(bench, twist):
-    v_WP, wheels = commanded(bench, TwistWheelCommand(), "twist_B", twist)
+    v_WP, wheels = commanded(bench, "twist_B", twist)
     v, omega = body_twist(wheels, ROBOT)
     assert v * twist[1] == pytest.approx(twist[0] * omega)
     assert v * twist[0] + omega * twist[1] > 0.0
@@ -206,19 +199,17 @@ def test_twist_beyond_the_limits_keeps_its_curvature(bench, twist):
     assert max(abs(wheels)) <= 12.0 + 1e-12
 
 
-@pytest.mark.parametrize(
-    ("block", "port"),
-    [(VelocityWheelCommand, "velocity_W"), (TwistWheelCommand, "twist_B")],
-)
+@pytest.mark.parametrize("port", ["velocity_W", "twist_B"])
 @pytest.mark.parametrize("point", [[0.2, -0.1, 0.4], [0.6, 0.7, 0.4], [0.1, 4.5, -0.4]])
-def test_gradient_of_other_commands(bench, check_gradient, block, port, point):
+def test_gradient_of_other_commands(bench, check_gradient, port, point):
     """Free, clamped, and with the wheels scaled."""
 
     def respond(block, x):
         at = bench(block, **{port: x[:2]}, pose_WB_estimated=[0.0, 0.0, x[2]])
         return at.updated()
 
-    check_gradient(block(robot=RobotParameters(top_speed_m_s=0.7)), respond, point)
+    robot = RobotParameters(top_speed_m_s=0.7)
+    check_gradient(WheelCommand(command=port, robot=robot), respond, point)
 
 
 def test_a_vector_straight_back_is_turned_aside():

@@ -90,12 +90,10 @@ def test_mismatch_and_noise_are_as_large_as_told():
 
 def airflow(heading_deg, **own):
     wind = WindParameters(kind="uniform", speed_m_s=0.8)
-    air = list(WindField(parameters=wind).step.state)
+    air = np.array(WindField(parameters=wind).step.state)
     step = AirflowSensors(parameters=AirflowParameters(noise=0.0, **own)).step
-    outputs = [[0.0, 0.0]]
-    step.step(
-        0, [], [air, [0.0, 0.0, math.radians(heading_deg)]], outputs, step.numbers
-    )
+    pose, outputs = np.array([0.0, 0.0, math.radians(heading_deg)]), [[0.0, 0.0]]
+    step.step(0, [], [air, pose], outputs, step.numbers)
     return outputs[0]
 
 

@@ -121,6 +121,17 @@ def test_the_unsteady_wind_has_its_spread_and_its_memory():
         assert later == pytest.approx(math.exp(-1.0), abs=0.1)
 
 
+def test_wind_and_plume_change_ten_times_a_second():
+    field, puffs = WindField().step, OdorPlume().step
+    air, plume, changed = np.array(field.state), np.array(puffs.state), []
+    for tick in range(12):
+        before = air.copy(), plume.copy()
+        puffs.step(tick, plume, (air,), (), puffs.numbers)
+        field.step(tick, air, (), (), field.numbers)
+        changed.append([(before[0] != air).any(), (before[1] != plume).any()])
+    assert changed == [[tick % 4 == 0] * 2 for tick in range(12)]
+
+
 def test_a_jet_widens_slows_and_blows_nothing_backwards():
     wind = WindParameters(
         kind="jet", meander_intensity=0.0, jet_origin_m=(0.0, 0.0), jet_diameter_m=0.3

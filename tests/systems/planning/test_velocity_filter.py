@@ -147,13 +147,13 @@ def driven(
     bodies = np.array(bodies, dtype=float).reshape(-1, 5)
     sensor = IdealObjectSensor(robot=BURGER, bodies=len(bodies)).step
     command = SafetyFilter(robot=BURGER).step
-    seen, state = list(sensor.state), list(command.state)
+    seen, state = np.array(sensor.state), list(command.state)
     (x, y, theta), wheels = pose, np.zeros(2)
     distances, commands = [], []
     for tick in range(round(seconds / TICK_S)):
         poses = bodies[:, :3] + TICK_S * tick * np.array(velocities)
         objects = [[0.0] * 64]
-        places = [[x, y, theta], poses.ravel().tolist(), bodies[:, 3:].ravel().tolist()]
+        places = [np.array([x, y, theta]), poses.ravel(), bodies[:, 3:].ravel()]
         sensor.step(tick, seen, places, objects, sensor.numbers)
         p_WP = x + EPSILON * math.cos(theta), y + EPSILON * math.sin(theta)
         rectangles = np.hstack([poses, bodies[:, 3:]])
@@ -268,7 +268,7 @@ def meeting(starts: Any) -> float:
         IdealObjectSensor(robot=BURGER, bodies=1, robots=(0,)).step for _ in "ab"
     ]
     commands = [SafetyFilter(robot=BURGER).step for _ in "ab"]
-    seen = [list(sensor.state) for sensor in sensors]
+    seen = [np.array(sensor.state) for sensor in sensors]
     states = [list(command.state) for command in commands]
     least = math.inf
     for tick in range(1000):
@@ -276,7 +276,7 @@ def meeting(starts: Any) -> float:
         least = min(least, rectangle_clearance(rows[0], rows[1]))
         for k in range(2):
             objects, pose = [[0.0] * 64], poses[k].tolist()
-            inputs = [pose, poses[1 - k].tolist(), size]
+            inputs = [poses[k], poses[1 - k], np.array(size)]
             sensors[k].step(tick, seen[k], inputs, objects, sensors[k].numbers)
             pull = (4.0 * (courses[k] - states[k][2:4])).tolist()
             commands[k].step(

@@ -105,7 +105,7 @@ def test_fading_is_drawn_every_tenth_of_a_second():
 
 def test_the_sink_keeps_the_last_of_each_robot():
     step = SinkMonitor(robots={"nose": 1, "ear": 2}).step
-    state = list(step.state)
+    state = np.array(step.state)
     said = [[Frame(1, 5, 30.0)], [Frame(2, 16, 1.0), Frame(1, 12, 0.0)], [], []]
     for tick, frames in enumerate(said):
         data = b"".join(map(encode_frame, frames))

@@ -28,14 +28,10 @@ def seen(bodies: Any, ticks: int = 1, robots: Any = (), **own: Any) -> Any:
         seed=3,
     )
     step, rows = block.step, []
-    state = list(step.state)
+    state = np.array(step.state)
     for tick in range(ticks):
         poses = bodies[:, :3] + 0.025 * tick * bodies[:, 3:6]
-        inputs = [
-            [0.0, 0.0, 0.0],
-            poses.ravel().tolist(),
-            bodies[:, 6:].ravel().tolist(),
-        ]
+        inputs = [np.zeros(3), poses.ravel(), bodies[:, 6:].ravel()]
         outputs = [[0.0] * 64]
         step.step(tick, state, inputs, outputs, step.numbers)
         rows.append(np.reshape(outputs[0], (8, 8)))

@@ -36,14 +36,15 @@ class Driven:
         self.block = ObjectDetector(
             parameters=ObjectDetectorParameters(**own), sensors=sensors, robot=BURGER
         )
-        self.state, self.tick = list(self.block.step.state), 0
+        self.state, self.tick = np.array(self.block.step.state), 0
 
     def see(self, ranges: Any, pose: Any = REST, ages: Any = None) -> Any:
         """Objects (8, 8) of a tick; infinite ranges give no echo."""
         farthest = self.sensors.maximum_range_m
         echo = [float(r <= farthest) for r in ranges]
         held = [min(r, farthest) for r in ranges]
-        inputs = [held, echo, [0.0] * len(held) if ages is None else ages, list(pose)]
+        ages = np.zeros(len(held)) if ages is None else ages
+        inputs = [*map(np.array, (held, echo, ages, pose))]
         outputs, step = [[0.0] * 64], self.block.step
         step.step(self.tick, self.state, inputs, outputs, step.numbers)
         self.tick += 1

@@ -12,11 +12,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
 from systems.base.robot import RobotParameters
+from systems.framework.block import RunFacts, copied
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts
 from systems.ranging.parameters import OBJECT_SIZE, OBJECT_SLOTS
-from systems.routes.global_planner import GlobalPlanner, planner_step
+from systems.routes.global_planner import REPLANS, GlobalPlanner, planner_step
 from systems.routes.parameters import RouteParameters
 from systems.routes.path_target import PathTarget
 from systems.routes.route import ROUTE_SIZE, plan_route
@@ -113,7 +113,7 @@ def run_by_drake(planner, target, boxes, ticks):
 def run_compiled(steps, boxes, ticks, tick, start=(0.0, 0.0)):
     """The same by compiled steps, in the order of compiled loops."""
     planner, target = steps
-    states = [np.array(step.state) for step in steps]
+    states = copied(planner.state), np.array(target.state)
     route, replans = np.zeros(ROUTE_SIZE), np.zeros(1)
     place, progress, valid = np.zeros(4), np.zeros(2), np.zeros(1)
     (x, y), rows = start, []
@@ -170,11 +170,11 @@ def test_it_comes_past_an_unknown_wall_and_compiled_the_same(compiled_tick):
 def ticks_of_replans(planner, tick, objects, pose, count, progress=(0.5, 0.3)):
     """When the route changed, of a robot that stands, and the state at the end."""
     step = planner.step_for(facts())
-    state, changed = np.array(step.state), []
+    state, changed = step.state, []
     for k in range(count):
-        before = state[:ROUTE_SIZE].copy()
+        before = state.route.copy()
         tick(step.step, k, state, (objects, pose, progress), (), step.numbers)
-        if (before != state[:ROUTE_SIZE]).any():
+        if (before != state.route).any():
             changed.append(k)
     return changed, state
 
@@ -189,7 +189,7 @@ def test_it_plans_anew_after_6_s_without_way(compiled_tick):
     changed, state = ticks_of_replans(make(), compiled_tick, objects, STANDS, 300)
     # From then on the route is known: planned again from the same place it is the same.
     assert changed == [240]
-    route = state[2:ROUTE_SIZE].reshape(-1, 2)[: int(state[0])]
+    route = state.route[2:].reshape(-1, 2)[: int(state.route[0])]
     assert route[0] == pytest.approx([1.0, 0.0])
     assert route[-1] == pytest.approx([4.0, 0.0])
     # What is known is the nearest point, (1.35, 0).
@@ -205,30 +205,28 @@ def test_who_is_at_the_goal_does_not_stall(compiled_tick):
 def test_way_that_is_made_is_no_stall(compiled_tick):
     """0.11 m in 5.9 s."""
     step = make().step_for(facts())
-    state = np.array(step.state)
+    first = step.state.route.copy()
     for k in range(1000):
         progress = 0.0, 0.11 * (k // 236)
         inputs = np.zeros(64), STANDS, progress
-        compiled_tick(step.step, k, state, inputs, (), step.numbers)
-    np.testing.assert_array_equal(state[:ROUTE_SIZE], step.state[:ROUTE_SIZE])
+        compiled_tick(step.step, k, step.state, inputs, (), step.numbers)
+    np.testing.assert_array_equal(step.state.route, first)
 
 
 def test_way_on_a_new_route_counts_from_its_begin(compiled_tick):
     """It stalls 3 m along the first one, and makes way on the second."""
     step = make().step_for(facts())
-    state = np.array(step.state)
     for k in range(900):
         along = 3.0 if k <= 240 else 0.11 * ((k - 241) // 236)
         inputs = np.zeros(64), STANDS, (along, along)
-        compiled_tick(step.step, k, state, inputs, (), step.numbers)
-    assert state[ROUTE_SIZE] == 1.0
+        compiled_tick(step.step, k, step.state, inputs, (), step.numbers)
+    assert step.state.progress[REPLANS] == 1.0
 
 
 def test_where_there_is_no_way_the_route_stays_until_there_is_one(compiled_tick):
     """A ring of robots at rest, which go after the second attempt."""
     planner = make()
     step = planner.step_for(facts())
-    state = np.array(step.state)
     ring = np.zeros((OBJECT_SLOTS, OBJECT_SIZE))
     for k, slot in enumerate(ring):
         angle = math.tau * k / OBJECT_SLOTS
@@ -238,10 +236,10 @@ def test_where_there_is_no_way_the_route_stays_until_there_is_one(compiled_tick)
     for k in range(760):
         objects = ring.ravel() if k < 600 else np.zeros(64)
         inputs = objects, STANDS, (0.0, 0.0)
-        compiled_tick(step.step, k, state, inputs, (), step.numbers)
-        replans.append(state[ROUTE_SIZE])
+        compiled_tick(step.step, k, step.state, inputs, (), step.numbers)
+        replans.append(step.state.progress[REPLANS])
     assert np.flatnonzero(np.diff(replans)).tolist() == [719]
-    np.testing.assert_allclose(state[2:4], [1.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(step.state.route[2:4], [1.0, 0.0], atol=1e-12)
 
 
 def test_without_replanning_the_route_stays(bench):
@@ -251,16 +249,18 @@ def test_without_replanning_the_route_stays(bench):
     assert rows[-1, 2] == 0.0
     assert rows[-1, 0] < 2.0
     step = planner.step_for(facts())
-    state = np.array(step.state)
-    planner_step(900, state, (np.zeros(64), STANDS, (0.0, 0.0)), (), step.numbers)
-    np.testing.assert_array_equal(state, step.state)
+    first = copied(step.state)
+    inputs = np.zeros(64), STANDS, (0.0, 0.0)
+    planner_step(900, step.state, inputs, (), step.numbers)
+    np.testing.assert_array_equal(step.state.route, first.route)
+    np.testing.assert_array_equal(step.state.progress, first.progress)
 
 
 def test_a_run_has_its_own_start_and_map():
     planner = make()
     step = planner.step_for(facts(start=(0.0, 1.0), mapped=[WALL]))
     expected = plan_route((0.0, 1.0), (4.0, 0.0), [WALL]).numbers
-    np.testing.assert_array_equal(step.state[:ROUTE_SIZE], expected)
+    np.testing.assert_array_equal(step.state.route, expected)
     np.testing.assert_array_equal(step.numbers.rectangles, [WALL])
 
 
@@ -277,18 +277,18 @@ def test_planning_anew_takes_less_than_10_ms(compiled_tick):
     planner = make(own, [*boxes, *corners], (-4.4, -4.4))
     step = planner.step_for(facts((-4.4, -4.4), [*boxes, *corners]))
     assert step.numbers.grid.blocked.size >= 200 * 200
-    seen = step.numbers.seen
+    seen = step.state.seen
     seen.points[:500] = generator.uniform(-4, 4, (500, 2)) * [1, 0.1]
     seen.points[:500, 1] -= 1.5
     seen.added[0] = 500
     took = []
     for k in range(8):
-        state = np.array(step.state)
+        state = copied(step.state)
         inputs = np.zeros(64), (-4.4 - EPSILON, -4.4, 0.0), (0.0, 0.0)
         begin = time.process_time()
         compiled_tick(step.step, 240, state, inputs, (), step.numbers)
         took.append(time.process_time() - begin)
-        assert state[ROUTE_SIZE] == 1.0, k
+        assert state.progress[REPLANS] == 1.0, k
     assert np.median(took[1:]) < 0.01
 
 

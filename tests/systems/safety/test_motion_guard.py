@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from diagrams import Scenario, load_scenario, simulate
-from systems import FreeSpaceMap, MotionGuard, WheelSpeedCommand
+from systems import FreeSpaceMap, MotionGuard, WheelCommand
 from systems.base.parameters import OdometryParameters
 from systems.base.robot import body_radius
 from systems.framework.input_error import InputError
@@ -91,7 +91,7 @@ def guarded(
 @pytest.mark.parametrize("acceleration", [(4.0, 1.0), (-3.0, 9.0), (80.0, -60.0)])
 def test_in_known_space_it_is_the_block_in_whose_place_it_stands(bench, acceleration):
     plain = bench(
-        WheelSpeedCommand(), acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3]
+        WheelCommand(), acceleration_W=acceleration, pose_WB_estimated=[0, 0, 0.3]
     ).updated()
     state = guarded(bench, known_space(), acceleration)
     np.testing.assert_array_equal(state[:4], plain)

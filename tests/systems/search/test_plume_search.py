@@ -29,7 +29,7 @@ class Run:
 
     def __init__(self, **own: Any) -> None:
         block = PlumeSearch(parameters=PlumeSearchParameters(**{**OWN, **own}))
-        self.step, self.state, self.tick = block.step, list(block.step.state), 0
+        self.step, self.state, self.tick = block.step, np.array(block.step.state), 0
         self.noise, self.parser = np.random.default_rng(1), StreamParser()
         self.frames: list[Any] = []
         self.log: list[list[float]] = []

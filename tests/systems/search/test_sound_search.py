@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
+import numpy as np
 import pytest
 
 from systems.radio.codec import Frame, encode_frame
@@ -34,7 +35,7 @@ class Run:
 
     def __init__(self, **own: Any) -> None:
         block = SoundSearch(parameters=SoundSearchParameters(**{**OWN, **own}))
-        self.step, self.state, self.tick = block.step, list(block.step.state), 0
+        self.step, self.state, self.tick = block.step, np.array(block.step.state), 0
         self.frames: list[Frame] = []
         self.parser = StreamParser()
         self.log: list[list[float]] = []
