@@ -33,8 +33,12 @@ from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
 from systems.hearing.tracking.tracker_model import Measurement, Track, TrackerModel
-from systems.laws.active_impedance_controller import active_force
-from systems.laws.impedance import attraction_force, repulsion_force
+from systems.laws.active import active_force
+from systems.laws.impedance_controller import (
+    attraction_force,
+    obstacle_speed,
+    repulsion_force,
+)
 from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ultrasonic_array import (
     cone_ranges,
@@ -160,14 +164,17 @@ class PlainLoop:
         valid = track.age - T <= scenario.tracker.maximum_age_s
         mass = scenario.robot.mass_kg
         F_m = attraction_force(p_WP, v_WP, target, valid, scenario.attraction, mass)
-        F_b, _ = repulsion_force(
-            vectors,
-            before,
-            lambda c, s: active_force(c, s, scenario.repulsion.active),
-            scenario.repulsion.velocity_term,
-            T,
-        )
-        return (F_m[0] + F_b[0]) / mass, (F_m[1] + F_b[1]) / mass
+        closing = scenario.repulsion.velocity_term == "closing"
+        gains = (scenario.repulsion.active,)
+        Fx = Fy = 0.0
+        for feature, *C_W in vectors:
+            C_before = before.get(round(feature))
+            s = 0.0
+            if C_before is not None:
+                s = obstacle_speed(C_W, C_before, closing, T)
+            fx, fy = repulsion_force(C_W, s, active_force, gains)
+            Fx, Fy = Fx + fx, Fy + fy
+        return (F_m[0] + Fx) / mass, (F_m[1] + Fy) / mass
 
     def _listen(self, time: Any, state: Any, history: Any, last: Any) -> Any:
         scenario = self.scenario

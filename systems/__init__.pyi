@@ -34,39 +34,33 @@ from .hearing.tracking.source_tracker import (
     SourceTracker as SourceTracker,
     SourceTracker_ as SourceTracker_,
 )
-from .laws.active_impedance_2017_controller import (
-    ActiveImpedance2017Controller as ActiveImpedance2017Controller,
-    ActiveImpedance2017Controller_ as ActiveImpedance2017Controller_,
-)
-from .laws.active_impedance_controller import (
-    ActiveImpedanceController as ActiveImpedanceController,
-    ActiveImpedanceController_ as ActiveImpedanceController_,
-)
-from .laws.baselines.dynamic_window import (
+from .laws.baselines.dynamic_window_controller import (
     DynamicWindowController as DynamicWindowController,
 )
-from .laws.baselines.path_integral import (
+from .laws.baselines.path_integral_controller import (
     PathIntegralController as PathIntegralController,
 )
-from .laws.baselines.reciprocal_avoidance import (
+from .laws.baselines.reciprocal_avoidance_controller import (
     ReciprocalAvoidanceController as ReciprocalAvoidanceController,
 )
-from .laws.baselines.stop_when_near import (
+from .laws.baselines.stop_when_near_controller import (
     StopWhenNearController as StopWhenNearController,
 )
-from .laws.baselines.vector_field_histogram import (
+from .laws.baselines.vector_field_histogram_controller import (
     VectorFieldHistogramController as VectorFieldHistogramController,
 )
-from .laws.conventional_impedance_2017_controller import (
+from .laws.guarded_controller import GuardedController as GuardedController
+from .laws.impedance_controller import (
+    ActiveImpedance2017Controller as ActiveImpedance2017Controller,
+    ActiveImpedance2017Controller_ as ActiveImpedance2017Controller_,
+    ActiveImpedanceController as ActiveImpedanceController,
+    ActiveImpedanceController_ as ActiveImpedanceController_,
     ConventionalImpedance2017Controller as ConventionalImpedance2017Controller,
     ConventionalImpedance2017Controller_ as ConventionalImpedance2017Controller_,
-)
-from .laws.conventional_impedance_controller import (
     ConventionalImpedanceController as ConventionalImpedanceController,
     ConventionalImpedanceController_ as ConventionalImpedanceController_,
-)
-from .laws.guarded_controller import GuardedController as GuardedController
-from .laws.radial_law_controller import (
+    ImpedanceController as ImpedanceController,
+    ImpedanceController_ as ImpedanceController_,
     RadialLawController as RadialLawController,
     RadialLawController_ as RadialLawController_,
 )

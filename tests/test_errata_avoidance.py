@@ -13,18 +13,14 @@ import pytest
 from hypothesis import given, strategies as st
 
 from systems.base.robot import RobotParameters
-from systems.framework.signals import TICK_S
-from systems.laws.active_impedance_2017_controller import active_2017_force
-from systems.laws.active_impedance_controller import active_force
-from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
-from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.impedance import repulsion_force
-from systems.laws.parameters import (
-    Active2017Parameters,
-    ActiveParameters,
+from systems.laws.active import ActiveParameters, active_force
+from systems.laws.active_2017 import Active2017Parameters, active_2017_force
+from systems.laws.conventional import ConventionalParameters, conventional_force
+from systems.laws.conventional_2017 import (
     Conventional2017Parameters,
-    ConventionalParameters,
+    conventional_2017_force,
 )
+from systems.laws.impedance_controller import repulsion_force
 from systems.ranging.collision_vector import echo_point, foot_on_segment
 from systems.world.geometry import rotate
 
@@ -163,13 +159,7 @@ def test_han_eq_16_measures_from_the_origin_of_the_world() -> None:
     assert corrected == pytest.approx(5.315, abs=1e-3)
     assert conventional_force(printed, 0.0, CONVENTIONAL) == 0.0
     assert conventional_force(corrected, 0.0, CONVENTIONAL) == 0.0
-    force, _ = repulsion_force(
-        [(1.0, x_w, y_w)],
-        {},
-        lambda c, s: conventional_force(c, s, CONVENTIONAL),
-        "printed",
-        TICK_S,
-    )
+    force = repulsion_force((x_w, y_w), 0.0, conventional_force, (CONVENTIONAL,))
     assert force == pytest.approx((-4.8, 0.0))
 
 

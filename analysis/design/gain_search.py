@@ -22,6 +22,7 @@ from analysis.laws.push_and_pull import (
     injected_share,
     kinetic_energy,
     largest_rise,
+    law_force,
     rest_offset,
     sampled_push,
     spring,
@@ -29,6 +30,7 @@ from analysis.laws.push_and_pull import (
 )
 from diagrams.scenario.scenario import Scenario
 from systems.framework.input_error import InputError
+from systems.laws.active import matched_share
 from systems.laws.catalogue import LAWS
 from systems.laws.repulsion import RepulsionParameters
 
@@ -129,10 +131,13 @@ def _matched_damper(
     scenario: Scenario, law: str, requirements: DesignRequirements
 ) -> Scenario:
     """d_ref from the offset by a far echo, D_0 from the energy put back."""
-    attraction, gains = scenario.attraction, getattr(scenario.repulsion, law)
-    tail = spring(law, scenario)(scenario.ultrasonic.maximum_range_m)
-    at_rest = requirements.far_offset_m * attraction.stiffness_n_m - tail
-    d_ref = _rounded(at_rest / gains.speed_limit_m_s)
+    far = scenario.ultrasonic.maximum_range_m
+    tail = spring(law, scenario)(far)
+    at_rest = requirements.far_offset_m * scenario.attraction.stiffness_n_m - tail
+    unit = {"reference_damping_n_s_m": 1.0, "matched_damping_n_s_m": 2.0}
+    with_unit = with_gains(scenario, law, **unit)
+    unit_term = law_force(law, with_unit)(far, 0.0) - spring(law, with_unit)(far)
+    d_ref = _rounded(at_rest / unit_term)
 
     def excess(D_0: float) -> float:
         changed = with_gains(
@@ -168,7 +173,7 @@ def _matched_spring(
     allowed = allowed_stiffness(scenario, requirements)
 
     def with_alpha(alpha: float) -> Scenario:
-        inverse_ratio = math.exp(-reach / (2.0 * alpha))
+        inverse_ratio = matched_share(reach, alpha)
         k_ref = gain_for_barrier(
             scenario,
             law,

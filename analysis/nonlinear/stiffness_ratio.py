@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from analysis.laws.head_on import head_on
 from diagrams import Scenario
-from systems.laws.active_impedance_controller import active_force
+from systems.laws.active import active_force
 
 #: Spacing of the distances at which forces are compared, m.
 _RATIO_STEP_M = 2e-3

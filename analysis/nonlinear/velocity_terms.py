@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from analysis.laws.head_on import HeadOn, head_on
 from diagrams import Scenario
-from systems.laws.impedance import obstacle_speed
+from systems.laws.impedance_controller import obstacle_speed
 
 Variant = Literal["printed", "closing"]
 VARIANTS: tuple[Variant, ...] = get_args(Variant)
@@ -270,6 +270,7 @@ def sensed_speeds(
         (n,) m/s.
     """
     pairs = zip(now_m.tolist(), before_m.tolist(), strict=True)
+    closing = term == "closing"
     return np.array(
-        [obstacle_speed((c, 0.0), (then, 0.0), term, tick_s) for c, then in pairs]
+        [obstacle_speed((c, 0.0), (then, 0.0), closing, tick_s) for c, then in pairs]
     )

@@ -18,7 +18,6 @@ from systems.base.wheel_speed_command import COMMANDS
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.laws.catalogue import LAWS
-from systems.laws.law import Law
 from systems.ranging.collision_vector import SLOTS
 
 #: What it may tell the log besides, with sizes.
@@ -70,10 +69,12 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     if name in LAWS and LAWS[name].on_route:
         return make_trajectory_controller(scenario)
     if name in LAWS:
-        law = LAWS[name]
-        if law.controller is not None and law.plans:
-            return law.controller(**asked_for(law.controller, {**parts, **more}))
-        return _block(law, parts)
+        law, controller = LAWS[name], LAWS[name].controller
+        if controller is None:
+            return RadialLawController(law=law, **parts)
+        if law.plans:
+            parts = asked_for(controller, {**parts, **more})
+        return controller(**parts)
     law = import_own(name, "law")
     if inspect.isclass(law):
         # One that takes any keyword may hand it on to a law of ours, which does not.
@@ -84,15 +85,6 @@ def make_controller(scenario: Scenario, *, bodies: int = 0, seed: int = 0) -> An
     reach, top_speed = scenario.ultrasonic.maximum_range_m, scenario.robot.top_speed_m_s
     try_law(function, scenario.repulsion, reach, top_speed)
     return RadialLawController(**parts, law=function)
-
-
-def _block(law: Law, parts: dict[str, Any]) -> Any:
-    if law.controller is not None:
-        return law.controller(**parts)
-    force = law.force
-    assert force is not None, f"{law.name} has neither force nor block"
-    arguments = law.arguments(parts["repulsion"], parts["sensors"].minimum_range_m)
-    return RadialLawController(**parts, law=force, arguments=arguments)
 
 
 def _own_block(name: str, law: type, parts: dict[str, Any]) -> Any:

@@ -34,7 +34,7 @@ from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
 from systems.framework.step_block import StepBlock
-from systems.laws.impedance import ImpedanceLoop
+from systems.laws.impedance_controller import LAW_COLUMNS
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
 
@@ -516,7 +516,7 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
     """Output ports of a block that have columns, of a user's own as far as it has."""
-    columns = block_facts(block).columns or ImpedanceLoop.FACTS.columns
+    columns = block_facts(block).columns or LAW_COLUMNS
     ports = {
         port.get_name(): port.size()
         for port in map(block.get_output_port, range(block.num_output_ports()))

@@ -17,7 +17,7 @@ from analysis.laws.head_on import head_on
 from analysis.nonlinear.equilibrium_maps import BOX_M, BOX_X_M, TO_GO_M, boxes_scenario
 from diagrams import Scenario
 from systems.framework.input_error import InputError
-from systems.laws.impedance import attraction_force, repulsion_force
+from systems.laws.impedance_controller import attraction_force, repulsion_force
 from systems.ranging.collision_vector import collision_vectors, echo_points
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
 from systems.ranging.ultrasonic_array import cone_ranges
@@ -118,11 +118,10 @@ def _block_force(
         vectors = collision_vectors(
             points, case.collision_vector, case.ultrasonic.neighbours
         )
-    vectors_W = [(v[0], *rotate(theta, v[1], v[2])) for v in vectors]
-    term = case.repulsion.velocity_term
-    F_b, _ = repulsion_force(vectors_W, {}, law, term, case.tick_s)
     p_WP, p_WS = control_point(pose, offset), case.source.path().pose(0.0)[:2]
     F_m = attraction_force(
         p_WP, (0.0, 0.0), p_WS, 1.0, case.attraction, case.robot.mass_kg
     )
+    pushes = [repulsion_force(rotate(theta, x, y), 0.0, law) for _, x, y in vectors]
+    F_b = np.sum(pushes or [(0.0, 0.0)], axis=0)
     return float(F_m[0] + F_b[0]), float(F_m[1] + F_b[1])

@@ -4,23 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from systems.laws.baselines.records import DWA, MPPI, ORCA, STOP_WHEN_NEAR, VFH_PLUS
+from systems.laws.active import ACTIVE
+from systems.laws.active_2017 import ACTIVE_2017
+from systems.laws.conventional import CONVENTIONAL
+from systems.laws.conventional_2017 import CONVENTIONAL_2017
+from systems.laws.dynamic_window import DWA
+from systems.laws.guarded import GUARDED
 from systems.laws.law import Law
-from systems.laws.records import (
-    ACTIVE,
-    ACTIVE_2017,
-    CONVENTIONAL,
-    CONVENTIONAL_2017,
-    GUARDED,
-    NONE,
-    PLUME_SEARCH,
-    SOUND_SEARCH,
-)
+from systems.laws.no_avoidance import NONE
+from systems.laws.path_integral import MPPI
+from systems.laws.reciprocal_avoidance import ORCA
+from systems.laws.searches import PLUME_SEARCH, SOUND_SEARCH
+from systems.laws.stop_when_near import STOP_WHEN_NEAR
 from systems.laws.trajectory.trajectory_laws import (
     TRAJECTORY_ADAPTIVE,
     TRAJECTORY_CONVENTIONAL,
     TRAJECTORY_FILTERED,
 )
+from systems.laws.vector_field_histogram import VFH_PLUS
 
 #: The laws that come with the package, by name.
 LAWS: Mapping[str, Law] = {

@@ -9,7 +9,8 @@ import numpy as np
 from systems.base.robot import RobotParameters, body_radius
 from systems.framework.block import OBJECT, Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.laws.parameters import AttractionParameters, GuardedParameters
+from systems.laws.guarded import GuardedParameters
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.planning.evasion import EvasionNumbers
 from systems.planning.guarded_drive import (

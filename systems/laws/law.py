@@ -9,6 +9,9 @@ from typing import Any, Literal
 
 from systems.framework.parameters import Parameters
 
+#: Columns of the port ``forces_W`` of a law's block.
+FORCE_COLUMNS = "attraction_x", "attraction_y", "repulsion_x", "repulsion_y"
+
 
 @dataclass(frozen=True)
 class Equation:
@@ -56,17 +59,18 @@ class Law:
     """In the legends of pictures."""
     equations: tuple[Equation, ...]
     """For the model sheet."""
-    module: str = ""
-    """Of force and block, which is loaded when one is first asked for: to check a
-    scenario takes neither Drake nor compiled code."""
-    force_name: str = ""
-    """Name of ``force`` in it."""
+    force: Callable[..., Any] | None = None
+    """``force(c, s, gains)``: push away from an obstacle, N.
+
+    It takes a distance in m and a speed in m/s, floats or AutoDiffXd. Its part f(c, 0)
+    has an energy. A law whose block decides on a motion has no force."""
     least_range: bool = False
     """Whether ``force`` takes the sensors' least range, m, as a fourth argument."""
     gains: type[Parameters] | None = None
     """Model of its gains; every field has a default."""
     controller_name: str = ""
-    """Name of ``controller`` in ``module``."""
+    """Name of its block's class in ``systems``; without one ``RadialLawController``
+    runs the force."""
     loop_gains: tuple[str, str] | None = None
     """Gains of the distance term and of the velocity term, for root loci."""
     tuning: Tuning | None = None
@@ -87,27 +91,21 @@ class Law:
     """In pictures; none: the next one of the palette."""
 
     @property
-    def force(self) -> Callable[..., Any] | None:
-        """``force(c, s, gains)``: push away from an obstacle, N.
-
-        At a distance in m and a speed in m/s, floats or AutoDiffXd. Its part f(c, 0)
-        has an energy; a law without a force, whose block decides otherwise, has none.
-        """
-        return self._load(self.force_name)
-
-    @property
     def controller(self) -> Callable[..., Any] | None:
-        """Class of its block, which takes robot, attraction, repulsion and sensors.
+        """Class of its block, if the law names one.
 
-        None: ``RadialLawController`` with the force.
+        The class takes robot, attraction, repulsion and sensors. It is loaded on the
+        first call: the check of a scenario needs neither Drake nor compiled code.
         """
-        return self._load(self.controller_name)
+        if not self.controller_name:
+            return None
+        return getattr(import_module("systems"), self.controller_name)
 
     def arguments(self, repulsion: Any, least_range_m: float) -> tuple[Any, ...]:
         """What ``force`` takes after c and s.
 
         Args:
-            repulsion: ``RepulsionParameters``; none: the law's default gains.
+            repulsion: ``RepulsionParameters``.
             least_range_m: Least range of the sensors, m.
 
         Returns:
@@ -116,9 +114,5 @@ class Law:
         """
         gains: Any = None
         if self.gains is not None:
-            given = repulsion is not None
-            gains = getattr(repulsion, self.name) if given else self.gains()
+            gains = getattr(repulsion, self.name)
         return (gains, least_range_m) if self.least_range else (gains,)
-
-    def _load(self, name: str) -> Any:
-        return getattr(import_module(self.module), name) if name else None

@@ -21,11 +21,15 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.laws.active_impedance_2017_controller import active_2017_force
-from systems.laws.active_impedance_controller import active_force
-from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
-from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.impedance import attraction_force, repulsion_force
+from systems.laws.active import active_force
+from systems.laws.active_2017 import active_2017_force
+from systems.laws.conventional import conventional_force
+from systems.laws.conventional_2017 import conventional_2017_force
+from systems.laws.impedance_controller import (
+    attraction_force,
+    obstacle_speed,
+    repulsion_force,
+)
 from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
@@ -363,12 +367,11 @@ def test_force_is_the_same_to_1e_9_at_1e5_states(law, velocity_term):
     gains = getattr(parameters(velocity_term)["repulsion"], law)
     force = FUNCTIONS[law]
 
-    def law_of_c_and_s(c, s):
-        return force(c, s, gains)
-
+    closing = velocity_term == "closing"
+    pairs = zip(state["C"].tolist(), state["before"].tolist(), strict=True)
     pushes = [
-        repulsion_force([(1.0, *C)], {1: before}, law_of_c_and_s, velocity_term, T)[0]
-        for C, before in zip(state["C"].tolist(), state["before"].tolist(), strict=True)
+        repulsion_force(C, obstacle_speed(C, before, closing, T), force, (gains,))
+        for C, before in pairs
     ]
     found = pulls_at_1e5_states() + np.array(pushes)
     expected = total_force(law, velocity_term, state)

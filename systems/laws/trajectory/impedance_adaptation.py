@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 from systems.laws.trajectory.impedance_sensitivity import (
     Impedance,
     SensitivityNumbers,
@@ -33,6 +30,8 @@ from systems.world.geometry import control_point
 
 #: Places in the state: what adapts, and sensitivities to each, four numbers.
 _GAINS, _SENSITIVITIES = 0, 3
+#: Names of what adapts.
+_ADAPTED = "stiffness", "damping", "contact_stiffness"
 
 
 class AdaptationNumbers(NamedTuple):
@@ -65,14 +64,9 @@ class AdaptationNumbers(NamedTuple):
 def adaptation_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AdaptationNumbers
 ) -> None:
-    """Impedance of one tick; see ``systems.framework.step_block.Step``.
+    """Adapts K, D and K_e by one tick.
 
-    Args:
-        tick: Not used.
-        state: K, D and K_e; then for each dp/dq, x and y, and dv/dq, x and y.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``AdaptationNumbers``.
+    The state is K, D and K_e; then for each of them dp/dq and dv/dq, x and y each.
     """
     target, reference, pose, v_WP, objects = inputs
     for k in range(3):
@@ -121,21 +115,8 @@ def adaptation_step(
         state[_GAINS + k] = min(max(value, numbers.low[k]), numbers.high[k])
 
 
-class ImpedanceAdaptation(LeafSystem, StepBlock):
+class ImpedanceAdaptation(Block):
     """Adapts stiffness and damping of a robot on a route.
-
-    .. pydrake_system::
-
-        name: ImpedanceAdaptation
-        input_ports:
-        - target_state [m, m, m/s, m/s]
-        - reference_state [m, m, m/s, m/s]
-        - pose_WB_estimated [m, m, rad]
-        - v_WP [m/s, of the virtual mass]
-        - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
-        output_ports:
-        - impedance [number, K in N/m, D in N s/m and K_e in N/m]
-        - adaptation_active [0 or 1]
 
     ``lyapunov``: K' = (gamma/M) e_v . (p - p_d), D' = (gamma/M) e_v . (v - v_d), with
     e_v = v - v_ref: what eq. 40 to 42 are as printed, for which a Lyapunov function
@@ -144,8 +125,8 @@ class ImpedanceAdaptation(LeafSystem, StepBlock):
     34, whose left side is a derivative.
 
     Discrete state, every tick: K, D, K_e, and their sensitivities, four numbers each.
-    The outputs are state and present input; what is learnt at a tick counts from the
-    next one on.
+    ``impedance`` is state; a gradient at a tick changes it from the next tick on.
+    ``adaptation_active`` depends on the present input.
 
     Args:
         parameters: ``AdaptationParameters``.
@@ -157,52 +138,40 @@ class ImpedanceAdaptation(LeafSystem, StepBlock):
     has the errata.
     """
 
-    FACTS = BlockFacts(
-        "adaptation",
-        "control",
-        columns={
-            "impedance": ("stiffness", "damping", "contact_stiffness"),
-            "adaptation_active": ("adaptation_active",),
-        },
-        states=(
-            "stiffness",
-            "damping",
-            "contact_stiffness",
-            *(
-                f"{part}_by_{gain}"
-                for gain in ("stiffness", "damping", "contact_stiffness")
-                for part in ("x", "y", "vx", "vy")
-            ),
+    part = "adaptation"
+    inputs = (
+        Port("target_state", 4, "m, m, m/s, m/s"),
+        Port("reference_state", 4, "m, m, m/s, m/s"),
+        Port("pose_WB_estimated", 3, "m, m, rad"),
+        Port("v_WP", 2, "m/s, of the virtual mass"),
+        Port(
+            "objects_W",
+            OBJECT_SLOTS * OBJECT_SIZE,
+            "number, m and m/s in eight slots, see systems.ranging.objects",
         ),
+    )
+    outputs = (
+        Port("impedance", 3, "number, K in N/m, D in N s/m and K_e in N/m", _ADAPTED),
+        Port("adaptation_active", 1, "0 or 1", ("adaptation_active",)),
+    )
+    states = (
+        *_ADAPTED,
+        *(f"{axis}_by_{gain}" for gain in _ADAPTED for axis in ("x", "y", "vx", "vy")),
     )
 
     def __init__(
         self,
         *,
-        parameters: AdaptationParameters | None = None,
-        impedance: TrajectoryImpedanceParameters | None = None,
-        robot: RobotParameters | None = None,
+        parameters: AdaptationParameters = AdaptationParameters(),
+        impedance: TrajectoryImpedanceParameters = TrajectoryImpedanceParameters(),
+        robot: RobotParameters = RobotParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        own = parameters or AdaptationParameters()
-        law = impedance or TrajectoryImpedanceParameters()
         self.set_name("impedance_adaptation")
-        numbers = adaptation_numbers(own, law, robot or RobotParameters(), tick_s)
-        state: Sequence[float] = [*numbers.nominal, *[0.0] * 12]
-        self.declare_step(
-            float,
-            Step(adaptation_step, numbers, state),
-            (
-                ("target_state", 4),
-                ("reference_state", 4),
-                ("pose_WB_estimated", 3),
-                ("v_WP", 2),
-                ("objects_W", OBJECT_SLOTS * OBJECT_SIZE),
-            ),
-            (("impedance", 3), ("adaptation_active", 1)),
-            tick_s,
-        )
+        numbers = adaptation_numbers(parameters, impedance, robot, tick_s)
+        state = [*numbers.nominal, *[0.0] * 12]
+        self.declare(Step(adaptation_step, numbers, state), tick_s=tick_s)
 
 
 def adaptation_numbers(

@@ -8,12 +8,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem
 from scipy.linalg import expm
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block, Port, Step
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
 
 
 class ReferenceNumbers(NamedTuple):
@@ -48,15 +46,7 @@ def held_matrices(frequency: float, ratio: float, tick_s: float) -> ReferenceNum
 def reference_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: ReferenceNumbers
 ) -> None:
-    """The reference of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Number of the tick.
-        state: Place, m, and velocity, m/s, x and y.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``ReferenceNumbers``.
-    """
+    """Advances the reference by one tick."""
     target, a, b = inputs[0], numbers.a, numbers.b
     if tick == 0:
         for k in range(4):
@@ -70,19 +60,11 @@ def reference_step(
         state[2 + axis] = a[2] * p + a[3] * v + b[2] * p_d + b[3] * v_d
 
 
-class ReferenceModel(LeafSystem, StepBlock):
+class ReferenceModel(Block):
     """Moves as P should, after the target.
 
-    .. pydrake_system::
-
-        name: ReferenceModel
-        input_ports:
-        - target_state [m, m, m/s, m/s]
-        output_ports:
-        - reference_state [m, m, m/s, m/s]
-
-    It begins where the target is at the first tick. It knows of no contact: pushing an
-    obstacle back counts as an error.
+    It begins where the target is at the first tick. It does not know contacts: the
+    motion of P away from an obstacle counts as an error.
 
     Discrete state, every tick: place and velocity, exact for a target that is held over
     the tick. A target counts from the next tick on.
@@ -96,19 +78,10 @@ class ReferenceModel(LeafSystem, StepBlock):
     19 where they belong.
     """
 
-    FACTS = BlockFacts(
-        "reference_model",
-        "control",
-        columns={
-            "reference_state": (
-                "reference_x",
-                "reference_y",
-                "reference_vx",
-                "reference_vy",
-            )
-        },
-        states=("reference_x", "reference_y", "reference_vx", "reference_vy"),
-    )
+    part = "reference_model"
+    inputs = (Port("target_state", 4, "m, m, m/s, m/s"),)
+    states = "reference_x", "reference_y", "reference_vx", "reference_vy"
+    outputs = (Port("reference_state", 4, "m, m, m/s, m/s", states),)
 
     def __init__(
         self,
@@ -119,10 +92,5 @@ class ReferenceModel(LeafSystem, StepBlock):
     ) -> None:
         super().__init__()
         self.set_name("reference_model")
-        self.declare_step(
-            float,
-            Step(reference_step, held_matrices(frequency, ratio, tick_s), [0.0] * 4),
-            (("target_state", 4),),
-            (("reference_state", 4),),
-            tick_s,
-        )
+        numbers = held_matrices(frequency, ratio, tick_s)
+        self.declare(Step(reference_step, numbers, [0.0] * 4), tick_s=tick_s)

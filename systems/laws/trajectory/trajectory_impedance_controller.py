@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
 from systems.base.wheel_speed_command import (
@@ -13,10 +12,10 @@ from systems.base.wheel_speed_command import (
     integrate_velocity,
     turned_off_back,
 )
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import Block_, Port, Step
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step, StepBlock
+from systems.laws.law import FORCE_COLUMNS
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
 from systems.laws.trajectory.trajectory_impedance import (
     ContactNumbers,
@@ -84,15 +83,7 @@ def _command(
 def trajectory_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
-    """Acceleration of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Not used.
-        state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``TrajectoryNumbers``.
-    """
+    """Computes acceleration and forces with K, D and K_e of the parameters."""
     _command(inputs, numbers.impedance, outputs, numbers)
 
 
@@ -100,39 +91,19 @@ def trajectory_impedance_step(
 def adapted_impedance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: TrajectoryNumbers
 ) -> None:
-    """The same with K, D and K_e of the last input.
-
-    Args:
-        tick: Not used.
-        state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``TrajectoryNumbers``.
-    """
+    """Computes acceleration and forces with K, D and K_e of the last input."""
     _command(inputs, inputs[4], outputs, numbers)
 
 
 @define_for_scalars("TrajectoryImpedanceController_", __name__)
 def TrajectoryImpedanceController_(T):
-    class Impl(LeafSystem_[T], StepBlock):
+    class Impl(Block_[T]):
         """Pulls P to a moving target, and off robots and obstacles.
-
-        .. pydrake_system::
-
-            name: TrajectoryImpedanceController
-            input_ports:
-            - target_state [m, m, m/s, m/s]
-            - objects_W [number, m and m/s in eight slots, see systems.ranging.objects]
-            - pose_WB_estimated [m, m, rad]
-            - v_WP [m/s, of the virtual mass]
-            output_ports:
-            - acceleration_W [m/s^2]
-            - forces_W [N, of the target then of contacts, x and y each]
 
         M p'' = -K (p - p_d) - D (v - v_d) + sum of K_e (S - d) n - D_e (v - v_j), with
         n from object j to P, where it is nearer than S. With ``adapts`` there is an
-        input port ``impedance``, K, D and K_e, which counts in the place of the
-        parameters'. A function of the present input: no state, no latency.
+        input port ``impedance``, whose K, D and K_e replace those of the parameters. A
+        function of the present input: no state, no latency.
 
         With ``block_distance_m`` (eq. 6) the acceleration is -v/T, which stops the
         virtual mass at once, where its next step would end within that distance of an
@@ -151,37 +122,38 @@ def TrajectoryImpedanceController_(T):
         that their text asks for; docs/errata.md lists the differences.
         """
 
-        FACTS = BlockFacts(
-            "controller",
-            "control",
-            columns={
-                "forces_W": (
-                    "attraction_x",
-                    "attraction_y",
-                    "repulsion_x",
-                    "repulsion_y",
-                )
-            },
+        inputs = (
+            Port("target_state", 4, "m, m, m/s, m/s"),
+            Port(
+                "objects_W",
+                OBJECT_SLOTS * OBJECT_SIZE,
+                "number, m and m/s in eight slots, see systems.ranging.objects",
+            ),
+            Port("pose_WB_estimated", 3, "m, m, rad"),
+            Port("v_WP", 2, "m/s, of the virtual mass"),
+        )
+        outputs = (
+            Port("acceleration_W", 2, "m/s^2"),
+            Port(
+                "forces_W",
+                4,
+                "N, of the target then of contacts, x and y each",
+                FORCE_COLUMNS,
+            ),
         )
 
         def _construct(
             self,
             *,
-            parameters=None,
-            robot=None,
-            adapts=False,
-            tick_s=TICK_S,
-            converter=None,
-        ):
+            parameters: TrajectoryImpedanceParameters = TrajectoryImpedanceParameters(),
+            robot: RobotParameters = RobotParameters(),
+            adapts: bool = False,
+            tick_s: float = TICK_S,
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            own = parameters or TrajectoryImpedanceParameters()
-            robot = robot or RobotParameters()
-            self._config = {
-                "parameters": own,
-                "robot": robot,
-                "adapts": adapts,
-                "tick_s": tick_s,
-            }
+            self.set_name("trajectory_impedance_controller")
+            own = parameters
             numbers = TrajectoryNumbers(
                 (own.stiffness_n_m, own.damping_n_s_m, own.contact_stiffness_n_m),
                 own.contact_damping_n_s_m,
@@ -193,26 +165,12 @@ def TrajectoryImpedanceController_(T):
                 robot.top_speed_m_s,
                 tick_s,
             )
-            inputs = [
-                ("target_state", 4),
-                ("objects_W", OBJECT_SLOTS * OBJECT_SIZE),
-                ("pose_WB_estimated", 3),
-                ("v_WP", 2),
-            ]
+            step = trajectory_impedance_step
             if adapts:
-                inputs.append(("impedance", 3))
-            self.set_name("trajectory_impedance_controller")
-            step = adapted_impedance_step if adapts else trajectory_impedance_step
-            self.declare_step(
-                T,
-                Step(step, numbers),
-                inputs,
-                (("acceleration_W", 2), ("forces_W", 4)),
-                tick_s,
-            )
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, **other._config, converter=converter)
+                step = adapted_impedance_step
+                impedance = Port("impedance", 3, "number, K, D and K_e")
+                self.inputs = (*self.inputs, impedance)
+            self.declare(Step(step, numbers), tick_s=tick_s)
 
     return Impl
 

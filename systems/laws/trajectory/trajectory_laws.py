@@ -30,7 +30,6 @@ def _law(
         label=label,
         equations=(_IMPEDANCE, *more),
         gains=gains,
-        module="systems.laws.trajectory.trajectory_impedance_controller",
         controller_name="TrajectoryImpedanceController",
         plans=True,
         on_route=True,

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from analysis.laws.radial_law import radial_law
-from systems.laws.active_impedance_controller import active_force
+from systems.laws.active import active_force
 
 K_0, RHO_0, ALPHA = 16.0, 0.8, 0.8 / (2.0 * math.log(4.0))
 RANGE = 3.0

@@ -10,7 +10,11 @@ from scipy.integrate import solve_ivp
 
 from analysis.models.point_mass import STEP_S, point_mass
 from diagrams.building.laws import make_controller
-from systems.laws.impedance import attraction_force, repulsion_force
+from systems.laws.impedance_controller import (
+    attraction_force,
+    obstacle_speed,
+    repulsion_force,
+)
 from systems.ranging.ideal_obstacle_sensor import nearest_vectors
 
 LAWS = ("conventional", "active", "conventional2017", "active2017")
@@ -25,9 +29,13 @@ def block_force(scenario, law, state, *, before=None):
         return nearest_vectors((p[0], p[1], 0.0), bodies, 0.0, 3.0, slots)
 
     C = {} if before is None else {round(v[0]): v[1:] for v in vectors(before)}
-    F_b, _ = repulsion_force(
-        vectors(state), C, law, scenario.repulsion.velocity_term, 1e-6
-    )
+    closing = scenario.repulsion.velocity_term == "closing"
+    pushes = [(0.0, 0.0)]
+    for feature, *C_W in vectors(state):
+        then = C.get(round(feature))
+        s = 0.0 if then is None else obstacle_speed(C_W, then, closing, 1e-6)
+        pushes.append(repulsion_force(C_W, s, law))
+    F_b = np.sum(pushes, axis=0)
     p_WS = scenario.source.path().pose(0.0)[:2]
     F_m = attraction_force(state[:2], state[2:], p_WS, 1.0, scenario.attraction, 3.94)
     return F_m[0] + F_b[0], F_m[1] + F_b[1]

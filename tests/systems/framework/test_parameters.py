@@ -20,7 +20,7 @@ from systems.framework.parameters import (
     Positive,
     Size,
 )
-from systems.laws.parameters import ActiveParameters
+from systems.laws.active import ActiveParameters
 from systems.ranging.parameters import UltrasonicParameters
 from systems.sound.acoustics import AcousticParameters, sound_speed
 

@@ -102,8 +102,8 @@ def add_law(tree: Path) -> None:
     listed = (laws / "catalogue.py").read_text("utf-8")
     for before, added in (
         (
-            "from systems.laws.law import Law\n",
-            "{}from systems.laws.gaussian import GAUSSIAN\n",
+            "from systems.laws.guarded import GUARDED\n",
+            "from systems.laws.gaussian import GAUSSIAN\n{}",
         ),
         ("        ACTIVE_2017,\n", "{}        GAUSSIAN,\n"),
     ):

@@ -39,7 +39,6 @@ def test_titles():
 def test_gains_stand_in_the_scenario_under_the_law_s_name(name):
     law = LAWS[name]
     assert law.gains is not None
-    assert law.arguments(None, LEAST) == law.arguments(REPULSION, LEAST)
     assert getattr(REPULSION, name) == law.gains()
     field = RepulsionParameters.model_fields[name]
     assert field.description == f"Gains of ``law: {name}``."

@@ -17,15 +17,12 @@ from systems import (
     ConventionalImpedance2017Controller,
     ConventionalImpedanceController,
 )
-from systems.laws.active_impedance_2017_controller import active_2017_force
-from systems.laws.active_impedance_controller import active_force
-from systems.laws.conventional_impedance_2017_controller import conventional_2017_force
-from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.parameters import (
-    Active2017Parameters,
-    ActiveParameters,
+from systems.laws.active import ActiveParameters, active_force
+from systems.laws.active_2017 import Active2017Parameters, active_2017_force
+from systems.laws.conventional import ConventionalParameters, conventional_force
+from systems.laws.conventional_2017 import (
     Conventional2017Parameters,
-    ConventionalParameters,
+    conventional_2017_force,
 )
 from systems.laws.repulsion import RepulsionParameters
 

@@ -9,9 +9,9 @@ import pytest
 from pydrake.math import exp
 
 from systems.base.robot import RobotParameters
+from systems.laws.conventional import ConventionalParameters
+from systems.laws.impedance_controller import RadialLawController
 from systems.laws.no_avoidance import no_force
-from systems.laws.parameters import ConventionalParameters
-from systems.laws.radial_law_controller import RadialLawController
 from systems.laws.repulsion import RepulsionParameters
 
 pytestmark = pytest.mark.drake

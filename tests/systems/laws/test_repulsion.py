@@ -7,7 +7,7 @@ import math
 import pytest
 from pydantic import ValidationError
 
-from systems.laws.parameters import ActiveParameters, matched_decay
+from systems.laws.active import ActiveParameters, matched_decay
 
 
 def test_matched_decay_of_a_ratio_of_e():

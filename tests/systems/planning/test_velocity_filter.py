@@ -10,7 +10,7 @@ import pytest
 from scipy.optimize import linprog, minimize, nnls
 
 from systems.base.robot import RobotParameters
-from systems.laws.baselines.reciprocal_avoidance import avoid_body
+from systems.laws.baselines.reciprocal_avoidance_controller import avoid_body
 from systems.planning.safety_filter import SafetyFilter
 from systems.planning.velocity_filter import (
     FilterNumbers,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from systems.base.robot import RobotParameters
-from systems.laws.radial_law_controller import RadialLawController
+from systems.laws.impedance_controller import RadialLawController
 from systems.ranging.collision_vector import CollisionVector
 from systems.ranging.parameters import CollisionVectorParameters, UltrasonicParameters
 from systems.ranging.ultrasonic_array import UltrasonicArray

@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from systems.laws.baselines.dynamic_window import (
+from systems.laws.baselines.dynamic_window_controller import (
     WindowNumbers,
     choose_in_window,
     time_to_contact,

@@ -7,8 +7,13 @@ import pytest
 from scipy.ndimage import distance_transform_edt
 
 from systems.base.robot import RobotParameters
-from systems.laws.baselines.parameters import PathIntegralParameters
-from systems.laws.baselines.path_integral import _roll_numbers, distance_field, roll_out
+from systems.laws.baselines.path_integral_controller import (
+    _roll_numbers,
+    distance_field,
+    roll_out,
+)
+from systems.laws.path_integral import PathIntegralParameters
+from systems.planning.parameters import FollowingParameters
 
 CELL_M = 0.05
 START = 0.0, 0.0, 0.0
@@ -33,7 +38,7 @@ def test_places_are_where_they_are():
 def rolled(own, noise, goal, *, field=None, rounds=1):
     """The plan after some rounds, each from the plan of the last."""
     controls = np.zeros((own.steps, 2))
-    numbers = _roll_numbers(own, RobotParameters(), None)
+    numbers = _roll_numbers(own, RobotParameters(), FollowingParameters())
     if field is None:
         field = distance_field(np.empty((0, 3)), 0.0, 0.0, 2.5, CELL_M)
     for k in range(rounds):
@@ -98,7 +103,7 @@ def test_it_does_not_drive_into_a_wall():
 def test_discs_cover_the_body(width):
     robot = RobotParameters(width_m=width)
     own = PathIntegralParameters(clearance_m=0.0)
-    aside, radius = _roll_numbers(own, robot, None).discs
+    aside, radius = _roll_numbers(own, robot, FollowingParameters()).discs
     x, y = np.meshgrid(np.linspace(-0.175, 0.175, 9), np.linspace(-0.5, 0.5, 41))
     y = y * width
     near = [np.hypot(x, y - aside * k) <= radius + 1e-9 for k in (-1, 0, 1)]

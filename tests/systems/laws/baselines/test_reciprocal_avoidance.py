@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 
-from systems.laws.baselines.reciprocal_avoidance import avoid_body
+from systems.laws.baselines.reciprocal_avoidance_controller import avoid_body
 
 RADIUS, HORIZON = 0.5, 3.0
 

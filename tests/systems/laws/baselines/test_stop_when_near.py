@@ -6,8 +6,11 @@ import math
 
 import pytest
 
-from systems.laws.baselines.parameters import StopWhenNearParameters
-from systems.laws.baselines.stop_when_near import StopNumbers, stop_when_near_step
+from systems.laws.baselines.stop_when_near_controller import (
+    StopNumbers,
+    stop_when_near_step,
+)
+from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.parameters import FollowingParameters
 

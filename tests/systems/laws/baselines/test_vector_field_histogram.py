@@ -7,12 +7,12 @@ import math
 import numpy as np
 import pytest
 
-from systems.laws.baselines.parameters import VectorFieldHistogramParameters
-from systems.laws.baselines.vector_field_histogram import (
+from systems.laws.baselines.vector_field_histogram_controller import (
     HistogramNumbers,
     choose_direction,
     polar_histogram,
 )
+from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 
 NUMBERS = HistogramNumbers(1.5, 0.4, (1.0, 2.0), (5.0, 2.0, 2.0))
 GAINS = 5.0, 2.0, 2.0

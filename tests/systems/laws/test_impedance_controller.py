@@ -8,9 +8,16 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from systems.laws.impedance import attraction_force, obstacle_speed, repulsion_force
+from systems.laws.active import ACTIVE
+from systems.laws.impedance_controller import (
+    ActiveImpedanceController,
+    ImpedanceController,
+    RadialLawController,
+    attraction_force,
+    obstacle_speed,
+    repulsion_force,
+)
 from systems.laws.parameters import AttractionParameters
-from systems.laws.radial_law_controller import RadialLawController
 from systems.laws.repulsion import RepulsionParameters
 
 T = 0.025
@@ -45,8 +52,8 @@ def test_without_a_target_the_mass_brakes_with_its_time_constant():
 def test_obstacle_speed_of_a_sliding_surface():
     """C turns from (1, 0) to (1, 0.01): 0.4 m/s printed, receding: not closing."""
     now, before = (1.0, 0.01), (1.0, 0.0)
-    assert obstacle_speed(now, before, "printed", T) == pytest.approx(0.4)
-    assert obstacle_speed(now, before, "closing", T) == 0.0
+    assert obstacle_speed(now, before, False, T) == pytest.approx(0.4)
+    assert obstacle_speed(now, before, True, T) == 0.0
 
 
 @given(angle, st.floats(0.2, 3.0), st.floats(-0.1, 0.1))
@@ -55,8 +62,8 @@ def test_on_the_line_of_sight_the_printed_speed_is_the_magnitude(
 ):
     u = np.array([math.cos(direction), math.sin(direction)])
     now, before = (distance + change) * u, distance * u
-    printed = obstacle_speed(now, before, "printed", T)
-    closing = obstacle_speed(now, before, "closing", T)
+    printed = obstacle_speed(now, before, False, T)
+    closing = obstacle_speed(now, before, True, T)
     assert printed == pytest.approx(abs(change) / T, abs=1e-9)
     assert closing == pytest.approx(max(0.0, -change) / T, abs=1e-9)
 
@@ -64,28 +71,24 @@ def test_on_the_line_of_sight_the_printed_speed_is_the_magnitude(
 @given(angle, angle, st.floats(0.2, 3.0), st.floats(0.2, 3.0))
 def test_closing_speed_is_never_above_the_printed(a, b, r, q):
     now, before = (r * math.cos(a), r * math.sin(a)), (q * math.cos(b), q * math.sin(b))
-    closing = obstacle_speed(now, before, "closing", T)
-    assert 0.0 <= closing <= obstacle_speed(now, before, "printed", T) + 1e-9
-
-
-def test_no_speed_at_the_first_echo():
-    assert obstacle_speed((1.0, 0.5), None, "printed", T) == 0.0
+    closing = obstacle_speed(now, before, True, T)
+    assert 0.0 <= closing <= obstacle_speed(now, before, False, T) + 1e-9
 
 
 @given(angle, length)
 def test_repulsion_points_away(direction, distance):
     C = (distance * math.cos(direction), distance * math.sin(direction))
-    vectors = [(1.0, *C)]
-    force, _ = repulsion_force(vectors, {}, lambda c, s: 5.0 / c, "printed", T)
+    force = repulsion_force(C, 0.0, lambda c, s: 5.0 / c)
     expected = [-5.0 / distance * x / distance for x in C]
     np.testing.assert_allclose(force, expected, rtol=1e-9, atol=1e-12)
 
 
-def test_forces_of_several_vectors_add():
-    vectors = [(1.0, 1.0, 0.0), (2.0, 0.0, 0.5)]
-    force, speeds = repulsion_force(vectors, {}, lambda c, s: 1 / c, "printed", T)
-    assert force == pytest.approx((-1.0, -2.0))
-    assert speeds == [0.0, 0.0]
+def test_forces_of_several_vectors_add(bench):
+    block = RadialLawController(law=lambda c, s, repulsion: 1.0 / c)
+    at = on_bench(bench, block)
+    see(at, (1.0, 1.0, 0.0), (2.0, 0.0, 0.5))
+    np.testing.assert_allclose(at.output("forces_W")[2:], [-1.0, -2.0])
+    np.testing.assert_array_equal(at.output("obstacle_speeds"), np.zeros(3))
 
 
 def make_bench(bench, velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):
@@ -94,6 +97,11 @@ def make_bench(bench, velocity_term="printed", *, pose=(0.0, 0.0, 0.0)):
         repulsion=RepulsionParameters(velocity_term=velocity_term),
         law=lambda c, s, repulsion: s,
     )
+    return on_bench(bench, block, pose=pose)
+
+
+def on_bench(bench, block, *, pose=(0.0, 0.0, 0.0)):
+    """A controller that sees nothing, 5 m from its target."""
     return bench(
         block,
         p_WS_estimated=[5.0, 0.0],
@@ -199,6 +207,24 @@ def test_acceleration_is_the_sum_over_the_mass(bench):
     np.testing.assert_allclose(
         at.output("acceleration_W"), [(2 * 3.625 - 0.4) / 3.94, 0.0], atol=1e-9
     )
+
+
+def test_a_law_of_the_catalogue_and_its_name_are_one_block(bench):
+    named, general = ActiveImpedanceController(), ImpedanceController(law=ACTIVE)
+    pushes = []
+    for block in (named, general):
+        at = on_bench(bench, block)
+        see(at, (2, 0.4, 0.1))
+        pushes.append(at.output("forces_W"))
+    np.testing.assert_array_equal(*pushes)
+    assert pushes[0][2] < 0.0
+    assert named.get_name() == "active_impedance_controller"
+    assert isinstance(named, ImpedanceController)
+
+
+def test_a_named_law_takes_no_other():
+    with pytest.raises(TypeError, match="law"):
+        ActiveImpedanceController(law=ACTIVE)
 
 
 def test_unseen_slots_push_nothing(bench):

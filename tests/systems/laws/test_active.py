@@ -11,16 +11,10 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 
 from systems.base.robot import RobotParameters
-from systems.laws.active_impedance_controller import (
-    ActiveImpedanceController,
-    active_force,
-)
-from systems.laws.conventional_impedance_controller import conventional_force
-from systems.laws.parameters import (
-    ActiveParameters,
-    AttractionParameters,
-    ConventionalParameters,
-)
+from systems.laws.active import ActiveParameters, active_force
+from systems.laws.conventional import ConventionalParameters, conventional_force
+from systems.laws.impedance_controller import ActiveImpedanceController
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 POINT = [2.0, 0.4, 0.6, 0.1, 0.2, 0.3, -0.1, -0.1]

@@ -7,11 +7,9 @@ import pytest
 from scipy.integrate import quad
 
 from systems.base.robot import RobotParameters
-from systems.laws.conventional_impedance_controller import (
-    ConventionalImpedanceController,
-    conventional_force,
-)
-from systems.laws.parameters import AttractionParameters, ConventionalParameters
+from systems.laws.conventional import ConventionalParameters, conventional_force
+from systems.laws.impedance_controller import ConventionalImpedanceController
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 GAINS = ConventionalParameters(stiffness_n_m=10.0, damping_n_s_m=3.0)

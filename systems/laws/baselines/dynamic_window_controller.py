@@ -10,22 +10,21 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters
+from systems.framework.block import OBJECT, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    follow_numbers,
     half_size,
     speed_limits,
 )
-from systems.laws.baselines.parameters import DynamicWindowParameters
+from systems.laws.dynamic_window import DynamicWindowParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
-from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.parameters import FreeSpaceParameters
 
 #: Speeds and yaw rates that are tried in a window.
 _SPEEDS, _TURNS = 9, 17
@@ -57,7 +56,6 @@ class DynamicWindowNumbers(NamedTuple):
     window: WindowNumbers
     follow: FollowNumbers
     period_ticks: int
-    free_space: FreeSpace
 
 
 @njit(cache=True)
@@ -205,20 +203,12 @@ def choose_in_window(
 def dynamic_window_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: DynamicWindowNumbers
 ) -> None:
-    """The twist of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Of its number depends when a motion is chosen.
-        state: Speed and yaw rate that were chosen last.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``DynamicWindowNumbers``.
-    """
+    """Computes the twist. The state is the speed and yaw rate that were chosen last."""
     target, pose, own = inputs[0], inputs[3], numbers.own
     if tick % numbers.period_ticks == 0:
         wanted, bearing = approach(inputs, numbers.follow)
         clear = target[0], target[1], own.source_clearance_m
-        places = list_occupied(numbers.free_space, pose[0], pose[1], _REACH_M, clear)
+        places = list_occupied(inputs[4], pose[0], pose[1], _REACH_M, clear)
         now, at = (state[0], state[1]), (pose[0], pose[1], pose[2])
         state[0], state[1] = choose_in_window(
             places, at, now, wanted, bearing, numbers.window
@@ -228,18 +218,6 @@ def dynamic_window_step(
 
 class DynamicWindowController(BaselineController):
     """Chooses among the motions that it can reach and stop from in time.
-
-    .. pydrake_system::
-
-        name: DynamicWindowController
-        input_ports:
-        - p_WS_estimated [m]
-        - v_WS_estimated [m/s]
-        - target_valid [0 or 1]
-        - pose_WB_estimated [m, m, rad]
-        - free_space [FreeSpace]
-        output_ports:
-        - twist_B [m/s, rad/s]
 
     Each ``period_s`` it takes, of speeds and yaw rates that its accelerations let it
     reach, those from which it can brake before its rectangle covers a place that has
@@ -255,26 +233,26 @@ class DynamicWindowController(BaselineController):
         attraction: The follow distance.
         repulsion: ``RepulsionParameters``; uses ``dwa``.
         following: How fast it drives and turns.
-        known: Grid of the map.
         tick_s: Period of the controller, s.
 
     Reference: Fox, Burgard and Thrun, The dynamic window approach to collision
     avoidance, IEEE Robotics and Automation Magazine 4 (1), 1997.
     """
 
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
     def __init__(
         self,
         *,
-        robot: RobotParameters | None = None,
-        attraction: AttractionParameters | None = None,
-        repulsion: Any = None,
-        following: FollowingParameters | None = None,
-        known: FreeSpaceParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        robot, known = robot or RobotParameters(), known or FreeSpaceParameters()
-        own = DynamicWindowParameters() if repulsion is None else repulsion.dwa
+        self.set_name("dynamic_window_controller")
+        own = repulsion.dwa
         window = WindowNumbers(
             (own.heading_gain, own.distance_gain, own.speed_gain),
             (own.acceleration_m_s2, own.turn_acceleration_rad_s2),
@@ -287,15 +265,10 @@ class DynamicWindowController(BaselineController):
         numbers = DynamicWindowNumbers(
             own,
             window,
-            follow_numbers(following, attraction, robot),
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
             max(round(own.period_s / tick_s), 1),
-            make_free_space(1, known.cell_m, 1, 2),
         )
-        self.declare_baseline(
-            "dynamic_window_controller",
-            dynamic_window_step,
-            numbers,
-            tick_s,
-            state=(0.0, 0.0),
-            carried=("free_space",),
-        )
+        step = Step(dynamic_window_step, numbers, [0.0, 0.0])
+        self.declare(step, tick_s=tick_s)

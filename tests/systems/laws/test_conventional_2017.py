@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from systems.base.robot import RobotParameters
-from systems.laws.conventional_impedance_2017_controller import (
-    ConventionalImpedance2017Controller,
+from systems.laws.conventional_2017 import (
+    Conventional2017Parameters,
     conventional_2017_force,
 )
-from systems.laws.parameters import AttractionParameters, Conventional2017Parameters
+from systems.laws.impedance_controller import ConventionalImpedance2017Controller
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 from systems.ranging.parameters import UltrasonicParameters
 

@@ -10,24 +10,23 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
+from systems.framework.block import OBJECT, Port, RunFacts, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import RunFacts, Step
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    follow_numbers,
     half_size,
     speed_limits,
 )
-from systems.laws.baselines.parameters import PathIntegralParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.path_integral import PathIntegralParameters
+from systems.laws.repulsion import RepulsionParameters
 from systems.planning.carrot import find_carrot
 from systems.planning.following import FollowNumbers, wanted_speed
 from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import wrapped
 from systems.planning.way import Way, find_way, make_way
-from systems.safety.free_space import FreeSpace, make_free_space
 from systems.safety.parameters import FreeSpaceParameters
 
 #: Half of the window of the distances, m; it holds what a horizon reaches.
@@ -72,11 +71,17 @@ class PathIntegralNumbers(NamedTuple):
     radius_m: float
     """Of the disc for which ways are sought, m."""
     period_ticks: int
-    free_space: FreeSpace
-    way: Way
-    """Room for the way, which is sought anew each time."""
     noise: NDArray[np.float64]
     """(sequences, steps, 2) of standard deviation 1."""
+
+
+class PathIntegralState(NamedTuple):
+    """The state of ``PathIntegralController``."""
+
+    plan: NDArray[np.float64]
+    """(steps, 2) speed, m/s, and yaw rate, rad/s, of each step."""
+    way: Way
+    """Room for the way, which is sought anew each time."""
 
 
 @njit(cache=True)
@@ -211,51 +216,47 @@ def _cost(
 
 @register_jitable
 def path_integral_step(
-    tick: int, state: Any, inputs: Any, outputs: Any, numbers: PathIntegralNumbers
+    tick: int,
+    state: PathIntegralState,
+    inputs: Any,
+    outputs: Any,
+    numbers: PathIntegralNumbers,
 ) -> None:
-    """The twist of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Of its number depends when a plan is made.
-        state: The plan, speed and yaw rate of each step.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``PathIntegralNumbers``.
-    """
+    """Computes the twist, and a new plan every ``period_ticks``."""
     target, velocity, pose, own = inputs[0], inputs[1], inputs[3], numbers.own
-    steps, twist = len(state) // 2, outputs[0]
+    plan, space, twist = state.plan, inputs[4], outputs[0]
+    steps = len(plan)
     if tick % numbers.period_ticks == 0:
         controls = np.zeros((steps, 2))
         # What is left of the last plan, and its last motion once more.
         for k in range(steps):
             last = min(k + 1, steps - 1)
-            controls[k, 0], controls[k, 1] = state[2 * last], state[2 * last + 1]
+            controls[k, 0], controls[k, 1] = plan[last, 0], plan[last, 1]
         at, valid = (pose[0], pose[1], pose[2]), inputs[2][0] > 0.5
         place, speed = (target[0], target[1]), (velocity[0], velocity[1])
-        goal = _goal(at, place, speed, valid, numbers)
+        goal = _goal(at, place, speed, valid, space, state.way, numbers)
         beside = (place[0], place[1], own.source_clearance_m)
-        space = numbers.free_space
         places = list_occupied(space, at[0], at[1], _WINDOW_M, beside)
         cell = space.cell_m
         field = distance_field(places, at[0], at[1], _WINDOW_M, cell)
         first = tick // numbers.period_ticks * own.samples
         roll_out(controls, numbers.noise, first, at, goal, field, cell, numbers.roll)
         for k in range(steps):
-            state[2 * k], state[2 * k + 1] = controls[k, 0], controls[k, 1]
-    twist[0], twist[1] = state[0], state[1]
+            plan[k, 0], plan[k, 1] = controls[k, 0], controls[k, 1]
+    twist[0], twist[1] = plan[0, 0], plan[0, 1]
 
 
 @register_jitable
-def _goal(at, target, speed, valid, numbers):  # type: ignore[no-untyped-def]
+def _goal(at, target, speed, valid, space, way, numbers):  # type: ignore[no-untyped-def]
     """Where P should be, m, and how fast that moves, m/s."""
     ahead = numbers.follow.control_point_m
     px, py = at[0] + ahead * math.cos(at[2]), at[1] + ahead * math.sin(at[2])
     if not valid:
         return px, py, 0.0, 0.0
-    own, way, follow = numbers.own, numbers.way, numbers.follow
+    own, follow = numbers.own, numbers.follow
     clear = np.array([[target[0], target[1], own.source_clearance_m]])
     start = at[0], at[1]
-    find_way(way, numbers.free_space, start, target, 0.0, numbers.radius_m, clear)
+    find_way(way, space, start, target, 0.0, numbers.radius_m, clear)
     straight = math.hypot(target[0] - px, target[1] - py)
     left = straight
     carrot = target
@@ -275,25 +276,13 @@ def _goal(at, target, speed, valid, numbers):  # type: ignore[no-untyped-def]
 class PathIntegralController(BaselineController):
     """Tries many sequences of motions and takes their mean, weighted by cost.
 
-    .. pydrake_system::
-
-        name: PathIntegralController
-        input_ports:
-        - p_WS_estimated [m]
-        - v_WS_estimated [m/s]
-        - target_valid [0 or 1]
-        - pose_WB_estimated [m, m, rad]
-        - free_space [FreeSpace]
-        output_ports:
-        - twist_B [m/s, rad/s]
-
     Each ``step_s`` it seeks the way to the target on the map (``find_way``, as the
     guarded law), and along it a goal that moves with the target; draws ``samples``
     sequences around the last plan, each costed by distance from the goal, angle,
     driving back and what is near on the map; and takes their mean with weights
     exp(-cost/temperature). The body is covered by three discs.
 
-    Discrete state: the plan. No latency.
+    State: the plan, and the room for the way. No latency.
 
     Args:
         robot: Its body, and place of P.
@@ -308,52 +297,46 @@ class PathIntegralController(BaselineController):
     Trans. on Robotics 34 (6), 2018; critics of Nav2's MPPI controller.
     """
 
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
     def __init__(
         self,
         *,
-        robot: RobotParameters | None = None,
-        attraction: AttractionParameters | None = None,
-        repulsion: Any = None,
-        following: FollowingParameters | None = None,
-        known: FreeSpaceParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
+        known: FreeSpaceParameters = FreeSpaceParameters(),
         seed: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        robot, known = robot or RobotParameters(), known or FreeSpaceParameters()
-        own = PathIntegralParameters() if repulsion is None else repulsion.mppi
+        self.set_name("path_integral_controller")
+        own = repulsion.mppi
         numbers = PathIntegralNumbers(
             own,
             _roll_numbers(own, robot, following),
-            follow_numbers(following, attraction, robot),
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
             body_radius(robot) + own.clearance_m,
             max(round(own.step_s / tick_s), 1),
-            make_free_space(1, known.cell_m, 1, 2),
-            make_way(known.cells),
             _noise(own, seed),
         )
-        self.declare_baseline(
-            "path_integral_controller",
-            path_integral_step,
-            numbers,
-            tick_s,
-            state=[0.0] * (2 * own.steps),
-            carried=("free_space",),
-        )
+        state = PathIntegralState(np.zeros((own.steps, 2)), make_way(known.cells))
+        self.declare(Step(path_integral_step, numbers, state), tick_s=tick_s)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each tick of a compiled loop."""
-        done = super().step_for(run)
-        own = done.numbers.own
-        noise = _noise(own, run.seed_of("controller"))
-        way = Way(*(np.copy(values) for values in done.numbers.way))
-        return done._replace(numbers=done.numbers._replace(noise=noise, way=way))
+        """The step, with a state of its own and the noise of the run."""
+        step = super().step_for(run)
+        noise = _noise(step.numbers.own, run.seed_of("controller"))
+        return step._replace(numbers=step.numbers._replace(noise=noise))
 
 
 def _roll_numbers(
     own: PathIntegralParameters,
     robot: RobotParameters,
-    following: FollowingParameters | None,
+    following: FollowingParameters,
 ) -> RollNumbers:
     length, width = half_size(robot)
     # Each disc covers a third of the width.

@@ -10,22 +10,19 @@ from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from systems.base.robot import RobotParameters, body_radius
+from systems.framework.block import OBJECT, Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    follow_numbers,
-)
-from systems.laws.baselines.parameters import (
-    VectorFieldHistogramParameters,
 )
 from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.laws.vector_field_histogram import VectorFieldHistogramParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.occupied import list_occupied
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards, wrapped
-from systems.safety.free_space import FreeSpace, make_free_space
-from systems.safety.parameters import FreeSpaceParameters
 
 #: Sectors of 5 deg (the paper's), and from how many on a valley is wide.
 _SECTORS, _WIDE = 72, 16
@@ -51,7 +48,6 @@ class VectorFieldHistogramNumbers(NamedTuple):
     own: VectorFieldHistogramParameters
     histogram: HistogramNumbers
     follow: FollowNumbers
-    free_space: FreeSpace
 
 
 @njit(cache=True)
@@ -218,19 +214,15 @@ def vector_field_histogram_step(
     outputs: Any,
     numbers: VectorFieldHistogramNumbers,
 ) -> None:
-    """The twist of one tick; see ``systems.framework.step_block.Step``.
+    """Computes the twist.
 
-    Args:
-        tick: Not used.
-        state: Which sectors are blocked, the last direction, sectors, and speed, m/s.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``VectorFieldHistogramNumbers``.
+    The state is which sectors are blocked, the last direction, sectors, and the last
+    speed, m/s.
     """
     target, pose, own, twist = inputs[0], inputs[3], numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
     clear = target[0], target[1], own.source_clearance_m
-    places = list_occupied(numbers.free_space, pose[0], pose[1], own.window_m, clear)
+    places = list_occupied(inputs[4], pose[0], pose[1], own.window_m, clear)
     memory = np.empty(len(state))
     for k in range(len(memory)):
         memory[k] = state[k]
@@ -251,18 +243,6 @@ def vector_field_histogram_step(
 class VectorFieldHistogramController(BaselineController):
     """Steers into the valley of a polar histogram that lies best.
 
-    .. pydrake_system::
-
-        name: VectorFieldHistogramController
-        input_ports:
-        - p_WS_estimated [m]
-        - v_WS_estimated [m/s]
-        - target_valid [0 or 1]
-        - pose_WB_estimated [m, m, rad]
-        - free_space [FreeSpace]
-        output_ports:
-        - twist_B [m/s, rad/s]
-
     Of the cells that echoed since they were last seen free it makes the four histograms
     of the paper at every tick: the primary one, in which each cell is as wide as the
     robot; the binary one, by two thresholds; the masked one, without directions that it
@@ -277,27 +257,26 @@ class VectorFieldHistogramController(BaselineController):
         attraction: The follow distance.
         repulsion: ``RepulsionParameters``; uses ``vfh_plus``.
         following: How fast it drives and turns.
-        known: Grid of the map.
         tick_s: Period of the controller, s.
 
     Reference: Ulrich and Borenstein, VFH+: reliable obstacle avoidance for fast mobile
     robots, IEEE Int. Conf. on Robotics and Automation, 1998.
     """
 
+    inputs = (*BaselineController.inputs, Port("free_space", OBJECT, "FreeSpace"))
+
     def __init__(
         self,
         *,
-        robot: RobotParameters | None = None,
-        attraction: AttractionParameters | None = None,
-        repulsion: Any = None,
-        following: FollowingParameters | None = None,
-        known: FreeSpaceParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        robot, known = robot or RobotParameters(), known or FreeSpaceParameters()
-        default = repulsion is None
-        own = VectorFieldHistogramParameters() if default else repulsion.vfh_plus
+        self.set_name("vector_field_histogram_controller")
+        own = repulsion.vfh_plus
         histogram = HistogramNumbers(
             own.window_m,
             body_radius(robot) + own.clearance_m,
@@ -307,14 +286,9 @@ class VectorFieldHistogramController(BaselineController):
         numbers = VectorFieldHistogramNumbers(
             own,
             histogram,
-            follow_numbers(following, attraction, robot),
-            make_free_space(1, known.cell_m, 1, 2),
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
         )
-        self.declare_baseline(
-            "vector_field_histogram_controller",
-            vector_field_histogram_step,
-            numbers,
-            tick_s,
-            state=(*[0.0] * _SECTORS, _NONE, 0.0),
-            carried=("free_space",),
-        )
+        state = [*[0.0] * _SECTORS, _NONE, 0.0]
+        self.declare(Step(vector_field_histogram_step, numbers, state), tick_s=tick_s)

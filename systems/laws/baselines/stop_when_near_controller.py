@@ -7,13 +7,14 @@ from typing import Any, NamedTuple
 from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters
+from systems.framework.block import Port, Step
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    follow_numbers,
 )
-from systems.laws.baselines.parameters import StopWhenNearParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.laws.stop_when_near import StopWhenNearParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.parameters import FollowingParameters
 from systems.planning.turning import turn_towards
@@ -31,15 +32,7 @@ class StopNumbers(NamedTuple):
 def stop_when_near_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: StopNumbers
 ) -> None:
-    """The twist of one tick; see ``systems.framework.step_block.Step``.
-
-    Args:
-        tick: Not used.
-        state: None.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``StopNumbers``.
-    """
+    """Computes the twist."""
     own, twist = numbers.own, outputs[0]
     wanted, bearing = approach(inputs, numbers.follow)
     ranges, echo = inputs[4], inputs[5]
@@ -51,19 +44,6 @@ def stop_when_near_step(
 
 class StopWhenNearController(BaselineController):
     """Turns to the target and drives; stops while an echo is near.
-
-    .. pydrake_system::
-
-        name: StopWhenNearController
-        input_ports:
-        - p_WS_estimated [m]
-        - v_WS_estimated [m/s]
-        - target_valid [0 or 1]
-        - pose_WB_estimated [m, m, rad]
-        - ranges [m]
-        - echo [0 or 1]
-        output_ports:
-        - twist_B [m/s, rad/s]
 
     What everybody tries first. No state; no latency.
 
@@ -78,27 +58,32 @@ class StopWhenNearController(BaselineController):
     Reference: ours; docs/results_laws.md.
     """
 
+    inputs = (
+        *BaselineController.inputs,
+        Port("ranges", "sensors", "m"),
+        Port("echo", "sensors", "0 or 1"),
+    )
+
     def __init__(
         self,
         *,
-        robot: RobotParameters | None = None,
-        attraction: AttractionParameters | None = None,
-        repulsion: Any = None,
-        following: FollowingParameters | None = None,
-        sensors: UltrasonicParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
+        sensors: UltrasonicParameters = UltrasonicParameters(),
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        count = (sensors or UltrasonicParameters()).count
-        default = repulsion is None
+        self.set_name("stop_when_near_controller")
         numbers = StopNumbers(
-            StopWhenNearParameters() if default else repulsion.stop_when_near,
-            follow_numbers(following, attraction, robot),
+            repulsion.stop_when_near,
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
         )
-        self.declare_baseline(
-            "stop_when_near_controller",
-            stop_when_near_step,
-            numbers,
-            tick_s,
-            inputs=(("ranges", count), ("echo", count)),
+        self.declare(
+            Step(stop_when_near_step, numbers),
+            tick_s=tick_s,
+            sizes={"sensors": sensors.count},
         )

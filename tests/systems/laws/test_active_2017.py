@@ -13,11 +13,9 @@ import pytest
 from scipy.integrate import quad
 
 from systems.base.robot import RobotParameters
-from systems.laws.active_impedance_2017_controller import (
-    ActiveImpedance2017Controller,
-    active_2017_force,
-)
-from systems.laws.parameters import Active2017Parameters, AttractionParameters
+from systems.laws.active_2017 import Active2017Parameters, active_2017_force
+from systems.laws.impedance_controller import ActiveImpedance2017Controller
+from systems.laws.parameters import AttractionParameters
 from systems.laws.repulsion import RepulsionParameters
 
 GAINS = Active2017Parameters(

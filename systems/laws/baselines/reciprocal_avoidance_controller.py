@@ -10,14 +10,15 @@ from numba.extending import register_jitable
 
 from systems.base.robot import RobotParameters, body_radius
 from systems.base.wheel_speed_command import turned_off_back
+from systems.framework.block import Port, Step
 from systems.framework.compiling import njit
 from systems.framework.signals import TICK_S
 from systems.laws.baselines.baseline_controller import (
     BaselineController,
-    follow_numbers,
 )
-from systems.laws.baselines.parameters import ReciprocalAvoidanceParameters
 from systems.laws.parameters import AttractionParameters
+from systems.laws.reciprocal_avoidance import ReciprocalAvoidanceParameters
+from systems.laws.repulsion import RepulsionParameters
 from systems.planning.following import FollowNumbers, approach
 from systems.planning.half_planes import nearest_velocity
 from systems.planning.parameters import FollowingParameters
@@ -156,14 +157,9 @@ def _legs(
 def reciprocal_avoidance_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: AvoidanceNumbers
 ) -> None:
-    """The twist of one tick; see ``systems.framework.step_block.Step``.
+    """Computes the twist.
 
-    Args:
-        tick: Number of the tick.
-        state: Velocity of the point, m/s, and poses of the bodies a tick ago.
-        inputs: As the input ports.
-        outputs: As the output ports.
-        numbers: ``AvoidanceNumbers``.
+    The state is the velocity of the point, m/s, and the poses of the bodies a tick ago.
     """
     own, pose, poses, sizes = numbers.own, inputs[4], inputs[5], inputs[6]
     twist, count = outputs[0], len(inputs[6]) // 2
@@ -215,20 +211,6 @@ def reciprocal_avoidance_step(
 class ReciprocalAvoidanceController(BaselineController):
     """Takes the velocity nearest to the wanted one that hits nobody for a while.
 
-    .. pydrake_system::
-
-        name: ReciprocalAvoidanceController
-        input_ports:
-        - p_WS_estimated [m]
-        - v_WS_estimated [m/s]
-        - target_valid [0 or 1]
-        - pose_WB_estimated [m, m, rad]
-        - pose_WB [m, m, rad]
-        - poses_WO [m, m, rad each]
-        - sizes [m, m each]
-        output_ports:
-        - twist_B [m/s, rad/s]
-
     It knows places, sizes and velocities of all bodies but that of the target: what a
     robot can do that sees everything, but plans no way. Bodies are rectangles, and all
     of a change of velocity is the robot's (the paper's non-cooperative agents). A point
@@ -250,31 +232,37 @@ class ReciprocalAvoidanceController(BaselineController):
     avoidance, Robotics Research, 2011; for differential drives Snape et al., IROS 2010.
     """
 
+    inputs = (
+        *BaselineController.inputs,
+        Port("pose_WB", 3, "m, m, rad"),
+        Port("poses_WO", "3 bodies", "m, m, rad each"),
+        Port("sizes", "2 bodies", "m, m each"),
+    )
+
     def __init__(
         self,
         *,
-        robot: RobotParameters | None = None,
-        attraction: AttractionParameters | None = None,
-        repulsion: Any = None,
-        following: FollowingParameters | None = None,
+        robot: RobotParameters = RobotParameters(),
+        attraction: AttractionParameters = AttractionParameters(),
+        repulsion: RepulsionParameters = RepulsionParameters(),
+        following: FollowingParameters = FollowingParameters(),
         bodies: int = 0,
         tick_s: float = TICK_S,
     ) -> None:
         super().__init__()
-        robot = robot or RobotParameters()
-        default = repulsion is None
-        own = ReciprocalAvoidanceParameters() if default else repulsion.orca
+        self.set_name("reciprocal_avoidance_controller")
+        own = repulsion.orca
         numbers = AvoidanceNumbers(
             own,
-            follow_numbers(following, attraction, robot),
+            FollowNumbers(
+                following, attraction.follow_distance_m, robot.control_point_m
+            ),
             body_radius(robot) + own.offset_m + own.clearance_m,
             tick_s,
         )
-        self.declare_baseline(
-            "reciprocal_avoidance_controller",
-            reciprocal_avoidance_step,
-            numbers,
-            tick_s,
-            state=[0.0] * (2 + 3 * bodies),
-            inputs=(("pose_WB", 3), ("poses_WO", 3 * bodies), ("sizes", 2 * bodies)),
+        state = [0.0] * (2 + 3 * bodies)
+        self.declare(
+            Step(reciprocal_avoidance_step, numbers, state),
+            tick_s=tick_s,
+            sizes={"bodies": bodies},
         )

@@ -1,0 +1,148 @@
+"""The active virtual-impedance law of Han 2019: gains, force and equations."""
+
+from __future__ import annotations
+
+import math
+from functools import cached_property
+from typing import Any
+
+from pydantic import model_validator
+
+from systems.framework.elementary import exp
+from systems.framework.input_error import InputError
+from systems.framework.parameters import Damping, Length, Parameters, Speed, Stiffness
+from systems.laws.law import Equation, Law, Tuning
+
+
+def matched_decay(limit: float, ratio: float) -> float:
+    """Decay length or speed with which two laws are equal at half a limit.
+
+    Args:
+        limit: The limit, m or m/s.
+        ratio: Of the two gains, above 1.
+
+    Returns:
+        limit / (2 ln ratio), as the limit.
+    """
+    return limit / (2.0 * math.log(ratio))
+
+
+def matched_share(limit: float, decay: float) -> float:
+    """Inverse of ``matched_decay``.
+
+    Args:
+        limit: The limit, m or m/s.
+        decay: Decay length or speed, as the limit.
+
+    Returns:
+        1/ratio of the two gains, exp(-limit / (2 decay)).
+    """
+    return math.exp(-limit / (2.0 * decay))
+
+
+class ActiveParameters(Parameters):
+    """Spring and damper that vary with distance and speed (Han 2019, eq. 20-22).
+
+    alpha and beta make the law equal to a conventional one with ``matched``
+    gains at half the reach and at half the speed limit.
+    """
+
+    reference_stiffness_n_m: Stiffness = 84.5
+    """k_ref, N/m, above K_0."""
+    matched_stiffness_n_m: Stiffness = 17.1
+    """K_0, N/m: the push at rho_0/2 is K_0 rho_0/2."""
+    reach_m: Length = 0.8
+    """rho_0, m (Han 2019, 5.2); the law itself has no limit of reach."""
+    reference_damping_n_s_m: Damping = 0.0811
+    """d_ref, N s/m, below D_0."""
+    matched_damping_n_s_m: Damping = 0.839
+    """D_0, N s/m: the velocity term at mu_0/2 is D_0 mu_0/2."""
+    speed_limit_m_s: Speed = 0.72
+    """mu_0: the velocity term acts below this speed, m/s (5.3)."""
+
+    @model_validator(mode="after")
+    def _check(self) -> ActiveParameters:
+        if self.reference_stiffness_n_m <= self.matched_stiffness_n_m:
+            raise InputError(
+                "reference_stiffness_n_m",
+                f"{self.reference_stiffness_n_m} (k_ref) is "
+                f"not above matched_stiffness_n_m {self.matched_stiffness_n_m} (K_0), "
+                "and alpha = rho_0 / (2 ln(k_ref/K_0)) must be positive; raise it",
+            )
+        if self.reference_damping_n_s_m >= self.matched_damping_n_s_m:
+            raise InputError(
+                "reference_damping_n_s_m",
+                f"{self.reference_damping_n_s_m} (d_ref) is "
+                f"not below matched_damping_n_s_m {self.matched_damping_n_s_m} (D_0), "
+                "and beta = mu_0 / (2 ln(D_0/d_ref)) must be positive; lower it",
+            )
+        return self
+
+    @cached_property
+    def alpha_m(self) -> float:
+        """Decay length of the spring, m (Han 2019, eq. 21)."""
+        ratio = self.reference_stiffness_n_m / self.matched_stiffness_n_m
+        return matched_decay(self.reach_m, ratio)
+
+    @cached_property
+    def beta_m_s(self) -> float:
+        """Growth speed of the damper, m/s (eq. 22, misprinted)."""
+        ratio = self.matched_damping_n_s_m / self.reference_damping_n_s_m
+        return matched_decay(self.speed_limit_m_s, ratio)
+
+
+def active_force(c: Any, s: Any, gains: ActiveParameters) -> Any:
+    """k_ref exp(-c/alpha) c + d_ref exp(s/beta) (mu_0 - s) (Han 2019, eq. 20).
+
+    Args:
+        c: Distance of the obstacle, m; float or AutoDiffXd.
+        s: Its speed, m/s; from mu_0 on the second term is 0 (table 4).
+        gains: k_ref, d_ref, mu_0, and K_0, D_0, rho_0 through alpha, beta.
+
+    Returns:
+        Force away from the obstacle, N. The first term is bounded, largest at
+        c = alpha, and zero at contact; the second is d_ref mu_0 at rest, at
+        any distance. Eq. 19-b multiplies K_0(c) by (rho_0 - c) once more; eq.
+        20 and table 4 are the consistent reading.
+    """
+    spring = gains.reference_stiffness_n_m * exp(-c / gains.alpha_m) * c
+    limit = gains.speed_limit_m_s
+    if s >= limit:
+        return spring
+    damper = gains.reference_damping_n_s_m * exp(s / gains.beta_m_s)
+    return spring + damper * (limit - s)
+
+
+ACTIVE = Law(
+    name="active",
+    title="Active law of 2019",
+    label="active 2019",
+    equations=(
+        Equation(
+            "Active law of 2019 (Han 2019, eq. 20)",
+            r"f = k_{ref}\,e^{-c/\alpha}\,c+d_{ref}\,e^{s/\beta}(\mu_0-s)"
+            r"\;[s<\mu_0]",
+            "f = k_ref exp(-c/alpha) c + d_ref exp(s/beta)(mu_0 - s) [s < mu_0]",
+        ),
+        Equation(
+            "with",
+            r"\alpha=\frac{\rho_0}{2\ln(k_{ref}/K_0)},"
+            r"\quad\beta=\frac{\mu_0}{2\ln(D_0/d_{ref})}",
+            "alpha = rho_0 / (2 ln(k_ref/K_0)), beta = mu_0 / (2 ln(D_0/d_ref))",
+        ),
+    ),
+    force=active_force,
+    controller_name="ActiveImpedanceController",
+    gains=ActiveParameters,
+    loop_gains=("reference_stiffness_n_m", "reference_damping_n_s_m"),
+    tuning=Tuning(
+        rule="matched",
+        # k_ref/e^2, at 2 alpha.
+        stiffest=lambda gains, least_range_m: (
+            gains.reference_stiffness_n_m * math.exp(-2.0)
+        ),
+        # The velocity term is d_ref mu_0 at rest, and off from mu_0 on.
+        spring_speed=lambda gains: gains.speed_limit_m_s,
+        sets_follow_distance=True,
+    ),
+)

@@ -1,0 +1,59 @@
+"""The conventional virtual-impedance law of Han 2019: gains, force and equation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from systems.framework.parameters import Damping, Length, Parameters, Stiffness
+from systems.laws.law import Equation, Law, Tuning
+
+
+class ConventionalParameters(Parameters):
+    """Spring and damper within a reach (Han 2019, eq. 19-a)."""
+
+    stiffness_n_m: Stiffness = 12.3
+    """K_0, N/m."""
+    damping_n_s_m: Damping = 0.8
+    """D_0, N s/m."""
+    reach_m: Length = 0.8
+    """rho_0: the law acts below this distance, m (Han 2019, 5.2)."""
+
+
+def conventional_force(c: Any, s: Any, gains: ConventionalParameters) -> Any:
+    """K_0 (rho_0 - c) + D_0 s below rho_0, else 0 (Han 2019, eq. 19-a).
+
+    Args:
+        c: Distance of the obstacle, m; float or AutoDiffXd.
+        s: Its speed, m/s.
+        gains: K_0, D_0, rho_0.
+
+    Returns:
+        Force away from the obstacle, N. It steps by D_0 s at rho_0.
+    """
+    if c < gains.reach_m:
+        return gains.stiffness_n_m * (gains.reach_m - c) + gains.damping_n_s_m * s
+    return 0.0 * c
+
+
+CONVENTIONAL = Law(
+    name="conventional",
+    title="Conventional law",
+    label="conventional",
+    equations=(
+        Equation(
+            "Conventional law (Han 2019, eq. 19-a)",
+            r"f = K_0\,(\rho_0-c)+D_0\,s\quad (c<\rho_0),"
+            r"\quad f = 0\quad (c\geq\rho_0)",
+            "f = K_0 (rho_0 - c) + D_0 s for c < rho_0, else 0",
+        ),
+    ),
+    force=conventional_force,
+    controller_name="ConventionalImpedanceController",
+    gains=ConventionalParameters,
+    loop_gains=("stiffness_n_m", "damping_n_s_m"),
+    tuning=Tuning(
+        rule="barrier",
+        stiffest=lambda gains, least_range_m: gains.stiffness_n_m,
+        sets_follow_distance=True,
+    ),
+)

@@ -1,0 +1,348 @@
+"""The block of all laws that are a force, and its functions: attraction and push.
+
+    M p'' = F_m + sum of f(c, s) u,   u = -C/|C|,  c = |C|,  s = |dC/dt|
+
+Han 2019, eq. 17-18 print the repulsion with the wrong sign and with forces
+that grow with distance; eq. 19 replaces them. See docs/errata.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+from numba.extending import register_jitable
+
+from systems.base.robot import RobotParameters
+from systems.base.wheel_speed_command import turned_off_back
+from systems.framework.block import Block_, Port, Step
+from systems.framework.scalar_math import float_of
+from systems.framework.scalar_types import define_for_scalars
+from systems.framework.signals import TICK_S
+from systems.laws.active import ACTIVE
+from systems.laws.active_2017 import ACTIVE_2017
+from systems.laws.conventional import CONVENTIONAL
+from systems.laws.conventional_2017 import CONVENTIONAL_2017
+from systems.laws.law import FORCE_COLUMNS, Law
+from systems.laws.no_avoidance import NONE
+from systems.laws.parameters import AttractionParameters
+from systems.laws.repulsion import RepulsionParameters
+from systems.ranging.collision_vector import SLOTS
+from systems.ranging.parameters import UltrasonicParameters
+from systems.world.geometry import control_point, rotate, safe_norm
+
+#: Numbers that are remembered per tick: feature, C_x and C_y of each slot.
+_ROW = 3 * SLOTS
+
+#: A target that is farther than this straight behind P pulls a little aside, m.
+_BEHIND_M = 0.3
+
+
+@register_jitable
+def attraction_force(
+    p_WP: Any, v_WP: Any, p_WS: Any, valid: Any, attraction: Any, mass: Any
+) -> Any:
+    """Force on the virtual mass towards the follow point, N.
+
+    Args:
+        p_WP: Control point, m; floats or AutoDiffXd.
+        v_WP: Velocity of the virtual mass, m/s.
+        p_WS: Target, m.
+        valid: Whether there is a target; without one the mass is braked.
+        attraction: ``AttractionParameters``.
+        mass: kg.
+
+    Returns:
+        (Fx, Fy) in W: K_r (p_S - p) (1 - d_f/|p_S - p|) - D_r v.
+    """
+    if not valid:
+        brake = mass / attraction.brake_time_s
+        return -brake * v_WP[0], -brake * v_WP[1]
+    dx, dy = p_WS[0] - p_WP[0], p_WS[1] - p_WP[1]
+    pull = attraction.stiffness_n_m
+    if attraction.follow_distance_m > 0.0:
+        pull = pull * (1.0 - attraction.follow_distance_m / safe_norm(dx, dy))
+    damping = attraction.damping_n_s_m
+    return pull * dx - damping * v_WP[0], pull * dy - damping * v_WP[1]
+
+
+@register_jitable
+def obstacle_speed(C_now: Any, C_before: Any, closing: Any, period_s: Any) -> Any:
+    """s in m/s: how fast the collision vector changes.
+
+    Args:
+        C_now: (x, y) in W, m; floats or AutoDiffXd.
+        C_before: The vector of the same feature a period ago.
+        closing: Whether s is max(0, -d|C|/dt) instead of |dC/dt|.
+        period_s: s.
+
+    Returns:
+        s, m/s, not negative; its type is that of ``C_now``.
+    """
+    if not closing:
+        return safe_norm(C_now[0] - C_before[0], C_now[1] - C_before[1]) / period_s
+    speed = (
+        safe_norm(C_before[0], C_before[1]) - safe_norm(C_now[0], C_now[1])
+    ) / period_s
+    return speed if speed > 0.0 else 0.0 * speed
+
+
+@register_jitable
+def repulsion_force(C_W: Any, s: Any, force: Any, arguments: Any = ()) -> Any:
+    """Force on the virtual mass away from one obstacle.
+
+    Args:
+        C_W: Collision vector (x, y) in W, m; floats or AutoDiffXd.
+        s: Speed of the obstacle, m/s.
+        force: ``force(c, s, *arguments)``, N.
+        arguments: Of the force, after c and s.
+
+    Returns:
+        (Fx, Fy) in W, N.
+    """
+    c = safe_norm(C_W[0], C_W[1])
+    f = force(c, s, *arguments)
+    return -f * C_W[0] / c, -f * C_W[1] / c
+
+
+class ImpedanceNumbers(NamedTuple):
+    """What the step of ``ImpedanceController`` depends on."""
+
+    force: Callable[..., Any]
+    """``force(c, s, *arguments)``, N."""
+    arguments: tuple[Any, ...]
+    """Gains, and for some laws the least range of the sensors, m."""
+    attraction: AttractionParameters
+    mass_kg: float
+    """Of the virtual mass, kg."""
+    control_point_m: float
+    """Distance of P ahead of the axle, m."""
+    closing: bool
+    """Whether s is the speed of approach alone."""
+    round_s: float
+    """Time of a round of the sensors, s."""
+
+
+def impedance_step(
+    tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
+) -> None:
+    """Computes the acceleration of the virtual mass, the forces and the speeds s.
+
+    The state has one row for each tick of a round, the last tick first: feature, C_x
+    and C_y in W, m, of each slot.
+    """
+    p_WS, valid, C_B, features, pose, v_WP = inputs
+    acceleration, forces, speeds = outputs
+    x, y = control_point(pose, numbers.control_point_m)
+    dx, dy = turned_off_back(p_WS[0] - x, p_WS[1] - y, pose[2], _BEHIND_M)
+    F_m = attraction_force(
+        (0.0 * dx, 0.0 * dy),
+        v_WP,
+        (dx, dy),
+        valid[0] > 0.5,
+        numbers.attraction,
+        numbers.mass_kg,
+    )
+    Fx = Fy = 0.0 * valid[0]
+    oldest, seen = len(state) - _ROW, 0
+    now = [0.0 * valid[0]] * _ROW
+    for k in range(SLOTS):
+        if features[k] > 0.5:
+            C_W = rotate(pose[2], C_B[2 * k], C_B[2 * k + 1])
+            s = 0.0 * C_W[0]
+            for j in range(oldest, oldest + _ROW, 3):
+                if _same_feature(state[j], features[k]):
+                    before = state[j + 1], state[j + 2]
+                    s = obstacle_speed(C_W, before, numbers.closing, numbers.round_s)
+            fx, fy = repulsion_force(C_W, s, numbers.force, numbers.arguments)
+            Fx, Fy = Fx + fx, Fy + fy
+            speeds[seen] = s
+            now[3 * seen] = features[k]
+            now[3 * seen + 1], now[3 * seen + 2] = C_W[0], C_W[1]
+            seen += 1
+    acceleration[0] = (F_m[0] + Fx) / numbers.mass_kg
+    acceleration[1] = (F_m[1] + Fy) / numbers.mass_kg
+    forces[0], forces[1], forces[2], forces[3] = F_m[0], F_m[1], Fx, Fy
+    for k in range(len(state) - 1, _ROW - 1, -1):
+        state[k] = state[k - _ROW]
+    for k in range(_ROW):
+        state[k] = now[k]
+
+
+@register_jitable
+def _same_feature(before, now):
+    """Features are whole numbers from 1 on, whatever their scalar type."""
+    return before > 0.5 and abs(float_of(before) - float_of(now)) < 0.5
+
+
+_INPUTS = (
+    Port("p_WS_estimated", 2, "m"),
+    Port("target_valid", 1, "0 or 1"),
+    Port("collision_vectors_B", 2 * SLOTS, "m, three slots of x and y"),
+    Port("features", SLOTS, "number of what the vector stands on, 0 an empty slot"),
+    Port("pose_WB_estimated", 3, "m, m, rad"),
+    Port("v_WP", 2, "m/s, of the virtual mass"),
+)
+_OUTPUTS = (
+    Port("acceleration_W", 2, "m/s^2"),
+    Port("forces_W", 4, "N, attraction then repulsion, x and y each", FORCE_COLUMNS),
+    Port("obstacle_speeds", SLOTS, "m/s, s of each slot", "obstacle_speed_{}"),
+)
+#: Columns of the ports of a law, also of a user's own block.
+LAW_COLUMNS: Mapping[str, tuple[str, ...]] = {
+    port.name: port.column_names({}) for port in _OUTPUTS if port.columns
+}
+
+
+@define_for_scalars("ImpedanceController_", __name__)
+def ImpedanceController_(T):
+    class Impl(Block_[T]):
+        """Follows the target; pushes off obstacles by the force of a law.
+
+        Each collision vector's s is the change of the same feature over one round of
+        the sensors, divided by the time of that round; 0 where the feature was not
+        there a round ago. A round is a tick where all sensors fire at every tick, and
+        three ticks where three sensors fire one after the other: every sensor has then
+        fired once since, and both vectors contain the held ranges. At constant
+        velocities s is exact at every tick, for a pair of sensors as for one sensor.
+        Otherwise s is the mean over the round, which is itself up to a round less a
+        tick old.
+
+        Discrete state, every tick: the collision vectors of the last round of the
+        sensors, for s. The outputs are functions of state and present input:
+        no latency.
+
+        Args:
+            law: A law of ``systems.laws.catalogue`` that has a force; or a function
+                ``law(c, s, repulsion)``: force away from the obstacle in N at
+                distance c in m and speed s in m/s. Use pydrake.math in such a
+                function, so that it can be differentiated.
+            robot: Mass and place of P.
+            attraction: ``AttractionParameters``.
+            repulsion: ``RepulsionParameters``: gains of the law, and what s is.
+            sensors: ``UltrasonicParameters``: period and order of firing, least range.
+            tick_s: Period of the controller, s.
+        """
+
+        inputs, outputs = _INPUTS, _OUTPUTS
+
+        def _construct(
+            self,
+            *,
+            law: Law | Callable[..., Any] = NONE,
+            robot: RobotParameters = RobotParameters(),
+            attraction: AttractionParameters = AttractionParameters(),
+            repulsion: RepulsionParameters = RepulsionParameters(),
+            sensors: UltrasonicParameters = UltrasonicParameters(),
+            tick_s: float = TICK_S,
+            converter: Any = None,
+        ) -> None:
+            super().__init__(converter=converter)
+            self.set_name("impedance_controller")
+            round_ticks = sensors.round_ticks(tick_s)
+            self.states = _slot_names(round_ticks)
+            numbers = ImpedanceNumbers(
+                *_force_and_arguments(law, repulsion, sensors.minimum_range_m),
+                attraction,
+                robot.mass_kg,
+                robot.control_point_m,
+                repulsion.velocity_term == "closing",
+                round_ticks * tick_s,
+            )
+            step = Step(impedance_step, numbers, [0.0] * (_ROW * round_ticks))
+            self.declare(step, tick_s=tick_s)
+
+        def radial_force(self, c: Any, s: Any) -> Any:
+            """Force away from an obstacle at distance c in m and speed s in m/s, N."""
+            numbers = self.step.numbers
+            return numbers.force(c, s, *numbers.arguments)
+
+    return Impl
+
+
+def _force_and_arguments(
+    law: Law | Callable[..., Any],
+    repulsion: RepulsionParameters,
+    least_range_m: float,
+) -> tuple[Callable[..., Any], tuple[Any, ...]]:
+    if not isinstance(law, Law):
+        return law, (repulsion,)
+    assert law.force is not None, f"{law.name} has no force"
+    return law.force, law.arguments(repulsion, least_range_m)
+
+
+def _slot_names(round_ticks: int) -> tuple[str, ...]:
+    """Names of what is remembered, the last tick first."""
+    return tuple(
+        f"{name}_{slot}{after}"
+        for after in ("", *(f"_{k}_ticks_ago" for k in range(2, round_ticks + 1)))
+        for slot in range(1, SLOTS + 1)
+        for name in ("feature", "C_x", "C_y")
+    )
+
+
+def _define(name: str, block_name: str, documentation: str, **fixed: Any) -> Any:
+    """``ImpedanceController_`` under another name, with some arguments fixed.
+
+    Args:
+        name: Of the class.
+        block_name: Of the block in diagrams.
+        documentation: Docstring of the class.
+        fixed: Arguments of ``ImpedanceController`` that the class sets.
+
+    Returns:
+        The template.
+    """
+
+    @define_for_scalars(f"{name}_", __name__)
+    def template(T):
+        class Impl(ImpedanceController_[T]):
+            __qualname__ = f"{name}_.<locals>.Impl"
+            __doc__ = documentation
+            inputs, outputs = _INPUTS, _OUTPUTS
+
+            def _construct(self, *, converter: Any = None, **options: Any) -> None:
+                super()._construct(converter=converter, **fixed, **options)
+                self.set_name(block_name)
+
+        return Impl
+
+    return template
+
+
+def _define_for(law: Law, block_name: str) -> Any:
+    """The template of a law that comes with the package."""
+    equations = ", ".join(f"``{equation.text}``" for equation in law.equations)
+    documentation = f"""Follows the target; pushes off obstacles by one law.
+
+    {law.equations[0].title}: {equations}.
+
+    It is ``ImpedanceController`` with this law, and takes the same arguments but
+    ``law``. Its gains are ``{law.name}`` of ``RepulsionParameters``."""
+    return _define(law.controller_name, block_name, documentation, law=law)
+
+
+ActiveImpedanceController_ = _define_for(ACTIVE, "active_impedance_controller")
+ActiveImpedance2017Controller_ = _define_for(
+    ACTIVE_2017, "active_impedance_2017_controller"
+)
+ConventionalImpedanceController_ = _define_for(
+    CONVENTIONAL, "conventional_impedance_controller"
+)
+ConventionalImpedance2017Controller_ = _define_for(
+    CONVENTIONAL_2017, "conventional_impedance_2017_controller"
+)
+RadialLawController_ = _define(
+    "RadialLawController",
+    "radial_law_controller",
+    """Follows the target; pushes off by any function of c and s.
+
+    It is ``ImpedanceController``, with the block name of a user's own law.""",
+)
+
+ImpedanceController = ImpedanceController_[None]
+ActiveImpedanceController = ActiveImpedanceController_[None]
+ActiveImpedance2017Controller = ActiveImpedance2017Controller_[None]
+ConventionalImpedanceController = ConventionalImpedanceController_[None]
+ConventionalImpedance2017Controller = ConventionalImpedance2017Controller_[None]
+RadialLawController = RadialLawController_[None]

@@ -1,0 +1,68 @@
+"""Model predictive path integral control: gains, equation and record."""
+
+from __future__ import annotations
+
+from pydantic import Field
+
+from systems.framework.parameters import (
+    Duration,
+    Length,
+    NonNegative,
+    NonNegativeLength,
+    Positive,
+    Speed,
+)
+from systems.laws.law import Equation, Law
+from systems.laws.parameters import MapParameters
+
+
+class PathIntegralParameters(MapParameters):
+    """Samples and costs of the controller; the critics are those of Nav2."""
+
+    clearance_m: NonNegativeLength = 0.08
+    """Distance kept from places of echoes, m."""
+    samples: int = Field(default=500, ge=10, le=5_000)
+    """Sequences of motions that are tried."""
+    steps: int = Field(default=25, ge=2, le=100)
+    """Steps of a sequence."""
+    step_s: Duration = 0.1
+    """Length of a step, and time from one plan to the next, s."""
+    speed_spread_m_s: Speed = 0.2
+    """Standard deviation of tried speeds, m/s (Nav2's)."""
+    turn_spread_rad_s: Positive = 1.1
+    """Standard deviation of tried yaw rates, rad/s."""
+    temperature: Positive = 0.37
+    """A sequence whose cost is higher by this has a weight of 1/e; Nav2 has 0.3."""
+    control_gain: NonNegative = 0.015
+    """Cost of a deviation from the last plan, gamma (value of Nav2)."""
+    goal_gain: NonNegative = 5.0
+    """Cost per meter of mean distance from the wanted position (Nav2's goal critic:
+    5)."""
+    angle_gain: NonNegative = 0.63
+    """Cost per radian off the direction of the path (Nav2's path angle critic: 2)."""
+    forward_gain: NonNegative = 0.81
+    """Cost of driving backward, s/m (Nav2's prefer forward critic: 5)."""
+    obstacle_gain: NonNegative = 3.4
+    """Cost of touching the clearance of obstacles (Nav2's cost critic: 3.81)."""
+    inflation_m: Length = 0.057
+    """Distance over which this cost falls to 1/e, m."""
+    collision_cost: NonNegative = 1_000.0
+    """Cost of a contact."""
+
+
+MPPI = Law(
+    name="mppi",
+    title="Model predictive path integral control (Williams et al. 2018)",
+    label="MPPI",
+    equations=(
+        Equation(
+            "MPPI: the plan",
+            r"u_k=\sum_n w_n\,(u_k+\epsilon_k^n),"
+            r"\quad w_n\propto\exp(-\frac{1}{\lambda}S_n)",
+            "u_k = sum of w_n (u_k + e_k^n), w_n ~ exp(-S_n/lambda)",
+        ),
+    ),
+    controller_name="PathIntegralController",
+    gains=PathIntegralParameters,
+    plans=True,
+)

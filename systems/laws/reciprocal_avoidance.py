@@ -1,0 +1,37 @@
+"""ORCA: gains, equation and record."""
+
+from __future__ import annotations
+
+from systems.framework.parameters import Duration, Length, NonNegativeLength, Parameters
+from systems.laws.law import Equation, Law
+
+
+class ReciprocalAvoidanceParameters(Parameters):
+    """Horizon and disc of ORCA."""
+
+    horizon_s: Duration = 1.8
+    """Time for which the law avoids contacts, s."""
+    offset_m: Length = 0.045
+    """Distance of the holonomic point ahead of the axle, m."""
+    clearance_m: NonNegativeLength = 0.02
+    """Distance kept from all bodies, m."""
+    farthest_m: Length = 5.0
+    """Bodies farther away than this do not count, m."""
+
+
+ORCA = Law(
+    name="orca",
+    title="ORCA with perfect knowledge (van den Berg et al. 2011)",
+    label="ORCA",
+    equations=(
+        Equation(
+            "ORCA: velocity of the point ahead of the axle",
+            r"v=\mathrm{argmin}\,|v-v^{pref}|"
+            r"\quad\mathrm{with}\quad n_i\cdot(v-v_i-u_i)\geq 0",
+            "v = argmin |v - v_pref| with n_i . (v - v_i - u_i) >= 0",
+        ),
+    ),
+    controller_name="ReciprocalAvoidanceController",
+    gains=ReciprocalAvoidanceParameters,
+    plans=True,
+)
