@@ -379,7 +379,8 @@ def DiffDrivePlant_(T):
                 _third_order,
                 TICK_S,
                 TICK_S,
-                *of_plant[:2],
+                of_plant[0],
+                of_plant[1],
                 robot.wheel_radius_m,
                 robot.wheel_separation_m,
             )

@@ -32,7 +32,8 @@ def test_they_are_those_of_the_block(run):
     context = follower.blocks["controller"].GetMyContextFromRoot(
         simulator.get_context()
     )
-    _, _, hazards = context.get_abstract_state(0).get_value()
+    _, state, _ = context.get_abstract_state(0).get_value()
+    hazards = state.hazards
     found = tracked(run, [2.0, 8.0])
     assert found.times == pytest.approx([2.0, 8.0])
     exists = hazards.tracks[:, EXISTS]
