@@ -348,7 +348,7 @@ def _step(
     if numbers.steady:
         direction, speed = math.radians(wind.direction_deg), wind.speed_m_s
         plume[_AT.steady] = 1.0
-        steady = _SteadyPlaces(
+        plume[[*_MEAN_PLUME]] = (
             *p_WO,
             math.cos(direction),
             math.sin(direction),
@@ -357,7 +357,6 @@ def _step(
             own.mean_intensity * speed,
             own.upright_growth * speed,
         )
-        plume[PUFFS_BEGIN : PUFFS_BEGIN + len(steady)] = steady
     else:
         _spin_up(plume, initial_wind(wind, seed), own, numbers)
     plume[_AT.age] = own.age_s
