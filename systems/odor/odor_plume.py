@@ -21,16 +21,68 @@ from systems.odor.wind import WIND_PERIOD_S, WIND_SIZE, initial_wind, wind_veloc
 
 #: Puffs that are kept, the youngest.
 MOST_PUFFS = 320
-#: Numbers of a puff: x, y in W, m; its own velocity, m/s; its spreads level and
-#: upright, m; what it holds.
-PUFF_SIZE = 7
-_X, _Y, _VX, _VY, _LEVEL, _UPRIGHT, _AMOUNT = range(PUFF_SIZE)
-# The port ``plume``: background, kind, number of puffs, part of the next one, height of
-# the source, and how long it has been released, then the puffs.
-_BACKGROUND, _STEADY, _COUNT, _PART, _HEIGHT, _AGE = range(6)
-#: Where the puffs begin in the port; of a steady plume place of the source, direction
-#: of the wind, rate, speed and spreads stand there.
-PUFFS_BEGIN = 6
+
+
+class _PlumePlaces(NamedTuple):
+    """Places in the port ``plume``, before the puffs."""
+
+    background: int
+    """Concentration everywhere."""
+    steady: int
+    """Whether the plume is steady, 0 or 1."""
+    puffs: int
+    """Number of the puffs."""
+    part: int
+    """Of the next puff that is already due, 0 to 1."""
+    height: int
+    """Of the source, m."""
+    age: int
+    """Time since the release began, s."""
+
+
+class _PuffPlaces(NamedTuple):
+    """Places of what is known of a puff, from its first number."""
+
+    x: int
+    """In W, m."""
+    y: int
+    vx: int
+    """Its own velocity in W, m/s."""
+    vy: int
+    level: int
+    """Its spread in the plane, m."""
+    upright: int
+    """Its vertical spread, m."""
+    amount: int
+    """What it holds, in units of C1, m^3."""
+
+
+class _SteadyPlaces(NamedTuple):
+    """Places in the port ``plume`` of a steady plume, in the place of puffs."""
+
+    x: int
+    """Of the source in W, m."""
+    y: int
+    cosine: int
+    """Of the direction of the wind."""
+    sine: int
+    rate: int
+    """Of the source, in units of C1, m^3/s."""
+    speed: int
+    """Of the wind, m/s."""
+    level: int
+    """Growth of the spread in the plane, m/s."""
+    upright: int
+    """Growth of the vertical spread, m/s."""
+
+
+_AT = _PlumePlaces(*range(6))
+#: Where the puffs begin in the port.
+PUFFS_BEGIN = len(_AT)
+_PUFF = _PuffPlaces(*range(7))
+#: Numbers of a puff.
+PUFF_SIZE = len(_PUFF)
+_MEAN_PLUME = _SteadyPlaces(*range(PUFFS_BEGIN, PUFFS_BEGIN + 8))
 #: Size of the port ``plume``.
 PLUME_SIZE = PUFFS_BEGIN + PUFF_SIZE * MOST_PUFFS
 #: A puff's spread is no less than this, m.
@@ -80,26 +132,26 @@ def concentration(
     Returns:
         That of the plume and of the background.
     """
-    total, height = plume[_BACKGROUND], plume[_HEIGHT]
-    if plume[_STEADY] > 0.5:
-        first = PUFFS_BEGIN
-        dx, dy = x - plume[first], y - plume[first + 1]
-        c, s = plume[first + 2], plume[first + 3]
-        spreads = plume[first + 6], plume[first + 6], plume[first + 7]
-        rate, speed = plume[first + 4], plume[first + 5]
+    total, height = plume[_AT.background], plume[_AT.height]
+    if plume[_AT.steady] > 0.5:
+        at = _MEAN_PLUME
+        dx, dy = x - plume[at.x], y - plume[at.y]
+        c, s = plume[at.cosine], plume[at.sine]
+        spreads = plume[at.level], plume[at.level], plume[at.upright]
+        rate, speed = plume[at.rate], plume[at.speed]
         u, v = c * dx + s * dy, c * dy - s * dx
         return total + steady_concentration(u, v, z, height, rate, speed, spreads)
-    for puff in range(int(plume[_COUNT])):
+    for puff in range(int(plume[_AT.puffs])):
         first = PUFFS_BEGIN + PUFF_SIZE * puff
-        level = max(plume[first + _LEVEL], _SMALLEST_M)
-        upright = max(plume[first + _UPRIGHT], _SMALLEST_M)
-        dx, dy = x - plume[first + _X], y - plume[first + _Y]
+        level = max(plume[first + _PUFF.level], _SMALLEST_M)
+        upright = max(plume[first + _PUFF.upright], _SMALLEST_M)
+        dx, dy = x - plume[first + _PUFF.x], y - plume[first + _PUFF.y]
         off = (dx * dx + dy * dy) / (level * level)
         if off > _FAR * _FAR:
             continue
         low, high = (z - height) / upright, (z + height) / upright
         lift = math.exp(-0.5 * low * low) + math.exp(-0.5 * high * high)
-        dense = plume[first + _AMOUNT] / (level * level * upright)
+        dense = plume[first + _PUFF.amount] / (level * level * upright)
         total += dense * math.exp(-0.5 * off) * lift / (2.0 * math.pi) ** 1.5
     return total
 
@@ -133,35 +185,37 @@ def _advance(
 ) -> None:  # pragma: no cover  (compiled)
     """Carries all puffs on by a period, and releases new ones."""
     dt = numbers.period_s
-    plume[_AGE] += dt
+    plume[_AT.age] += dt
     if numbers.volume > 0.0:
-        plume[_BACKGROUND] = numbers.rate * plume[_AGE] / numbers.volume
+        plume[_AT.background] = numbers.rate * plume[_AT.age] / numbers.volume
     if numbers.steady:
         return
     normals = tick_normals(numbers.noise, tick, 2 * MOST_PUFFS, 2)
     change = math.sqrt(1.0 - numbers.own_keep**2) * numbers.own_intensity
     kept = 0
-    for puff in range(int(plume[_COUNT])):
+    for puff in range(int(plume[_AT.puffs])):
         old, new = PUFFS_BEGIN + PUFF_SIZE * puff, PUFFS_BEGIN + PUFF_SIZE * kept
-        x, y = plume[old + _X], plume[old + _Y]
+        x, y = plume[old + _PUFF.x], plume[old + _PUFF.y]
         ux, uy = wind_velocity(wind, x, y)
         speed = math.hypot(ux, uy)
-        vx = numbers.own_keep * plume[old + _VX] + change * speed * normals[puff, 0]
-        vy = numbers.own_keep * plume[old + _VY] + change * speed * normals[puff, 1]
+        spread, keep = change * speed, numbers.own_keep
+        vx = keep * plume[old + _PUFF.vx] + spread * normals[puff, 0]
+        vy = keep * plume[old + _PUFF.vy] + spread * normals[puff, 1]
         x, y = x + dt * (ux + vx), y + dt * (uy + vy)
         if math.hypot(x - numbers.x, y - numbers.y) > numbers.reach_m:
             continue
         way = dt * max(speed, _STILL_M_S)
-        plume[new + _X], plume[new + _Y] = x, y
-        plume[new + _VX], plume[new + _VY] = vx, vy
-        plume[new + _LEVEL] = plume[old + _LEVEL] + numbers.level_growth * way
-        plume[new + _UPRIGHT] = plume[old + _UPRIGHT] + numbers.upright_growth * way
-        plume[new + _AMOUNT] = plume[old + _AMOUNT]
+        plume[new + _PUFF.x], plume[new + _PUFF.y] = x, y
+        plume[new + _PUFF.vx], plume[new + _PUFF.vy] = vx, vy
+        level, upright = numbers.level_growth * way, numbers.upright_growth * way
+        plume[new + _PUFF.level] = plume[old + _PUFF.level] + level
+        plume[new + _PUFF.upright] = plume[old + _PUFF.upright] + upright
+        plume[new + _PUFF.amount] = plume[old + _PUFF.amount]
         kept += 1
-    before = plume[_PART]
-    plume[_PART] += dt * numbers.puffs_per_s
-    fresh = int(plume[_PART])
-    plume[_PART] -= fresh
+    before = plume[_AT.part]
+    plume[_AT.part] += dt * numbers.puffs_per_s
+    fresh = int(plume[_AT.part])
+    plume[_AT.part] -= fresh
     if kept + fresh > MOST_PUFFS:
         drop = kept + fresh - MOST_PUFFS
         for k in range(PUFF_SIZE * (kept - drop)):
@@ -176,14 +230,14 @@ def _advance(
         vx = numbers.own_intensity * speed * normals[row, 0]
         vy = numbers.own_intensity * speed * normals[row, 1]
         way = age * max(speed, _STILL_M_S)
-        plume[first + _X] = numbers.x + age * (ux + vx)
-        plume[first + _Y] = numbers.y + age * (uy + vy)
-        plume[first + _VX], plume[first + _VY] = vx, vy
-        plume[first + _LEVEL] = numbers.level_growth * way
-        plume[first + _UPRIGHT] = numbers.upright_growth * way
-        plume[first + _AMOUNT] = numbers.rate / numbers.puffs_per_s
+        plume[first + _PUFF.x] = numbers.x + age * (ux + vx)
+        plume[first + _PUFF.y] = numbers.y + age * (uy + vy)
+        plume[first + _PUFF.vx], plume[first + _PUFF.vy] = vx, vy
+        plume[first + _PUFF.level] = numbers.level_growth * way
+        plume[first + _PUFF.upright] = numbers.upright_growth * way
+        plume[first + _PUFF.amount] = numbers.rate / numbers.puffs_per_s
         kept += 1
-    plume[_COUNT] = kept
+    plume[_AT.puffs] = kept
 
 
 @register_jitable
@@ -290,17 +344,22 @@ def _step(
         tick_noise(seed),
     )
     plume = np.zeros(PLUME_SIZE)
-    plume[_HEIGHT] = own.height_m
+    plume[_AT.height] = own.height_m
     if numbers.steady:
         direction, speed = math.radians(wind.direction_deg), wind.speed_m_s
-        plume[_STEADY] = 1.0
-        steady = plume[PUFFS_BEGIN:]
-        steady[:4] = *p_WO, math.cos(direction), math.sin(direction)
-        steady[4:6] = numbers.rate, speed
-        steady[6:8] = own.mean_intensity * speed, own.upright_growth * speed
+        plume[_AT.steady] = 1.0
+        plume[[*_MEAN_PLUME]] = (
+            *p_WO,
+            math.cos(direction),
+            math.sin(direction),
+            numbers.rate,
+            speed,
+            own.mean_intensity * speed,
+            own.upright_growth * speed,
+        )
     else:
         _spin_up(plume, initial_wind(wind, seed), own, numbers)
-    plume[_AGE] = own.age_s
+    plume[_AT.age] = own.age_s
     return Step(plume_step, numbers, plume, _publish)
 
 
@@ -311,6 +370,6 @@ def _spin_up(
     numbers: PlumeNumbers,
 ) -> None:
     """Releases the puffs of the time before the run, in a wind that does not change."""
-    plume[_AGE] = own.age_s
+    plume[_AT.age] = own.age_s
     for k in range(round(min(own.age_s, _LONGEST_SPIN_UP_S) / numbers.period_s)):
         _advance(plume, wind, -1 - k, numbers)

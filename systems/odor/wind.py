@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -21,10 +22,29 @@ from systems.framework.noise import (
 from systems.framework.signals import TICK_S
 from systems.odor.parameters import WindParameters
 
-#: Size of the port ``wind``: whether it is a jet; mean and unsteady velocity, each x
-#: and y, m/s; a jet's origin, m, its diameter, m, and its growth.
-WIND_SIZE = 9
-_JET, _MEAN, _GUST, _ORIGIN, _DIAMETER, _GROWTH = 0, 1, 3, 5, 7, 8
+
+class _Places(NamedTuple):
+    """Places in the port ``wind``."""
+
+    jet: int
+    """Whether it is a jet, 0 or 1."""
+    mean: int
+    """Mean velocity, x and y, m/s."""
+    gust: int
+    """Unsteady velocity, x and y, m/s."""
+    origin: int
+    """Of a jet, x and y, m."""
+    diameter: int
+    """Of a jet at its origin, m."""
+    growth: int
+    """Of a jet."""
+    size: int
+    """Of the port."""
+
+
+_AT = _Places(*accumulate((1, 2, 2, 2, 1, 1), initial=0))
+#: Size of the port ``wind``.
+WIND_SIZE = _AT.size
 #: Wind and plume change so often, s.
 WIND_PERIOD_S = 0.1
 #: Diameters along which a round jet keeps its speed on the axis (Pope 2000, 5.1: the
@@ -47,18 +67,18 @@ def wind_velocity(
         (ux, uy) in W, m/s.
     """
     share = 1.0
-    speed = math.hypot(wind[_MEAN], wind[_MEAN + 1])
-    if wind[_JET] > 0.5 and speed > 0.0:
-        dx, dy = x - wind[_ORIGIN], y - wind[_ORIGIN + 1]
-        along = (dx * wind[_MEAN] + dy * wind[_MEAN + 1]) / speed
-        across = (dy * wind[_MEAN] - dx * wind[_MEAN + 1]) / speed
+    speed = math.hypot(wind[_AT.mean], wind[_AT.mean + 1])
+    if wind[_AT.jet] > 0.5 and speed > 0.0:
+        dx, dy = x - wind[_AT.origin], y - wind[_AT.origin + 1]
+        along = (dx * wind[_AT.mean] + dy * wind[_AT.mean + 1]) / speed
+        across = (dy * wind[_AT.mean] - dx * wind[_AT.mean + 1]) / speed
         if along <= 0.0:
             return 0.0, 0.0
-        width = 0.5 * wind[_DIAMETER] + wind[_GROWTH] * along
-        share = min(1.0, _CORE * wind[_DIAMETER] / along)
+        width = 0.5 * wind[_AT.diameter] + wind[_AT.growth] * along
+        share = min(1.0, _CORE * wind[_AT.diameter] / along)
         share *= math.exp(-0.5 * (across / width) ** 2)
-    ux = share * (wind[_MEAN] + wind[_GUST])
-    return ux, share * (wind[_MEAN + 1] + wind[_GUST + 1])
+    ux = share * (wind[_AT.mean] + wind[_AT.gust])
+    return ux, share * (wind[_AT.mean + 1] + wind[_AT.gust + 1])
 
 
 class WindNumbers(NamedTuple):
@@ -85,7 +105,7 @@ def wind_step(
     normals = tick_normals(numbers.noise, tick, 1, 2)
     change = numbers.spread * math.sqrt(1.0 - numbers.keep**2)
     for k in range(2):
-        state[_GUST + k] = numbers.keep * state[_GUST + k] + change * float(
+        state[_AT.gust + k] = numbers.keep * state[_AT.gust + k] + change * float(
             normals[0, k]
         )
 
@@ -108,14 +128,14 @@ def initial_wind(own: WindParameters, seed: int) -> NDArray[np.float64]:
     """
     wind = np.zeros(WIND_SIZE)
     direction = math.radians(own.direction_deg)
-    wind[_JET] = own.kind == "jet"
-    wind[_MEAN : _MEAN + 2] = math.cos(direction), math.sin(direction)
-    wind[_MEAN : _MEAN + 2] *= own.speed_m_s
-    wind[_GUST : _GUST + 2] = (
+    wind[_AT.jet] = own.kind == "jet"
+    wind[_AT.mean : _AT.mean + 2] = math.cos(direction), math.sin(direction)
+    wind[_AT.mean : _AT.mean + 2] *= own.speed_m_s
+    wind[_AT.gust : _AT.gust + 2] = (
         _spread(own) * standard_normals((1, 2), seed, BEFORE_THE_RUN)[0]
     )
-    wind[_ORIGIN : _ORIGIN + 2] = own.jet_origin_m
-    wind[_DIAMETER], wind[_GROWTH] = own.jet_diameter_m, own.jet_growth
+    wind[_AT.origin : _AT.origin + 2] = own.jet_origin_m
+    wind[_AT.diameter], wind[_AT.growth] = own.jet_diameter_m, own.jet_growth
     return wind
 
 

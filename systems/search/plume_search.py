@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
@@ -23,17 +24,7 @@ from systems.search.search_ending import (
     UNDECIDED,
 )
 from systems.search.search_state import (
-    ACTIVITY,
-    ENDED,
-    EXPECTED,
-    FAULT,
-    FLAG,
-    LEFT,
-    MOVES,
-    OWN,
-    PHASE,
-    STARTED,
-    STEPS,
+    AT,
     add_frame,
     clear_frames,
     publish_search,
@@ -46,14 +37,37 @@ from systems.search.upwind_gradient import RULE_MEMORY, upwind_gradient_turn
 #: Ratios and airflows that a stop averages: R1, R2, R3, F1, F2.
 _SENSED = 5
 _WAIT, _SENSE, _MOVE, _OVER = range(4)
-# Places in the state, after those of both searches.
-_TOLD, _COUNT, _SMELT, _BEFORE, _SUM = range(OWN, OWN + 5)
-_LEAST = _SUM + _SENSED
-_MOST = _LEAST + _SENSED
-_MEAN = _MOST + _SENSED
-_MEMORY = _MEAN + _SENSED
-_FRAMES = _MEMORY + RULE_MEMORY
-_SIZE = _FRAMES + FRAMES_SIZE
+
+
+class _Places(NamedTuple):
+    """Places in the state of what this search has of its own."""
+
+    unsent: int
+    """What is still to be sent of a step: 2 all, 1 the second half, 0 nothing."""
+    readings: int
+    """Readings in this stop."""
+    smelt: int
+    """Least gas ratio of the last two stops and since, by which a touch is judged."""
+    before: int
+    """Least mean gas ratio at the last stop."""
+    sum: int
+    """Sums of the five readings in this stop; then their least and greatest values
+    and their means."""
+    least: int
+    most: int
+    mean: int
+    memory: int
+    """What the rules remember."""
+    frames: int
+    size: int
+    """Of the state."""
+
+
+_OWN = _Places(
+    *accumulate(
+        (1, 1, 1, 1, *(_SENSED,) * 4, RULE_MEMORY, FRAMES_SIZE), initial=len(AT)
+    )
+)
 # Numbers of frames (Song 2011, table 5).
 _FN_SET, _FN_HEADING, _FN_GAS, _FN_AIRFLOW, _FN_RESULT = 2, 5, 6, 9, 12
 # Bits of the faults.
@@ -81,23 +95,23 @@ class PlumeSearchNumbers(NamedTuple):
 
 @register_jitable
 def _begin_stop(state: Any, numbers: PlumeSearchNumbers) -> None:
-    state[ACTIVITY], state[LEFT] = _WAIT, numbers.wait
-    state[MOVES] = 0.0
-    state[_COUNT] = 0.0
+    state[AT.activity], state[AT.left] = _WAIT, numbers.wait
+    state[AT.moves] = 0.0
+    state[_OWN.readings] = 0.0
     for k in range(_SENSED):
-        state[_SUM + k] = 0.0
+        state[_OWN.sum + k] = 0.0
 
 
 @register_jitable
 def _sense(state: Any, gas: Any, airflow: Any) -> None:
     """Adds a tick's readings."""
-    first = state[_COUNT] < 0.5
+    first = state[_OWN.readings] < 0.5
     for k in range(_SENSED):
         value = gas[k] if k < 3 else airflow[k - 3]
-        state[_SUM + k] += value
-        state[_LEAST + k] = value if first else min(state[_LEAST + k], value)
-        state[_MOST + k] = value if first else max(state[_MOST + k], value)
-    state[_COUNT] += 1.0
+        state[_OWN.sum + k] += value
+        state[_OWN.least + k] = value if first else min(state[_OWN.least + k], value)
+        state[_OWN.most + k] = value if first else max(state[_OWN.most + k], value)
+    state[_OWN.readings] += 1.0
 
 
 @register_jitable
@@ -107,36 +121,36 @@ def _average(state: Any) -> int:
     Returns:
         How many gas sensors are alive.
     """
-    count = state[_COUNT]
+    count = state[_OWN.readings]
     for k in range(_SENSED):
-        total = state[_SUM + k]
+        total = state[_OWN.sum + k]
         if count > 2.5:
-            total -= state[_LEAST + k] + state[_MOST + k]
-            state[_MEAN + k] = total / (count - 2.0)
+            total -= state[_OWN.least + k] + state[_OWN.most + k]
+            state[_OWN.mean + k] = total / (count - 2.0)
         else:
-            state[_MEAN + k] = total / count
+            state[_OWN.mean + k] = total / count
     alive, others, bits = 0, 0.0, 0.0
     for k in range(3):
-        if state[_MOST + k] - state[_LEAST + k] >= _LIFELESS or count < 1.5:
+        if state[_OWN.most + k] - state[_OWN.least + k] >= _LIFELESS or count < 1.5:
             alive += 1
-            others += state[_MEAN + k]
+            others += state[_OWN.mean + k]
         else:
             bits += _DEAD_GAS << k
     if 0 < alive < 3:
         for k in range(3):
             if (int(bits) >> k) & 1:
-                state[_MEAN + k] = others / alive
-    switches = int(state[FAULT]) // _STUCK * _STUCK
-    state[FAULT] = switches + bits
+                state[_OWN.mean + k] = others / alive
+    switches = int(state[AT.fault]) // _STUCK * _STUCK
+    state[AT.fault] = switches + bits
     return alive
 
 
 @register_jitable
 def _end(state: Any, ended: int) -> None:
-    state[ACTIVITY], state[LEFT] = _OVER, 0.0
-    state[MOVES] = 0.0
-    state[ENDED] = ended
-    state[FLAG] = 1.0 if ended == FOUND else 0.0
+    state[AT.activity], state[AT.left] = _OVER, 0.0
+    state[AT.moves] = 0.0
+    state[AT.ended] = ended
+    state[AT.flag] = 1.0 if ended == FOUND else 0.0
 
 
 @register_jitable
@@ -145,40 +159,40 @@ def _decide(state: Any, heading: float, numbers: PlumeSearchNumbers) -> None:
     if _average(state) < 2:
         _end(state, NO_NOSE)
         return
-    if state[STEPS] >= numbers.most_steps:
+    if state[AT.steps] >= numbers.most_steps:
         _end(state, STEPS_GONE)
         return
-    mean = state[_MEAN], state[_MEAN + 1], state[_MEAN + 2]
-    blown = state[_MEAN + 3], state[_MEAN + 4]
-    memory = state[_MEMORY : _MEMORY + RULE_MEMORY]
+    mean = state[_OWN.mean], state[_OWN.mean + 1], state[_OWN.mean + 2]
+    blown = state[_OWN.mean + 3], state[_OWN.mean + 4]
+    memory = state[_OWN.memory : _OWN.memory + RULE_MEMORY]
     turn, phase, ended = numbers.turn(mean, blown, memory, numbers.rules)
-    state[PHASE] = phase
+    state[AT.phase] = phase
     if ended != UNDECIDED:
         _end(state, ended)
         return
-    state[EXPECTED] = wrapped_deg(heading + turn)
-    state[STEPS] += 1.0
-    state[ACTIVITY], state[LEFT] = _MOVE, numbers.move
-    state[MOVES] = 1.0
-    state[_TOLD] = 2.0
+    state[AT.expected] = wrapped_deg(heading + turn)
+    state[AT.steps] += 1.0
+    state[AT.activity], state[AT.left] = _MOVE, numbers.move
+    state[AT.moves] = 1.0
+    state[_OWN.unsent] = 2.0
     here = min(mean[0], mean[1], mean[2])
-    state[_SMELT], state[_BEFORE] = min(here, state[_BEFORE]), here
+    state[_OWN.smelt], state[_OWN.before] = min(here, state[_OWN.before]), here
 
 
 @register_jitable
 def _check_switches(state: Any, contact: Any) -> bool:
     """Whether something is touched; switches that are closed at the start are stuck."""
-    if state[STARTED] < 0.5:
-        state[STARTED] = 1.0
+    if state[AT.started] < 0.5:
+        state[AT.started] = 1.0
         for k in range(2):
             if contact[k] > 0.5:
-                state[FAULT] += _STUCK << k
+                state[AT.fault] += _STUCK << k
         if contact[0] > 0.5 and contact[1] > 0.5:
             _end(state, NO_TOUCH)
             return False
     touched = False
     for k in range(2):
-        stuck = (int(state[FAULT]) // (_STUCK << k)) % 2 == 1
+        stuck = (int(state[AT.fault]) // (_STUCK << k)) % 2 == 1
         touched = touched or (contact[k] > 0.5 and not stuck)
     return touched
 
@@ -186,30 +200,32 @@ def _check_switches(state: Any, contact: Any) -> bool:
 @register_jitable
 def _judge_touch(state: Any, numbers: PlumeSearchNumbers) -> None:
     """What is touched is the source, or smells of nothing."""
-    found = not numbers.gate or state[_SMELT] < numbers.gate_share
+    found = not numbers.gate or state[_OWN.smelt] < numbers.gate_share
     _end(state, FOUND if found else REFUSED)
 
 
 @register_jitable
-def _tell(state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers) -> None:
+def _add_frames(
+    state: Any, tick: int, heading: float, numbers: PlumeSearchNumbers
+) -> None:
     """Frames of this tick: what a step has measured, and in the end its result."""
     address = numbers.address
-    clear_frames(state, _FRAMES)
-    if state[ACTIVITY] == _OVER:
+    clear_frames(state, _OWN.frames)
+    if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
-            add_frame(state, _FRAMES, address, _FN_RESULT, state[FLAG])
+            add_frame(state, _OWN.frames, address, _FN_RESULT, state[AT.flag])
         return
-    if state[_TOLD] == 2.0:
-        add_frame(state, _FRAMES, address, _FN_HEADING, heading)
-        add_frame(state, _FRAMES, address, _FN_SET, state[EXPECTED])
-        add_frame(state, _FRAMES, address, _FN_GAS, state[_MEAN])
-        add_frame(state, _FRAMES, address, _FN_GAS + 1, state[_MEAN + 1])
-        state[_TOLD] = 1.0
-    elif state[_TOLD] == 1.0:
-        add_frame(state, _FRAMES, address, _FN_GAS + 2, state[_MEAN + 2])
-        add_frame(state, _FRAMES, address, _FN_AIRFLOW, state[_MEAN + 3])
-        add_frame(state, _FRAMES, address, _FN_AIRFLOW + 1, state[_MEAN + 4])
-        state[_TOLD] = 0.0
+    if state[_OWN.unsent] == 2.0:
+        add_frame(state, _OWN.frames, address, _FN_HEADING, heading)
+        add_frame(state, _OWN.frames, address, _FN_SET, state[AT.expected])
+        add_frame(state, _OWN.frames, address, _FN_GAS, state[_OWN.mean])
+        add_frame(state, _OWN.frames, address, _FN_GAS + 1, state[_OWN.mean + 1])
+        state[_OWN.unsent] = 1.0
+    elif state[_OWN.unsent] == 1.0:
+        add_frame(state, _OWN.frames, address, _FN_GAS + 2, state[_OWN.mean + 2])
+        add_frame(state, _OWN.frames, address, _FN_AIRFLOW, state[_OWN.mean + 3])
+        add_frame(state, _OWN.frames, address, _FN_AIRFLOW + 1, state[_OWN.mean + 4])
+        state[_OWN.unsent] = 0.0
 
 
 @register_jitable
@@ -219,32 +235,32 @@ def plume_search_step(
     """One tick of the search."""
     gas, airflow, headings, contact = inputs
     heading = headings[0]
-    if state[STARTED] < 0.5:
-        state[EXPECTED] = heading
-        state[_SMELT] = state[_BEFORE] = 1.0
+    if state[AT.started] < 0.5:
+        state[AT.expected] = heading
+        state[_OWN.smelt] = state[_OWN.before] = 1.0
         _begin_stop(state, numbers)
     touched = _check_switches(state, contact)
-    state[_SMELT] = min(state[_SMELT], gas[0], gas[1], gas[2])
-    if state[ACTIVITY] != _OVER:
+    state[_OWN.smelt] = min(state[_OWN.smelt], gas[0], gas[1], gas[2])
+    if state[AT.activity] != _OVER:
         if touched:
             _judge_touch(state, numbers)
-        elif state[ACTIVITY] == _WAIT and state[LEFT] <= 0.0:
-            state[ACTIVITY], state[LEFT] = _SENSE, numbers.sense
-    if state[ACTIVITY] == _SENSE:
+        elif state[AT.activity] == _WAIT and state[AT.left] <= 0.0:
+            state[AT.activity], state[AT.left] = _SENSE, numbers.sense
+    if state[AT.activity] == _SENSE:
         _sense(state, gas, airflow)
-    state[LEFT] -= 1.0
-    if state[LEFT] <= 0.0:
-        if state[ACTIVITY] == _SENSE:
+    state[AT.left] -= 1.0
+    if state[AT.left] <= 0.0:
+        if state[AT.activity] == _SENSE:
             _decide(state, heading, numbers)
-        elif state[ACTIVITY] == _MOVE:
+        elif state[AT.activity] == _MOVE:
             _begin_stop(state, numbers)
-    _tell(state, tick, heading, numbers)
+    _add_frames(state, tick, heading, numbers)
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: PlumeSearchNumbers) -> None:
     """The outputs of ``plume_search_step``'s state."""
-    publish_search(state, outputs, _FRAMES)
+    publish_search(state, outputs, _OWN.frames)
 
 
 class PlumeSearch(Block):
@@ -301,7 +317,7 @@ class PlumeSearch(Block):
             own.address,
         )
         self.declare(
-            Step(plume_search_step, numbers, [0.0] * _SIZE, _publish),
+            Step(plume_search_step, numbers, [0.0] * _OWN.size, _publish),
             tick_s=tick_s,
             arrays=True,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
@@ -10,22 +10,30 @@ from systems.framework.block import Port
 from systems.radio.codec import FRAME_BYTES, FRAMES_SIZE, MOST_FRAMES, write_frame
 from systems.search.search_ending import REPORT_COLUMNS
 
-#: Places in the state: what the robot is at, for how many ticks, whether it has begun;
-#: its outputs: heading, whether it moves, whether it calls or what it listens to, and
-#: its report; then what each search has of its own.
-(
-    ACTIVITY,
-    LEFT,
-    STARTED,
-    EXPECTED,
-    MOVES,
-    FLAG,
-    ENDED,
-    PHASE,
-    STEPS,
-    FAULT,
-    OWN,
-) = range(11)
+
+class SearchPlaces(NamedTuple):
+    """Places in the state of a search, of what both searches have."""
+
+    activity: int
+    left: int
+    """Ticks until the activity ends."""
+    started: int
+    """0 before the first tick, then 1."""
+    expected: int
+    """Heading to which the robot turns, deg."""
+    moves: int
+    """Whether it moves, 0 or 1."""
+    flag: int
+    """Whether it calls, or what it listens to."""
+    ended: int
+    """The report begins here, in the order of ``REPORT_COLUMNS``."""
+    phase: int
+    steps: int
+    fault: int
+
+
+#: Places of what both searches have; each search adds places of its own behind them.
+AT = SearchPlaces(*range(10))
 
 
 def ticks_of(time_s: float, tick_s: float, least: int = 1) -> int:
@@ -81,9 +89,9 @@ def publish_search(state: Any, outputs: Any, first: int) -> None:
         first: Place of the frames in the state.
     """
     expected, move, flag, report, frames = outputs
-    expected[0], move[0], flag[0] = state[EXPECTED], state[MOVES], state[FLAG]
+    expected[0], move[0], flag[0] = state[AT.expected], state[AT.moves], state[AT.flag]
     for k in range(len(report)):
-        report[k] = state[ENDED + k]
+        report[k] = state[AT.ended + k]
     for k in range(len(frames)):
         frames[k] = state[first + k]
 

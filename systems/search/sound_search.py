@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
@@ -26,17 +27,7 @@ from systems.search.search_ending import (
     STEPS_GONE,
 )
 from systems.search.search_state import (
-    ACTIVITY,
-    ENDED,
-    EXPECTED,
-    FAULT,
-    FLAG,
-    LEFT,
-    MOVES,
-    OWN,
-    PHASE,
-    STARTED,
-    STEPS,
+    AT,
     add_frame,
     clear_frames,
     publish_search,
@@ -46,23 +37,40 @@ from systems.search.search_state import (
 
 #: What the robot is at; ``search_phase`` in its report.
 _WAITS, _HOLDS, _LISTENS, _COMPUTES, _MOVING, _OVER = range(1, 7)
-# Places in the state, after those of both searches.
-(
-    _TOLD,
-    _LEVELS,
-    _READINGS,
-    _MISSES,
-    _NOISE_LEFT,
-    _WAITED,
-    _CALLED,
-    _ARRIVED,
-    _BEARING,
-    _RANGE,
-    _AWAY,
-    _PARSER,
-) = range(OWN, OWN + 12)
-_FRAMES = _PARSER + PARSER_SIZE
-_SIZE = _FRAMES + FRAMES_SIZE
+
+
+class _Places(NamedTuple):
+    """Places in the state of what this search has of its own."""
+
+    unsent: int
+    """Whether frames of a step are still to be sent, 0 or 1."""
+    levels: int
+    """Sum of the radio levels in this step, dBm."""
+    readings: int
+    """Number of these levels."""
+    misses: int
+    """Times in a row that the source was not located."""
+    noise_left: int
+    """Ticks for which it still listens to the noise."""
+    waited: int
+    """Ticks for which it has waited for the call."""
+    called: int
+    """1 called, -1 the caller has found nothing, 0 neither."""
+    arrived: int
+    """Whether the robot that goes first has reported its result, 0 or 1."""
+    bearing: int
+    """Of the source, deg."""
+    distance: int
+    """Of the source, m; 0 if it is not known."""
+    away: int
+    """Distance by the radio level, m."""
+    parser: int
+    frames: int
+    size: int
+    """Of the state."""
+
+
+_OWN = _Places(*accumulate((*(1,) * 11, PARSER_SIZE, FRAMES_SIZE), initial=len(AT)))
 # Numbers of frames (Song 2011, table 5).
 _FN_HEADING, _FN_FOUND_ODOR, _FN_DIRECTION = 5, 12, 13
 _FN_DISTANCE, _FN_RADIO_DISTANCE, _FN_RESULT = 14, 15, 16
@@ -99,37 +107,37 @@ class SoundSearchNumbers(NamedTuple):
 
 @register_jitable
 def _end(state: Any, ended: int) -> None:
-    state[ACTIVITY], state[LEFT] = _OVER, 0.0
-    state[MOVES], state[FLAG] = 0.0, _NOTHING
-    state[ENDED] = ended
+    state[AT.activity], state[AT.left] = _OVER, 0.0
+    state[AT.moves], state[AT.flag] = 0.0, _NOTHING
+    state[AT.ended] = ended
 
 
 @register_jitable
 def _receive(state: Any, air: Any, own: Any) -> None:
     """Calls and results out of what is on the air."""
-    parser = state[_PARSER : _PARSER + PARSER_SIZE]
+    parser = state[_OWN.parser : _OWN.parser + PARSER_SIZE]
     for k in range(int(air[0])):
         good, address, function, value = parse_byte(parser, air[1 + k])
         if good and address == own.caller and function == _FN_FOUND_ODOR:
-            state[_CALLED] = 1.0 if value > 0.5 else -1.0
+            state[_OWN.called] = 1.0 if value > 0.5 else -1.0
         if good and address == own.waits_for and function == _FN_RESULT:
-            state[_ARRIVED] = 1.0
+            state[_OWN.arrived] = 1.0
 
 
 @register_jitable
 def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
     """Until it is called; first it hears the noise."""
-    if state[_NOISE_LEFT] > 0.0:
-        state[FLAG] = _NOISE
-        state[_NOISE_LEFT] -= 1.0
+    if state[_OWN.noise_left] > 0.0:
+        state[AT.flag] = _NOISE
+        state[_OWN.noise_left] -= 1.0
         return
-    state[FLAG] = _NOTHING
-    state[_WAITED] += 1.0
-    if not numbers.own.await_call or state[_CALLED] > 0.5:
+    state[AT.flag] = _NOTHING
+    state[_OWN.waited] += 1.0
+    if not numbers.own.await_call or state[_OWN.called] > 0.5:
         _begin_step(state, numbers)
-    elif state[_CALLED] < -0.5:
+    elif state[_OWN.called] < -0.5:
         _end(state, CALLER_LOST)
-    elif state[_WAITED] > numbers.call_within:
+    elif state[_OWN.waited] > numbers.call_within:
         _end(state, NOT_CALLED)
 
 
@@ -137,21 +145,21 @@ def _wait(state: Any, numbers: SoundSearchNumbers) -> None:
 def _begin_step(state: Any, numbers: SoundSearchNumbers) -> None:
     """Listens, or holds for the one that goes first."""
     own = numbers.own
-    state[MOVES] = 0.0
-    near = 0.0 < state[_AWAY] < own.hold_within_m
-    if own.waits_for > 0 and state[_ARRIVED] < 0.5 and near:
-        state[ACTIVITY], state[LEFT] = _HOLDS, numbers.hold
+    state[AT.moves] = 0.0
+    near = 0.0 < state[_OWN.away] < own.hold_within_m
+    if own.waits_for > 0 and state[_OWN.arrived] < 0.5 and near:
+        state[AT.activity], state[AT.left] = _HOLDS, numbers.hold
         return
-    state[ACTIVITY], state[LEFT] = _LISTENS, numbers.listen
-    state[FLAG] = _SOUND
-    state[_LEVELS] = state[_READINGS] = 0.0
+    state[AT.activity], state[AT.left] = _LISTENS, numbers.listen
+    state[AT.flag] = _SOUND
+    state[_OWN.levels] = state[_OWN.readings] = 0.0
 
 
 @register_jitable
 def _missed(state: Any, ended: int, numbers: SoundSearchNumbers) -> None:
     """Listens again, if it may."""
-    state[_MISSES] += 1.0
-    if state[_MISSES] >= numbers.own.tries:
+    state[_OWN.misses] += 1.0
+    if state[_OWN.misses] >= numbers.own.tries:
         _end(state, ended)
     else:
         _begin_step(state, numbers)
@@ -164,10 +172,10 @@ def _decide(
     """Where to go by what was heard, or that it has arrived."""
     bearing, distance, detected, ranged, ambiguous, lost = heard
     own = numbers.own
-    state[FAULT] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
-    level = state[_LEVELS] / max(state[_READINGS], 1.0)
+    state[AT.fault] = float(_LOST_MICROPHONE) if lost > 0.5 else 0.0
+    level = state[_OWN.levels] / max(state[_OWN.readings], 1.0)
     away = radio_distance(level, numbers.level_dbm, numbers.exponent)
-    state[_AWAY] = away
+    state[_OWN.away] = away
     if away < own.radio_stop_m:
         _end(state, FOUND)
         return
@@ -177,46 +185,49 @@ def _decide(
     if ambiguous > 0.5:
         _missed(state, AMBIGUOUS, numbers)
         return
-    state[_MISSES] = 0.0
-    state[_BEARING] = math.degrees(bearing)
-    state[_RANGE] = distance if ranged > 0.5 else 0.0
+    state[_OWN.misses] = 0.0
+    state[_OWN.bearing] = math.degrees(bearing)
+    state[_OWN.distance] = distance if ranged > 0.5 else 0.0
     near = own.stop == "range" and ranged > 0.5 and away < own.radio_gate_m
     if near and distance < own.stop_range_m:
         _end(state, FOUND)
         return
-    if state[STEPS] >= own.most_steps:
+    if state[AT.steps] >= own.most_steps:
         _end(state, STEPS_GONE)
         return
     move = numbers.move
     if own.stop == "range" and ranged < 0.5 and away < own.radio_gate_m:
-        move = max(1, move // 2)  # near, but not told how near
+        move = max(1, move // 2)  # near, at an unknown distance
     if near:
         way = distance - _SHORT_OF * own.stop_range_m
-        time = way / numbers.speed_m_s + _LAG_S + _TURN_S_DEG * abs(state[_BEARING])
+        time = way / numbers.speed_m_s + _LAG_S + _TURN_S_DEG * abs(state[_OWN.bearing])
         move = min(move, int(max(time, _SHORTEST_S) / numbers.tick_s))
-    state[EXPECTED] = wrapped_deg(heading - state[_BEARING])
-    state[STEPS] += 1.0
-    state[ACTIVITY], state[LEFT] = _MOVING, move
-    state[MOVES] = 1.0
-    state[_TOLD] = 1.0
+    state[AT.expected] = wrapped_deg(heading - state[_OWN.bearing])
+    state[AT.steps] += 1.0
+    state[AT.activity], state[AT.left] = _MOVING, move
+    state[AT.moves] = 1.0
+    state[_OWN.unsent] = 1.0
 
 
 @register_jitable
-def _tell(state: Any, tick: int, heading: float, numbers: SoundSearchNumbers) -> None:
+def _add_frames(
+    state: Any, tick: int, heading: float, numbers: SoundSearchNumbers
+) -> None:
     """Frames of this tick."""
     address = numbers.own.address
-    clear_frames(state, _FRAMES)
-    if state[ACTIVITY] == _OVER:
+    clear_frames(state, _OWN.frames)
+    if state[AT.activity] == _OVER:
         if tick % numbers.repeat == 0:
-            found = 1.0 if state[ENDED] == FOUND else 0.0
-            add_frame(state, _FRAMES, address, _FN_RESULT, found)
-    elif state[_TOLD] > 0.5:
-        add_frame(state, _FRAMES, address, _FN_HEADING, heading)
-        add_frame(state, _FRAMES, address, _FN_DIRECTION, -state[_BEARING])
-        add_frame(state, _FRAMES, address, _FN_DISTANCE, min(state[_RANGE], 99.0))
-        away = min(state[_AWAY], 99.0)
-        add_frame(state, _FRAMES, address, _FN_RADIO_DISTANCE, away)
-        state[_TOLD] = 0.0
+            found = 1.0 if state[AT.ended] == FOUND else 0.0
+            add_frame(state, _OWN.frames, address, _FN_RESULT, found)
+    elif state[_OWN.unsent] > 0.5:
+        add_frame(state, _OWN.frames, address, _FN_HEADING, heading)
+        add_frame(state, _OWN.frames, address, _FN_DIRECTION, -state[_OWN.bearing])
+        distance = min(state[_OWN.distance], 99.0)
+        add_frame(state, _OWN.frames, address, _FN_DISTANCE, distance)
+        away = min(state[_OWN.away], 99.0)
+        add_frame(state, _OWN.frames, address, _FN_RADIO_DISTANCE, away)
+        state[_OWN.unsent] = 0.0
 
 
 @register_jitable
@@ -224,16 +235,16 @@ def _end_activity(
     state: Any, heard: Any, heading: float, numbers: SoundSearchNumbers
 ) -> None:
     """What comes after what it was at."""
-    activity = state[ACTIVITY]
+    activity = state[AT.activity]
     if activity == _LISTENS:
-        state[ACTIVITY], state[LEFT] = _COMPUTES, numbers.compute
-        state[FLAG] = _NOTHING
+        state[AT.activity], state[AT.left] = _COMPUTES, numbers.compute
+        state[AT.flag] = _NOTHING
     elif activity == _COMPUTES:
         _decide(state, heard, heading, numbers)
     elif activity == _MOVING:
         _begin_step(state, numbers)
     elif activity == _HOLDS:
-        state[_ARRIVED] = 1.0
+        state[_OWN.arrived] = 1.0
         _begin_step(state, numbers)
 
 
@@ -245,28 +256,28 @@ def sound_search_step(
     bearing, distance, detected, ranged, ambiguous, lost, levels, headings, air = inputs
     heard = bearing[0], distance[0], detected[0], ranged[0], ambiguous[0], lost[0]
     heading = headings[0]
-    if state[STARTED] < 0.5:
-        state[STARTED], state[EXPECTED] = 1.0, heading
-        state[ACTIVITY], state[_NOISE_LEFT] = _WAITS, numbers.noise
+    if state[AT.started] < 0.5:
+        state[AT.started], state[AT.expected] = 1.0, heading
+        state[AT.activity], state[_OWN.noise_left] = _WAITS, numbers.noise
     _receive(state, air, numbers.own)
-    if state[ACTIVITY] == _WAITS:
+    if state[AT.activity] == _WAITS:
         _wait(state, numbers)
-    elif state[ACTIVITY] != _OVER:
-        if state[ACTIVITY] == _LISTENS:
-            state[_LEVELS] += levels[0]
-            state[_READINGS] += 1.0
-        state[LEFT] -= 1.0
-        held = state[ACTIVITY] == _HOLDS and state[_ARRIVED] > 0.5
-        if held or state[LEFT] <= 0.0:
+    elif state[AT.activity] != _OVER:
+        if state[AT.activity] == _LISTENS:
+            state[_OWN.levels] += levels[0]
+            state[_OWN.readings] += 1.0
+        state[AT.left] -= 1.0
+        held = state[AT.activity] == _HOLDS and state[_OWN.arrived] > 0.5
+        if held or state[AT.left] <= 0.0:
             _end_activity(state, heard, heading, numbers)
-    state[PHASE] = state[ACTIVITY]
-    _tell(state, tick, heading, numbers)
+    state[AT.phase] = state[AT.activity]
+    _add_frames(state, tick, heading, numbers)
 
 
 @register_jitable
 def _publish(state: Any, outputs: Any, numbers: SoundSearchNumbers) -> None:
     """The outputs of ``sound_search_step``'s state."""
-    publish_search(state, outputs, _FRAMES)
+    publish_search(state, outputs, _OWN.frames)
 
 
 class SoundSearch(Block):
@@ -335,7 +346,7 @@ class SoundSearch(Block):
             tick_s,
         )
         self.declare(
-            Step(sound_search_step, numbers, [0.0] * _SIZE, _publish),
+            Step(sound_search_step, numbers, [0.0] * _OWN.size, _publish),
             tick_s=tick_s,
             arrays=True,
         )

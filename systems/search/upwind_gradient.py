@@ -3,15 +3,29 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 from numba.extending import register_jitable
 
 from systems.search.search_ending import NO_WIND, UNDECIDED
 
+
+class _Places(NamedTuple):
+    """Places in the memory of the rules."""
+
+    best: int
+    """Strongest smell."""
+    casts: int
+    """Casts since the plume was lost."""
+    side: int
+    """Side of the last lean: 1 right, -1 left."""
+    calm: int
+    """Stops in a row without wind."""
+
+
+_AT = _Places(*range(4))
 #: Numbers that a rule may remember from stop to stop.
-RULE_MEMORY = 4
-_BEST, _CASTS, _SIDE, _CALM = range(RULE_MEMORY)
+RULE_MEMORY = len(_AT)
 #: A reading below this share of the other sensor's is no reading.
 _SHADED = 0.1
 #: Where one sensor alone is blown at, the wind comes from 45 to 135 deg off.
@@ -49,8 +63,7 @@ def upwind_gradient_turn(
     Args:
         gas: (R1, R2, R3): right front, rear, left front, Rs/R0.
         airflow: (F1, F2): left, right.
-        memory: ``RULE_MEMORY`` numbers, 0 at first: strongest smell, casts since the
-            plume was lost, side of the last lean, and stops without wind; changed.
+        memory: ``RULE_MEMORY`` numbers, 0 at first; changed.
         rules: ``UpwindGradientParameters``.
 
     Returns:
@@ -58,22 +71,22 @@ def upwind_gradient_turn(
         ``NO_WIND`` where there is none to go by, else ``UNDECIDED``.
     """
     if max(airflow[0], airflow[1]) < rules.still_air:
-        memory[_CALM] += 1.0
-        ended = NO_WIND if memory[_CALM] >= _CALM_STOPS else UNDECIDED
+        memory[_AT.calm] += 1.0
+        ended = NO_WIND if memory[_AT.calm] >= _CALM_STOPS else UNDECIDED
         return 180.0, 1, ended
-    memory[_CALM] = 0.0
+    memory[_AT.calm] = 0.0
     upwind = upwind_angle(airflow)
     strongest = 1.0 - min(gas[0], gas[1], gas[2])
-    memory[_BEST] = max(memory[_BEST], strongest)
-    if strongest < rules.lost_share * memory[_BEST]:
-        memory[_CASTS] += 1.0
+    memory[_AT.best] = max(memory[_AT.best], strongest)
+    if strongest < rules.lost_share * memory[_AT.best]:
+        memory[_AT.casts] += 1.0
         # One step to the side of the last lean, two to the other, three back ...
-        leg = math.floor(0.5 * (math.sqrt(8.0 * memory[_CASTS] - 7.0) - 1.0) + 1e-9)
-        side = memory[_SIDE] if leg % 2 == 0 else -memory[_SIDE]
+        leg = math.floor(0.5 * (math.sqrt(8.0 * memory[_AT.casts] - 7.0) - 1.0) + 1e-9)
+        side = memory[_AT.side] if leg % 2 == 0 else -memory[_AT.side]
         turn = rules.cast_deg if side >= 0.0 else -rules.cast_deg
         return upwind + turn, 2, UNDECIDED
-    memory[_CASTS] = 0.0
+    memory[_AT.casts] = 0.0
     lean = rules.gain_deg * math.log(max(gas[2], _LEAST) / max(gas[0], _LEAST))
     lean = min(max(lean, -rules.largest_lean_deg), rules.largest_lean_deg)
-    memory[_SIDE] = 1.0 if lean >= 0.0 else -1.0
+    memory[_AT.side] = 1.0 if lean >= 0.0 else -1.0
     return upwind + lean, 1, UNDECIDED
