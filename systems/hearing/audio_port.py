@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from systems.framework.block import RunFacts
 from systems.framework.finite import check_record
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.framework.step_block import RunFacts
 
 
 def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
@@ -37,16 +37,16 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
-    """Frames of a compiled loop, by the tick at which they end.
+    """The frames of a compiled loop.
 
     Args:
-        run: What the loop runs.
+        run: The run.
 
     Returns:
-        A function of the present tick; the frame is made when it is called.
+        A function of the present tick, which computes the frame that ends at this tick.
 
     Raises:
-        InputError: No MicArray of ours gives any.
+        InputError: No block with a step publishes audio.
     """
     if "audio" not in run.carried:
         raise InputError(
