@@ -1,4 +1,4 @@
-"""How estimators get the frames of the microphones, in Drake and in compiled loops."""
+"""Ports of the estimators, in Drake and in compiled loops."""
 
 from __future__ import annotations
 
@@ -74,3 +74,22 @@ def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
             f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate_hz:g} "
             "Hz",
         )
+
+
+def declare_state_outputs(block: Any) -> None:
+    """Declares the output ports of a block whose first state group holds them.
+
+    Args:
+        block: Has declared its ports; the group has the values of the output ports, one
+            after the other.
+    """
+    first = 0
+    for port, size in zip(block.outputs, block._output_sizes, strict=True):
+
+        def calc(
+            context: Any, output: Any, part: Any = slice(first, first + size)
+        ) -> None:
+            output.SetFromVector(context.get_discrete_state(0).value()[part])
+
+        block.declare_output(port.name, calc, {block.xd_ticket()})
+        first += size
