@@ -32,7 +32,11 @@ from systems.framework.noise import BEFORE_THE_RUN, standard_normals, tick_gener
 from systems.framework.signals import TICK_S
 from systems.hearing.source_fix import SourceFix
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
-from systems.hearing.tracking.tracker_model import Measurement, Track, TrackerModel
+from systems.hearing.tracking.tracker_model import (
+    blank_track,
+    track_step,
+    tracker_numbers,
+)
 from systems.laws.active import active_force
 from systems.laws.impedance_controller import (
     attraction_force,
@@ -75,7 +79,7 @@ class PlainLoop:
         )
         p_BM = microphones_B(scenario.robot)
         self.array = real_array(p_BM, microphones, errors, c)
-        self.tracker = TrackerModel(scenario.tracker, scenario.robot, 1.5 * T)
+        self.tracker = tracker_numbers(scenario.tracker, scenario.robot, 1.5 * T)
         self.ultrasonic_seed = block_seed(scenario.seed, "ultrasonic_array")
         self.localiser, self.p_PA_B = robot_localiser(
             scenario.tdoa, scenario.robot, scenario.acoustics
@@ -87,7 +91,7 @@ class PlainLoop:
         self.memory = self.localiser.blank()
         state = [*scenario.start.pose, 0.0, 0.0, 0.0, 0.0]
         odometry, angles = list(scenario.start.pose), [0.0, 0.0]
-        track = self.tracker.start(odometry)
+        self.track = blank_track(self.tracker, odometry)
         v_WP: tuple[float, float] = (0.0, 0.0)
         wheels: tuple[float, float] = (0.0, 0.0)
         fix: SourceFix | None = None
@@ -100,9 +104,9 @@ class PlainLoop:
         for tick in range(round(scenario.duration_s / T)):
             time = tick * T
             odometry, angles = self._odometry(odometry, angles, state[3:5], wheels)
-            track, target = self._track(track, fix, odometry)
+            target, valid = self._target(tick, fix, odometry)
             vectors = self._obstacles(time, tick, state, odometry[2])
-            acceleration = self._law(odometry, v_WP, track, target, vectors, before)
+            acceleration = self._law(odometry, v_WP, target, valid, vectors, before)
             before = {round(row[0]): row[1:] for row in vectors}
             v_WP = integrate_velocity(
                 v_WP, acceleration, T, scenario.robot.top_speed_m_s
@@ -125,13 +129,12 @@ class PlainLoop:
         motion = lagged_motion(T, self.scenario.plant.motor_lag_s)
         return list(advance_pose(pose, body_twist(steps, robot), steady, motion)), now
 
-    def _track(self, track: Track, fix: Any, pose: Any) -> Any:
-        if fix is not None:
-            ports = port_values(fix, self.p_PA_B)
-            estimate = Measurement(ports[2], ports[3], fix.range_valid)
-            track = self.tracker.hear(track, estimate, pose)
-        target = self.tracker.position(track, pose)
-        return self.tracker.older(track, pose), target
+    def _target(self, tick: int, fix: Any, pose: Any) -> Any:
+        estimate = port_values(fix, self.p_PA_B)[2:6]
+        outputs = tuple(np.zeros(size) for size in (2, 2, 4, 1, 1))
+        inputs = (*estimate, np.array(pose))
+        track_step(tick, self.track, inputs, outputs, self.tracker)
+        return outputs[0], outputs[4][0] > 0.5
 
     def _obstacles(self, time: Any, tick: Any, state: Any, theta: Any) -> Any:
         scenario = self.scenario
@@ -157,11 +160,10 @@ class PlainLoop:
         return [[feature, *rotate(theta, x, y)] for feature, x, y in vectors]
 
     def _law(
-        self, pose: Any, v_WP: Any, track: Any, target: Any, vectors: Any, before: Any
+        self, pose: Any, v_WP: Any, target: Any, valid: Any, vectors: Any, before: Any
     ) -> Any:
         scenario = self.scenario
         p_WP = control_point(pose, scenario.robot.control_point_m)
-        valid = track.age - T <= scenario.tracker.maximum_age_s
         mass = scenario.robot.mass_kg
         F_m = attraction_force(p_WP, v_WP, target, valid, scenario.attraction, mass)
         closing = scenario.repulsion.velocity_term == "closing"

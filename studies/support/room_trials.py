@@ -24,7 +24,12 @@ from systems.framework.signals import FRAME_SAMPLES, SAMPLE_RATE_HZ, TICK_S
 from systems.hearing.localise import Localiser
 from systems.hearing.parameters import TDOAParameters, TrackerParameters
 from systems.hearing.tdoa_estimator import port_values, robot_localiser
-from systems.hearing.tracking.tracker_model import Measurement, TrackerModel
+from systems.hearing.tracking.tracker_model import (
+    TrackerNumbers,
+    blank_track,
+    track_step,
+    tracker_numbers,
+)
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.adc import convert
 from systems.sound.parameters import MicArrayParameters, RoomParameters, SoundParameters
@@ -154,7 +159,7 @@ def locate_bursts(
     tracking = (tracking or TrackerParameters()).model_copy(
         update={"resolve_front_back": False}
     )
-    tracker = TrackerModel(tracking, robot, 1.5 * TICK_S)
+    tracker = tracker_numbers(tracking, robot, 1.5 * TICK_S)
     errors = []
     for k, layout in enumerate(layouts):
         p_WM = microphones_W(layout.pose_WB, robot)
@@ -162,8 +167,8 @@ def locate_bursts(
             room, layout.p_WS, p_WM, _AIR.c, images=images
         )
         frames = _frames(response, burst, microphones, seed + k)
-        fixes = _fixes(frames, localiser, p_PA_B)
-        errors.append(_errors(_tracked(fixes, tracker, layout.pose_WB), layout))
+        estimates = _estimates(frames, localiser, p_PA_B)
+        errors.append(_errors(_tracked(estimates, tracker, layout.pose_WB), layout))
     bearing, distance = np.array(errors).T
     return RoomResult(layouts, bearing, distance)
 
@@ -194,35 +199,33 @@ def _frames(
         yield convert(part, noise, noise_pa, microphones)
 
 
-def _fixes(
+def _estimates(
     frames: Iterator[NDArray[np.int16]],
     localiser: Localiser,
     p_PA_B: NDArray[np.float64],
-) -> Iterator[Measurement | None]:
-    """What the estimator says of each frame, as the tracker takes it."""
+) -> Iterator[tuple[NDArray[np.float64], ...]]:
+    """The estimate of each frame, as the tracker takes it."""
     memory = localiser.blank()
     for frame in frames:
         fix, memory = localiser.localise(frame, memory)
-        if fix is None:
-            yield None
-            continue
-        ports = port_values(fix, p_PA_B)
-        yield Measurement(ports[2], ports[3], ranged=fix.range_valid)
+        yield port_values(fix, p_PA_B)[2:6]
 
 
 def _tracked(
-    estimates: Iterator[Measurement | None],
-    tracker: TrackerModel,
+    estimates: Iterator[tuple[NDArray[np.float64], ...]],
+    tracker: TrackerNumbers,
     pose: NDArray[np.float64],
 ) -> NDArray[np.float64] | None:
     """(2,) where the tracker of a robot at rest has the source at last, in W, m."""
-    track, heard = tracker.start(pose), False
-    for estimate in estimates:
-        if estimate is not None:
-            heard = True
-            track = tracker.hear(track, estimate, pose)
-        track = tracker.older(track, pose)
-    return np.array(tracker.position(track, pose)) if heard else None
+    state, heard = blank_track(tracker, pose.tolist()), False
+    outputs = tuple(np.zeros(size) for size in (2, 2, 4, 1, 1))
+    for tick, estimate in enumerate(estimates):
+        heard = heard or bool(estimate[2][0])
+        track_step(tick, state, (*estimate, pose), outputs, tracker)
+    # The target a tick after the last frame.
+    silence = tuple(np.zeros(size) for size in (2, 4, 1, 1))
+    track_step(0, state, (*silence, pose), outputs, tracker)
+    return outputs[0] if heard else None
 
 
 def _errors(p_WS: NDArray[np.float64] | None, layout: Layout) -> tuple[float, float]:

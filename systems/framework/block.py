@@ -361,7 +361,7 @@ class _Declared:
     def _blank_outputs(self: Any) -> list[Any]:
         """One entry per output port that carries numbers."""
         if self._as_arrays:
-            return [np.zeros(count) for count in self._output_sizes]
+            return [np.full(n, self._scalar(0.0)) for n in self._output_sizes]
         return [[self._scalar(0.0)] * count for count in self._output_sizes]
 
     def _compute(self: Any, context: Any) -> tuple[Any, Any]:

@@ -1,14 +1,14 @@
-"""How estimators get the frames of the microphones, in Drake and in compiled loops."""
+"""Ports of the estimators, in Drake and in compiled loops."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Any
 
+from systems.framework.block import RunFacts
 from systems.framework.finite import check_record
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.framework.step_block import RunFacts
 
 
 def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
@@ -37,16 +37,16 @@ def read_audio(context: Any, port: Any, block: str) -> AudioFrame:
 
 
 def audio_of_run(run: RunFacts) -> Callable[[int], AudioFrame]:
-    """Frames of a compiled loop, by the tick at which they end.
+    """The frames of a compiled loop.
 
     Args:
-        run: What the loop runs.
+        run: The run.
 
     Returns:
-        A function of the present tick; the frame is made when it is called.
+        A function of the present tick, which computes the frame that ends at this tick.
 
     Raises:
-        InputError: No MicArray of ours gives any.
+        InputError: No block with a step publishes audio.
     """
     if "audio" not in run.carried:
         raise InputError(
@@ -74,3 +74,22 @@ def check_rate(audio: AudioFrame, rate_hz: float, block: str) -> None:
             f"audio has a rate of {audio.sample_rate_hz:g} Hz; record at {rate_hz:g} "
             "Hz",
         )
+
+
+def declare_state_outputs(block: Any) -> None:
+    """Declares the output ports of a block whose first state group holds them.
+
+    Args:
+        block: Has declared its ports; the group has the values of the output ports, one
+            after the other.
+    """
+    first = 0
+    for port, size in zip(block.outputs, block._output_sizes, strict=True):
+
+        def calc(
+            context: Any, output: Any, part: Any = slice(first, first + size)
+        ) -> None:
+            output.SetFromVector(context.get_discrete_state(0).value()[part])
+
+        block.declare_output(port.name, calc, {block.xd_ticket()})
+        first += size

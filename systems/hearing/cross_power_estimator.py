@@ -8,17 +8,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.framework.step_block import RunFacts, Step
-from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
+from systems.hearing.audio_port import (
+    audio_of_run,
+    check_rate,
+    declare_state_outputs,
+    read_audio,
+)
 from systems.hearing.cross_powers import (
     FINE,
     CrossPowers,
@@ -254,18 +256,20 @@ class ArrayListener:
         return Direction(bearing, known)
 
 
-#: Output ports and their sizes.
+#: Output ports.
 _PORTS = (
-    ("source_bearing", 1),
-    ("source_range", 1),
-    ("p_PS_B", 2),
-    ("detected", 1),
-    ("range_valid", 1),
-    ("ambiguous", 1),
-    ("alternative_bearing", 1),
-    ("lost_microphone", 1),
+    Port("source_bearing", 1, "rad"),
+    Port("source_range", 1, "m"),
+    Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
+    Port("detected", 1, "0 or 1", "detected"),
+    Port("range_valid", 1, "0 or 1", "range_valid"),
+    Port("ambiguous", 1, "0 or 1", "ambiguous"),
+    Port("alternative_bearing", 1, "rad"),
+    Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
 )
-_OUTPUTS = sum(size for _, size in _PORTS)
+_SIZE = sum(port.elements({}) for port in _PORTS)
+# Groups of the discrete state.
+_OUTPUTS, _FRAME, _SUMS = range(3)
 _NOTHING, _NOISE, _SOUND = range(3)
 
 
@@ -281,24 +285,8 @@ class _Memory(NamedTuple):
     outputs: NDArray[np.float64]
 
 
-class CrossPowerEstimator(LeafSystem):
-    """Hears where the source is, while it is told to listen.
-
-    .. pydrake_system::
-
-        name: CrossPowerEstimator
-        input_ports:
-        - audio [AudioFrame]
-        - listening [number, 0 nothing, 1 noise alone, 2 sound]
-        output_ports:
-        - source_bearing [rad]
-        - source_range [m]
-        - p_PS_B [m, m]
-        - detected [0 or 1]
-        - range_valid [0 or 1]
-        - ambiguous [0 or 1]
-        - alternative_bearing [rad]
-        - lost_microphone [number, 0 none]
+class CrossPowerEstimator(Block):
+    """Hears where the source is while the search listens.
 
     Frames are gathered as cross-power spectra as long as ``listening`` asks for it,
     those of noise and of sound apart; when it no longer asks for sound, the estimate of
@@ -311,7 +299,7 @@ class CrossPowerEstimator(LeafSystem):
 
     While it is not asked for, ``audio`` is not evaluated, and nobody has to make it.
 
-    State: the outputs, a group each, and sums of spectra. Rate and latency: updated
+    State: the outputs, the last frame, and sums of spectra. Rate and latency: updated
     every ``frame_s`` of the microphones, and visible after it.
 
     Args:
@@ -326,57 +314,45 @@ class CrossPowerEstimator(LeafSystem):
     Reference: Song 2011, 3.2, 4.3, eq. 9 to 17; the first two methods are ours.
     """
 
-    FACTS = BlockFacts(
-        "hearing",
-        "hearing",
-        columns={
-            "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
-            "detected": ("detected",),
-            "range_valid": ("range_valid",),
-            "ambiguous": ("ambiguous",),
-            "lost_microphone": ("lost_microphone",),
-        },
+    part, stage = "hearing", "hearing"
+    inputs = (
+        Port("audio", OBJECT, "AudioFrame"),
+        Port("listening", 1, "number, 0 nothing, 1 noise alone, 2 sound"),
     )
+    outputs = _PORTS
 
     def __init__(
         self,
         *,
-        parameters: CrossPowerParameters | None = None,
-        robot: RobotParameters | None = None,
-        acoustics: AcousticParameters | None = None,
-        microphones: MicArrayParameters | None = None,
+        parameters: CrossPowerParameters = CrossPowerParameters(),
+        robot: RobotParameters = RobotParameters(preset="song2011_hearing"),
+        acoustics: AcousticParameters = AcousticParameters(),
+        microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
-        self._microphones = microphones or MicArrayParameters()
-        self._listener = ArrayListener(
-            parameters or CrossPowerParameters(),
-            robot or RobotParameters(preset="song2011_hearing"),
-            (acoustics or AcousticParameters()).c,
-            self._microphones,
-        )
+        self._microphones = microphones
+        self._listener = ArrayListener(parameters, robot, acoustics.c, microphones)
         self.set_name("cross_power_estimator")
-        self._audio = self.DeclareAbstractInputPort(
-            name="audio", model_value=Value(object())
-        )
-        self._listening = self.DeclareVectorInputPort(name="listening", size=1)
-        for name, size in _PORTS:
-            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
+        self.declare_ports()
+        self._audio, self._listening = self._input_ports
         facts = self._listener.facts
+        self.DeclareDiscreteState(_SIZE)
         self.DeclareDiscreteState(1 + facts.channels * facts.samples)
         self.DeclareDiscreteState(self._listener.sums_size)
         self.DeclareDiscreteState(self._listener.sums_size)
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=self._microphones.frame_s, offset_sec=0.0, update=self._listen
+            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
         )
+        declare_state_outputs(self)
 
     def _blank(self) -> _Memory:
         listener, facts = self._listener, self._listener.facts
         none = listener.unpack(np.zeros(listener.sums_size))
         frame = np.zeros((facts.channels, facts.samples))
-        return _Memory(_NOTHING, frame, none, none, np.zeros(_OUTPUTS))
+        return _Memory(_NOTHING, frame, none, none, np.zeros(_SIZE))
 
     def hear(self, asked: int, audio: Any, memory: _Memory) -> _Memory:
-        """What a frame leaves behind, whatever context the block is in.
+        """The memory after a frame.
 
         Args:
             asked: What ``listening`` says.
@@ -416,7 +392,7 @@ class CrossPowerEstimator(LeafSystem):
         return audio.counts.astype(np.float64)
 
     def _estimate(self, sound: CrossPowers, noise: CrossPowers) -> NDArray[np.float64]:
-        outputs, listener = np.zeros(_OUTPUTS), self._listener
+        outputs, listener = np.zeros(_SIZE), self._listener
         if sound.frames > 0.0 and (lost := listener.lost(sound)):
             outputs[8] = 1.0 + lost[0]
         found = listener.direction(sound, noise)
@@ -432,7 +408,7 @@ class CrossPowerEstimator(LeafSystem):
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
         asked = round(float(read_arrays(context, [self._listening])[0][0]))
-        if asked == _NOTHING and not context.get_discrete_state(len(_PORTS)).value()[0]:
+        if asked == _NOTHING and not context.get_discrete_state(_FRAME).value()[0]:
             return  # without reading the sums, which are long
         memory = self._remembered(context)
 
@@ -442,33 +418,37 @@ class CrossPowerEstimator(LeafSystem):
         after = self.hear(asked, frame, memory)
         if after is memory:
             return
-        first = 0
-        for group, (_, size) in enumerate(_PORTS):
-            discrete_state.set_value(group, after.outputs[first : first + size])
-            first += size
-        groups = len(_PORTS)
+        discrete_state.set_value(_OUTPUTS, after.outputs)
         head = np.concatenate(([float(after.asked)], after.before.ravel()))
-        discrete_state.set_value(groups, head)
+        discrete_state.set_value(_FRAME, head)
         pairs = (after.noise, memory.noise), (after.sound, memory.sound)
-        for group, (sums, old) in enumerate(pairs, start=groups + 1):
+        for group, (sums, old) in enumerate(pairs, start=_SUMS):
             if sums is not old:
                 discrete_state.set_value(group, self._listener.pack(sums))
 
     def _remembered(self, context: Any) -> _Memory:
-        groups, facts = len(_PORTS), self._listener.facts
-        head = context.get_discrete_state(groups).value()
+        facts = self._listener.facts
+        head = context.get_discrete_state(_FRAME).value()
         noise, sound = (
-            self._listener.unpack(context.get_discrete_state(groups + k).CopyToVector())
-            for k in (1, 2)
+            self._listener.unpack(context.get_discrete_state(k).CopyToVector())
+            for k in (_SUMS, _SUMS + 1)
         )
-        outputs = np.concatenate(
-            [context.get_discrete_state(k).value() for k in range(groups)]
-        )
+        outputs = context.get_discrete_state(_OUTPUTS).CopyToVector()
         before = head[1:].reshape(facts.channels, facts.samples)
         return _Memory(round(float(head[0])), before, noise, sound, outputs)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop, ``Step``."""
+        """What the block does in each frame of a compiled loop.
+
+        Args:
+            run: Has the frames.
+
+        Returns:
+            The step, which calls Python.
+
+        Raises:
+            InputError: No block with a step publishes audio.
+        """
         audio, memory = audio_of_run(run), self._blank()
 
         def listen(tick: int, inputs: Any, outputs: Any) -> None:
@@ -477,4 +457,4 @@ class CrossPowerEstimator(LeafSystem):
             outputs[:] = memory.outputs
 
         period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, 1, _OUTPUTS, period)
+        return host_step(listen, 1, _SIZE, period)

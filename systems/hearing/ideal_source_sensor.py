@@ -3,23 +3,20 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 from numba.extending import register_jitable
-from numpy.typing import NDArray
 from pydrake.math import atan2
-from pydrake.systems.framework import LeafSystem_
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
-from systems.framework.finite import read_lists
+from systems.framework.block import Block_, Port, RunFacts, Step
 from systems.framework.input_error import InputError
 from systems.framework.noise import tick_generator
 from systems.framework.scalar_math import cos, sin
 from systems.framework.scalar_types import define_for_scalars
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import Step
 from systems.hearing.parameters import IdealHearingParameters
 from systems.sound.parameters import SoundParameters
 from systems.world.geometry import control_point, rotate, safe_norm
@@ -85,6 +82,21 @@ def stated_covariance(x: Any, y: Any, hearing: Any) -> Any:
     )
 
 
+class _PerFrame:
+    """A table by number of the measurement, each row computed when it is read.
+
+    Args:
+        row: Takes the number.
+    """
+
+    def __init__(self, row: Callable[[int], Any]) -> None:
+        self._row = row
+
+    def __getitem__(self, frame: int) -> Any:
+        """The row of a measurement."""
+        return self._row(frame)
+
+
 class IdealSourceNumbers(NamedTuple):
     """What the step of ``IdealSourceSensor`` depends on."""
 
@@ -93,23 +105,19 @@ class IdealSourceNumbers(NamedTuple):
     hearing: IdealHearingParameters
     frame_ticks: int
     """Ticks from one measurement to the next."""
-    sounds: NDArray[np.bool_]
-    """(n,) whether there is sound, by number of the measurement."""
-    noise: NDArray[np.float64]
-    """(n, 2) standard normal numbers likewise; (0, 2) without noise."""
+    sounds: Any
+    """Whether there is sound, by number of the measurement: ``_PerFrame`` or (n,)."""
+    noisy: bool
+    noise: Any
+    """Two standard normal numbers likewise: ``_PerFrame`` or (n, 2)."""
 
 
 def ideal_source_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """What is heard at one tick; see ``systems.framework.step_block.Step``.
+    """What is heard at one tick.
 
-    Args:
-        tick: Number of the tick.
-        state: x and y of p_PS_B, m, and whether anything is heard.
-        inputs: As the input ports.
-        outputs: Left as they are: they follow from the state.
-        numbers: ``IdealSourceNumbers``.
+    The state has x and y of p_PS_B, m, and whether anything is heard.
     """
     if tick % numbers.frame_ticks != 0:
         return
@@ -118,18 +126,20 @@ def ideal_source_step(
     hearing = numbers.hearing
     x, y = relative_position(pose_WB, pose_WS, numbers.control_point_m)
     heard = numbers.sounds[frame] and safe_norm(x, y) <= hearing.maximum_range_m
-    if len(numbers.noise) > 0:
+    if numbers.noisy:
         x, y = disturbed(x, y, numbers.noise[frame], hearing)
-    state[0], state[1], state[2] = 0.0, 0.0, 0.0
+    # Sums, as AutoDiffXd takes no float in its place.
+    nothing = 0.0 * state[2]
+    state[0], state[1], state[2] = nothing, nothing, nothing
     if heard:
-        state[0], state[1], state[2] = x, y, 1.0
+        state[0], state[1], state[2] = x, y, nothing + 1.0
 
 
 def _publish_ideal_source(state, outputs, numbers):
     """The outputs of ``ideal_source_step``'s state."""
     bearing, distance, p_PS_B, covariance, detected, range_valid = outputs
     x, y = state[0], state[1]
-    bearing[0], distance[0] = math.atan2(y, x), safe_norm(x, y)
+    bearing[0], distance[0] = atan2(y, x), safe_norm(x, y)
     p_PS_B[0], p_PS_B[1] = x, y
     stated = stated_covariance(x, y, numbers.hearing)
     for k in range(4):
@@ -139,24 +149,10 @@ def _publish_ideal_source(state, outputs, numbers):
 
 @define_for_scalars("IdealSourceSensor_", __name__)
 def IdealSourceSensor_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(Block_[T]):
         """Measures where the source is, exactly or with a set noise.
 
-        .. pydrake_system::
-
-            name: IdealSourceSensor
-            input_ports:
-            - pose_WB [m, m, rad]
-            - pose_WS [m, m, rad]
-            output_ports:
-            - source_bearing [rad]
-            - source_range [m]
-            - p_PS_B [m]
-            - covariance [m^2, of p_PS_B, row by row]
-            - detected [0 or 1]
-            - range_valid [0 or 1]
-
-        Stands in for ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator`` with
+        It replaces ``SoundEmitter``, ``MicArray`` and ``TDOAEstimator`` and has
         the outputs of the last. Discrete state, every frame: p_PS_B and detected.
         Latency one tick, like the estimator's, so that both builds have the
         same loop; unlike the estimator it tells front from back.
@@ -172,140 +168,84 @@ def IdealSourceSensor_(T):
             InputError: Noise is set in an AutoDiffXd system.
         """
 
-        FACTS = BlockFacts(
-            "hearing",
-            "hearing",
-            columns={
-                "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
-                "detected": ("detected",),
-                "range_valid": ("range_valid",),
-            },
-            states=("p_PS_B_x", "p_PS_B_y", "detected"),
+        part, stage = "hearing", "hearing"
+        inputs = (Port("pose_WB", 3, "m, m, rad"), Port("pose_WS", 3, "m, m, rad"))
+        outputs = (
+            Port("source_bearing", 1, "rad"),
+            Port("source_range", 1, "m"),
+            Port("p_PS_B", 2, "m", ("p_PS_B_x", "p_PS_B_y")),
+            Port("covariance", 4, "m^2, of p_PS_B, row by row"),
+            Port("detected", 1, "0 or 1", "detected"),
+            Port("range_valid", 1, "0 or 1", "range_valid"),
         )
+        states = ("p_PS_B_x", "p_PS_B_y", "detected")
 
         def _construct(
             self,
             *,
-            robot=None,
-            hearing=None,
-            sound=None,
-            frame_s=TICK_S,
-            seed=0,
-            converter=None,
-        ):
+            robot: RobotParameters = RobotParameters(),
+            hearing: IdealHearingParameters = IdealHearingParameters(),
+            sound: SoundParameters = SoundParameters(),
+            frame_s: float = TICK_S,
+            seed: int = 0,
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._config = {
-                "robot": robot or RobotParameters(),
-                "hearing": hearing or IdealHearingParameters(),
-                "sound": sound or SoundParameters(),
-                "frame_s": frame_s,
-                "seed": seed,
-            }
-            self._hearing = self._config["hearing"]
-            self._noisy = (
-                self._hearing.bearing_noise_deg > 0.0
-                or self._hearing.range_noise_fraction > 0.0
+            noisy = (
+                hearing.bearing_noise_deg > 0.0 or hearing.range_noise_fraction > 0.0
             )
-            if self._noisy and T is not float:
+            if noisy and T is not float:
                 raise InputError(
                     "IdealSourceSensor",
                     "noise is set, and noise has no derivative; "
                     "set bearing_noise_deg and range_noise_fraction to 0",
                 )
             self.set_name("ideal_source_sensor")
-            self._poses = [
-                self.DeclareVectorInputPort(name=name, size=3)
-                for name in ("pose_WB", "pose_WS")
-            ]
-            self._position = self.DeclareDiscreteState(2)
-            self._detected = self.DeclareDiscreteState(1)
-            self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=frame_s, offset_sec=0.0, update=self._measure
-            )
-            self._declare("source_bearing", 1, self._bearing)
-            self._declare("source_range", 1, self._range)
-            self.DeclareStateOutputPort("p_PS_B", self._position)
-            self._declare(
-                "covariance",
-                4,
-                self._covariance,
-                self.xd_ticket(),
-            )
-            self.DeclareStateOutputPort("detected", self._detected)
-            self.DeclareStateOutputPort("range_valid", self._detected)
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, **other._config, converter=converter)
-
-        def _declare(self, name, size, calc, ticket=None):
-            self.DeclareVectorOutputPort(
-                name=name,
-                size=size,
-                calc=calc,
-                prerequisites_of_calc={ticket or self.xd_ticket()},
-            )
-
-        def _state(self, context):
-            return context.get_discrete_state(self._position).CopyToVector().tolist()
-
-        def _sounds(self, time: float) -> bool:
-            return not self._hearing.burst_gaps or self._config["sound"].sounds(time)
-
-        def _measure(self, context, discrete_state):
-            x, y = relative_position(
-                *read_lists(context, self._poses),
-                self._config["robot"].control_point_m,
-            )
-            time = context.get_time()
-            time = time if T is float else time.value()
-            frame_s = self._config["frame_s"]
-            heard = self._sounds(time - frame_s / 2.0) and bool(
-                safe_norm(x, y) <= self._hearing.maximum_range_m
-            )
-            if self._noisy:
-                x, y = self._disturbed(x, y, round(time / frame_s))
-            if not heard:
-                x = y = T(0.0)
-            discrete_state.set_value(self._position, [x, y])
-            discrete_state.set_value(self._detected, [T(float(heard))])
-
-        def _disturbed(self, x, y, frame):
-            rng = tick_generator(self._config["seed"], frame)
-            return disturbed(x, y, rng.standard_normal(2).tolist(), self._hearing)
-
-        def step_for(self, run):
-            """What the block does in each tick of a compiled loop, ``Step``."""
-            frame_s, seed = self._config["frame_s"], run.seed_of(self.get_name())
-            frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
-            sounds = np.ones(len(frames), dtype=bool)
-            if self._hearing.burst_gaps:
-                sounds = self._config["sound"].sounds((frames - 0.5) * frame_s)
-            noise = np.empty((0, 2))
-            if self._noisy:
-                generators = [tick_generator(seed, k) for k in frames.tolist()]
-                noise = np.array([rng.standard_normal(2) for rng in generators])
+            self._sound, self._frame_s = sound, frame_s
             numbers = IdealSourceNumbers(
-                self._config["robot"].control_point_m,
-                self._hearing,
-                round(frame_s / run.tick_s),
-                sounds,
-                noise,
+                robot.control_point_m,
+                hearing,
+                1,
+                _PerFrame(self._sounds),
+                noisy,
+                _noise(seed),
             )
-            return Step(ideal_source_step, numbers, [0.0] * 3, _publish_ideal_source)
+            state = [0.0] * len(self.states)
+            step = Step(ideal_source_step, numbers, state, _publish_ideal_source)
+            self.declare(step, tick_s=frame_s)
 
-        def _bearing(self, context, output):
-            x, y = self._state(context)
-            output.SetFromVector([atan2(y, x)])
+        def _sounds(self, frame: Any) -> Any:
+            """Whether there is sound in the middle of the frame before a measurement.
 
-        def _range(self, context, output):
-            x, y = self._state(context)
-            output.SetFromVector([safe_norm(x, y)])
+            Args:
+                frame: Number of the measurement, or an array of numbers.
+            """
+            sounds = self._sound.sounds((frame - 0.5) * self._frame_s)
+            return sounds | (not self.step.numbers.hearing.burst_gaps)
 
-        def _covariance(self, context, output):
-            x, y = self._state(context)
-            output.SetFromVector(stated_covariance(x, y, self._hearing))
+        def step_for(self, run: RunFacts) -> Step:
+            """The step, with tables for all measurements of the run."""
+            step, frame_s = self.step, self._frame_s
+            frames = np.arange(math.ceil((run.ticks + 1) * run.tick_s / frame_s) + 1)
+            noise = np.empty((0, 2))
+            if step.numbers.noisy:
+                rows = _noise(run.seed_of(self.get_name()))
+                noise = np.array([rows[frame] for frame in frames.tolist()])
+            numbers = step.numbers._replace(
+                frame_ticks=round(frame_s / run.tick_s),
+                sounds=self._sounds(frames),
+                noise=noise,
+            )
+            return step._replace(numbers=numbers)
 
     return Impl
+
+
+def _noise(seed: int) -> _PerFrame:
+    """Two standard normal numbers for each measurement."""
+    return _PerFrame(
+        lambda frame: tick_generator(seed, frame).standard_normal(2).tolist()
+    )
 
 
 IdealSourceSensor = IdealSourceSensor_[None]

@@ -7,16 +7,18 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
 from systems.base.robot import RobotParameters
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.finite import read_arrays
 from systems.framework.host_step import host_step
 from systems.framework.signals import AudioFrame
-from systems.framework.step_block import RunFacts, Step
-from systems.hearing.audio_port import audio_of_run, check_rate, read_audio
+from systems.hearing.audio_port import (
+    audio_of_run,
+    check_rate,
+    declare_state_outputs,
+    read_audio,
+)
 from systems.hearing.localise import HearingMemory, Localiser
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
@@ -31,7 +33,7 @@ def robot_localiser(
     parameters: TDOAParameters,
     robot: RobotParameters,
     acoustics: AcousticParameters,
-    microphones: MicArrayParameters | None = None,
+    microphones: MicArrayParameters = MicArrayParameters(),
 ) -> tuple[Localiser, NDArray[np.float64]]:
     """The localiser of the robot's own microphones.
 
@@ -45,7 +47,6 @@ def robot_localiser(
         The localiser, and (2,) the microphones' centroid from P in B axes, m.
     """
     shape = ArrayShape.of(robot.microphones_m)
-    microphones = microphones or MicArrayParameters()
     localiser = Localiser(
         parameters,
         shape,
@@ -104,24 +105,22 @@ def may_sound(
     return phase > 0.0 and since_burst < open_for
 
 
-class TDOAEstimator(LeafSystem):
+#: Input ports for ``choose: followed``.
+_BELIEF = (
+    Port("p_WS_estimated", 2, "m"),
+    Port("covariance_W", 4, "m^2"),
+    Port("age", 1, "s"),
+    Port("pose_WB_estimated", 3, "m, m, rad"),
+)
+# Groups of the discrete state: the outputs one after the other, and memories.
+_OUTPUTS, _MEMORY, _ECHOES, _CHOICE = range(4)
+
+
+class TDOAEstimator(Block):
     """Hears where the source is.
 
-    .. pydrake_system::
-
-        name: TDOAEstimator
-        input_ports:
-        - audio [AudioFrame]
-        output_ports:
-        - source_bearing [rad]
-        - source_range [m]
-        - p_PS_B [m, m]
-        - covariance [m^2]
-        - detected [0 or 1]
-        - range_valid [0 or 1]
-
-    ``systems.hearing.localise`` tells where the sound of a frame comes from: delays of
-    all pairs of channels, a place that explains them, and its errors. Range and
+    ``systems.hearing.localise`` computes where the sound of a frame comes from: delays
+    of all pairs of channels, a place that explains them, and its errors. Range and
     bearing count from the microphones' centroid, for the default row M2 = P;
     p_PS_B from P. Microphones in a row cannot tell front from back: the source
     is reported in the front half plane. Where nothing is heard all outputs are
@@ -136,8 +135,8 @@ class TDOAEstimator(LeafSystem):
     publish: p_WS_estimated [m], covariance_W [m^2], age [s] and pose_WB_estimated [m,
     m, rad]. They act on the state alone: no algebraic loop.
 
-    State: the outputs, one group a port, what ``HearingMemory`` holds, and with
-    ``choose: followed`` what ``ChoiceMemory`` does.
+    State: the outputs, ``HearingMemory``, and with ``choose: followed``
+    ``ChoiceMemory``.
     Rate and latency: updated every ``frame_s`` of the microphones, 25 ms, from the
     frame that ends then, and visible after it: one tick, the time that a processor
     takes.
@@ -155,58 +154,51 @@ class TDOAEstimator(LeafSystem):
     Reference: Han 2019, 2.2-2.3; Kim 2017, eq. 3-8.
     """
 
-    FACTS = BlockFacts(
-        "hearing",
-        "hearing",
-        columns={
-            "p_PS_B": ("p_PS_B_x", "p_PS_B_y"),
-            "detected": ("detected",),
-            "range_valid": ("range_valid",),
-        },
+    part, stage = "hearing", "hearing"
+    inputs = (Port("audio", OBJECT, "AudioFrame"),)
+    outputs = (
+        Port("source_bearing", 1, "rad"),
+        Port("source_range", 1, "m"),
+        Port("p_PS_B", 2, "m, m", ("p_PS_B_x", "p_PS_B_y")),
+        Port("covariance", 4, "m^2"),
+        Port("detected", 1, "0 or 1", "detected"),
+        Port("range_valid", 1, "0 or 1", "range_valid"),
     )
 
     def __init__(
         self,
         *,
-        parameters: TDOAParameters | None = None,
-        robot: RobotParameters | None = None,
-        acoustics: AcousticParameters | None = None,
-        sound: SoundParameters | None = None,
-        microphones: MicArrayParameters | None = None,
+        parameters: TDOAParameters = TDOAParameters(),
+        robot: RobotParameters = RobotParameters(),
+        acoustics: AcousticParameters = AcousticParameters(),
+        sound: SoundParameters = SoundParameters(),
+        microphones: MicArrayParameters = MicArrayParameters(),
     ) -> None:
         super().__init__()
-        self._microphones = microphones or MicArrayParameters()
-        parameters, robot = parameters or TDOAParameters(), robot or RobotParameters()
-        acoustics = acoustics or AcousticParameters()
-        self._schedule = None
-        if parameters.schedule_known:
-            self._schedule = sound or SoundParameters()
+        self._microphones = microphones
+        self._schedule = sound if parameters.schedule_known else None
         self._longest_way_s = MAXIMUM_RANGE_M / acoustics.c
         self._localiser, self._p_PA_B = robot_localiser(
-            parameters, robot, acoustics, self._microphones
+            parameters, robot, acoustics, microphones
         )
         self.set_name("tdoa_estimator")
-        self._audio = self.DeclareAbstractInputPort(
-            name="audio", model_value=Value(object())
-        )
-        self._choice, self._belief = None, []
+        self._choice = None
         if parameters.choose == "followed":
             self._choice = robot_choice(
-                self._localiser, robot, self._p_PA_B, self._microphones.frame_s
+                self._localiser, robot, self._p_PA_B, microphones.frame_s
             )
-            self._belief = [
-                self.DeclareVectorInputPort(name=name, size=size)
-                for name, size in _BELIEF
-            ]
-        for name, size in _PORTS:
-            self.DeclareStateOutputPort(name, self.DeclareDiscreteState(size))
+            self.inputs = (*self.inputs, *_BELIEF)
+        self.declare_ports()
+        self._audio, *self._belief = self._input_ports
+        self.DeclareDiscreteState(sum(self._output_sizes))
         self.DeclareDiscreteState(5)
         self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         if self._choice is not None:
             self.DeclareDiscreteState(self._choice.blank().pack().tolist())
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=self._microphones.frame_s, offset_sec=0.0, update=self._listen
+            period_sec=microphones.frame_s, offset_sec=0.0, update=self._listen
         )
+        declare_state_outputs(self)
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
         audio = read_audio(context, self._audio, "TDOAEstimator")
@@ -225,8 +217,8 @@ class TDOAEstimator(LeafSystem):
             discrete_state.set_value(_CHOICE, chosen.pack())
         if fix is None and not located:
             return  # silence goes on, and the outputs are zero already
-        for group, values in enumerate(port_values(fix, self._p_PA_B)):
-            discrete_state.set_value(group, values)
+        values = np.concatenate(port_values(fix, self._p_PA_B))
+        discrete_state.set_value(_OUTPUTS, values)
 
     def hear(
         self,
@@ -234,7 +226,7 @@ class TDOAEstimator(LeafSystem):
         memory: HearingMemory,
         choice: tuple[ChoiceMemory, Belief] | None = None,
     ) -> tuple[SourceFix | None, HearingMemory, ChoiceMemory | None]:
-        """Where the sound of a frame comes from, whatever context the block is in.
+        """Where the sound of a frame comes from.
 
         Args:
             audio: The frame.
@@ -262,7 +254,17 @@ class TDOAEstimator(LeafSystem):
         return None if best is None else found[best].fix, after, chosen
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop, ``Step``."""
+        """What the block does in each frame of a compiled loop.
+
+        Args:
+            run: Has the frames.
+
+        Returns:
+            The step, which calls Python.
+
+        Raises:
+            InputError: No block with a step publishes audio.
+        """
         audio = audio_of_run(run)
         memory, located = self._localiser.blank(), False
         chosen = None if self._choice is None else self._choice.blank()
@@ -278,9 +280,8 @@ class TDOAEstimator(LeafSystem):
             located = fix is not None
 
         inputs = sum(port.size() for port in self._belief)
-        size = sum(size for _, size in _PORTS)
         period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, inputs, size, period)
+        return host_step(listen, inputs, sum(self._output_sizes), period)
 
     def _remembered(self, context: Any) -> tuple[HearingMemory, bool]:
         """What the last frame left, and whether it held a place."""
@@ -293,30 +294,8 @@ class TDOAEstimator(LeafSystem):
         return HearingMemory(energy, noise_energy, echoes, bool(heard)), bool(located)
 
 
-#: Output ports and their sizes.
-_PORTS = (
-    ("source_bearing", 1),
-    ("source_range", 1),
-    ("p_PS_B", 2),
-    ("covariance", 4),
-    ("detected", 1),
-    ("range_valid", 1),
-)
-
-#: Input ports for ``choose: followed``, and their sizes.
-_BELIEF = (
-    ("p_WS_estimated", 2),
-    ("covariance_W", 4),
-    ("age", 1),
-    ("pose_WB_estimated", 3),
-)
-
-# Groups of the discrete state after those of the ports.
-_MEMORY, _ECHOES, _CHOICE = range(len(_PORTS), len(_PORTS) + 3)
-
-
 def _belief(values: NDArray[np.float64]) -> Belief:
-    """From what the ports of ``_BELIEF`` carry, one after the other."""
+    """From the values of the ports ``_BELIEF``, one after the other."""
     return Belief(
         values[:2].copy(),
         values[2:6].reshape(2, 2).copy(),
@@ -326,7 +305,7 @@ def _belief(values: NDArray[np.float64]) -> Belief:
 
 
 #: Values of the output ports where nothing is heard.
-_NOTHING = tuple(np.zeros(size) for _, size in _PORTS)
+_NOTHING = tuple(np.zeros(port.elements({})) for port in TDOAEstimator.outputs)
 
 
 def port_values(

@@ -7,11 +7,10 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-from pydrake.common.value import Value
-from pydrake.systems.framework import BasicVector, LeafSystem
+from pydrake.systems.framework import BasicVector
 
 from systems.base.robot import RobotParameters, microphones_B
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import OBJECT, Block, Port, RunFacts, Step
 from systems.framework.cache import declare_cache
 from systems.framework.finite import check_finite, check_record, read_arrays
 from systems.framework.host_step import host_step
@@ -20,7 +19,6 @@ from systems.framework.signals import (
     AudioFrame,
     Emission,
 )
-from systems.framework.step_block import RunFacts, Step
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_tolerances import (
     RealArray,
@@ -51,18 +49,8 @@ def microphone_reach(
     return max(MAXIMUM_RANGE_M, room_images(room, c).length / SAMPLE_RATE_HZ * c)
 
 
-class MicArray(LeafSystem):
+class MicArray(Block):
     """Records the sound at the robot's microphones.
-
-    .. pydrake_system::
-
-        name: MicArray
-        input_ports:
-        - emission [Emission]
-        - pose_WB [m, m, rad]
-        - velocity_WB [m/s, m/s, rad/s]
-        output_ports:
-        - audio [AudioFrame]
 
     A frame published at t covers [t - frame_s, t), 25 ms. Within a frame the robot
     follows a cubic Hermite polynomial; sound travels as in
@@ -101,60 +89,54 @@ class MicArray(LeafSystem):
             cannot be, or the file of the ego noise cannot be used.
     """
 
-    FACTS = BlockFacts("microphones", "hearing")
+    part, stage = "microphones", "hearing"
+    inputs = (
+        Port("emission", OBJECT, "Emission"),
+        Port("pose_WB", 3, "m, m, rad"),
+        Port("velocity_WB", 3, "m/s, m/s, rad/s"),
+    )
+    outputs = (Port("audio", OBJECT, "AudioFrame"),)
     POSITION_ERRORS, CHANNEL_DELAYS, GAINS, SOUND_SPEED = range(4)
 
     def __init__(
         self,
         *,
-        parameters: MicArrayParameters | None = None,
-        robot: RobotParameters | None = None,
-        acoustics: AcousticParameters | None = None,
+        parameters: MicArrayParameters = MicArrayParameters(),
+        robot: RobotParameters = RobotParameters(),
+        acoustics: AcousticParameters = AcousticParameters(),
         room: RoomParameters | None = None,
         others: Sequence[str] = (),
         seed: int = 0,
     ) -> None:
         super().__init__()
-        self._parameters = parameters or MicArrayParameters()
-        self._robot = robot or RobotParameters()
+        self._parameters, self._robot = parameters, robot
         self.set_name("mic_array")
-        c = (acoustics or AcousticParameters()).c
         # Refuses a bad skew before anything runs.
         self._recorder = Recorder(
-            self._parameters,
-            self._robot,
-            c,
+            parameters,
+            robot,
+            acoustics.c,
             room=room,
             sources=1 + len(others),
             seed=seed,
         )
-        self._declare_errors(c)
-        self._sources = [
-            self.DeclareAbstractInputPort(name=name, model_value=Value(object()))
-            for name in ("emission", *(f"emission_{name}" for name in others))
-        ]
-        self._motion = [
-            self.DeclareVectorInputPort(name=name, size=3)
-            for name in ("pose_WB", "velocity_WB")
-        ]
+        self._declare_errors(acoustics.c)
+        followed, *motion = self.inputs
+        further = [followed._replace(name=f"emission_{name}") for name in others]
+        self.inputs = (followed, *further, *motion)
+        self.declare_ports()
+        *self._sources, pose, velocity = self._input_ports
+        self._motion = [pose, velocity]
         group: Any
         for group in self._recorder.blank:
             if group is not None:
                 self.DeclareDiscreteState(group)
         self.DeclarePeriodicDiscreteUpdateEvent(
-            period_sec=self._parameters.frame_s, offset_sec=0.0, update=self._remember
+            period_sec=parameters.frame_s, offset_sec=0.0, update=self._remember
         )
-        self.DeclareAbstractOutputPort(
-            name="audio",
-            alloc=lambda: Value(object()),
-            calc=self._record,
-            prerequisites_of_calc={
-                self.time_ticket(),
-                self.xd_ticket(),
-                self._array.ticket(),
-                *(port.ticket() for port in (*self._sources, *self._motion)),
-            },
-        )
+        sources = {port.ticket() for port in self._input_ports}
+        sources |= {self.time_ticket(), self.xd_ticket(), self._array.ticket()}
+        self.declare_output("audio", self._record, sources)
 
     def _declare_errors(self, c: float) -> None:
         drawn = self._recorder.tolerances
@@ -224,7 +206,14 @@ class MicArray(LeafSystem):
         output.set_value(frame)
 
     def step_for(self, run: RunFacts) -> Step:
-        """What the block does in each frame of a compiled loop, ``Step``."""
+        """What the block does in each frame of a compiled loop.
+
+        Args:
+            run: Has the emissions.
+
+        Returns:
+            The step; it carries the audio, which is made when a block asks for it.
+        """
         recorder = self._recorder.of_seed(run.seed_of(self.get_name()))
         emitted = [run.carried[port.get_name()] for port in self._sources]
         memory = before = recorder.blank
@@ -240,10 +229,10 @@ class MicArray(LeafSystem):
 
         @lru_cache(maxsize=1)
         def audio(tick: int) -> AudioFrame:
-            """Made when it is asked for, once: not everybody listens all the time."""
+            """The frame that ends at a tick, computed once, when it is asked for."""
             emissions = [emission(tick) for emission in emitted]
             time = tick * run.tick_s
             return recorder.record(emissions, time, now, before, recorder.array)
 
-        run.carried["audio"] = audio
-        return host_step(remember, 6, 0, round(self._parameters.frame_s / run.tick_s))
+        period = round(self._parameters.frame_s / run.tick_s)
+        return host_step(remember, 6, 0, period)._replace(carries={"audio": audio})

@@ -1,4 +1,4 @@
-"""The loudspeaker on the master robot."""
+"""The loudspeaker on the leader."""
 
 from __future__ import annotations
 
@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common.value import Value
-from pydrake.systems.framework import LeafSystem
 
-from systems.framework.block_facts import BlockFacts
+from systems.framework.block import OBJECT, Block, Port
 from systems.framework.finite import check_finite, read_arrays
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission, read_only
 from systems.sound.acoustics import AcousticParameters
@@ -192,24 +190,17 @@ def history_ticks(
     return math.ceil((frame_s + maximum_range_m / c) / tick_s) + 1
 
 
-class SoundEmitter(LeafSystem):
+class SoundEmitter(Block):
     """Plays the sound from where the source is.
-
-    .. pydrake_system::
-
-        name: SoundEmitter
-        input_ports:
-        - pose_WS [m, m, rad]
-        - v_WS [m/s, m/s, rad/s]
-        output_ports:
-        - emission [Emission]
 
     Discrete state, every tick: position and velocity of the source at the last
     ticks, as far back as sound from the maximum range was emitted; before
     time zero the source rests where it starts. The output is a function of
-    time, state and present input: no latency. Before time zero it is silent. One that
-    is ``called`` remembers when it was first called, too: from that tick on it plays,
-    its schedule counted from there; it has an input port ``calling`` (0 or 1).
+    time, state and present input: no latency. Before time zero it is silent.
+
+    With ``called`` the block has a further input port ``calling`` (0 or 1). It
+    remembers when this port was first 1 and plays from that tick on; its schedule
+    counts from there.
 
     Args:
         sound: What to play.
@@ -226,13 +217,18 @@ class SoundEmitter(LeafSystem):
     Reference: Han 2019, section 4.1.
     """
 
-    FACTS = BlockFacts("emitter", "hearing")
+    part, stage = "emitter", "hearing"
+    inputs = (
+        Port("pose_WS", 3, "m, m, rad"),
+        Port("v_WS", 3, "m/s, m/s, rad/s"),
+    )
+    outputs = (Port("emission", OBJECT, "Emission"),)
 
     def __init__(
         self,
         *,
-        sound: SoundParameters | None = None,
-        acoustics: AcousticParameters | None = None,
+        sound: SoundParameters = SoundParameters(),
+        acoustics: AcousticParameters = AcousticParameters(),
         maximum_range_m: float = MAXIMUM_RANGE_M,
         frame_s: float = TICK_S,
         seed: int = 0,
@@ -240,50 +236,40 @@ class SoundEmitter(LeafSystem):
         called: bool = False,
     ) -> None:
         super().__init__()
-        self._sound = sound or SoundParameters()
-        self._waveform = make_waveform(self._sound, seed)
+        self._sound = sound
+        self._waveform = make_waveform(sound, seed)
         check_finite("SoundEmitter: maximum_range_m", maximum_range_m)
-        c = (acoustics or AcousticParameters()).c
         self._tick_s = tick_s
-        self._ticks = history_ticks(maximum_range_m, c, frame_s, tick_s)
+        self._ticks = history_ticks(maximum_range_m, acoustics.c, frame_s, tick_s)
         self.set_name("sound_emitter")
-        self._inputs = [
-            self.DeclareVectorInputPort(name=name, size=3)
-            for name in ("pose_WS", "v_WS")
-        ]
-        self._calling: Any = None
+        if called:
+            self.inputs = (*self.inputs, Port("calling", 1, "0 or 1"))
+        self.declare_ports()
+        self._motion, self._calling = self._input_ports[:2], self._input_ports[2:]
         self.DeclareDiscreteState(4 * self._ticks)
         if called:
-            self._calling = self.DeclareVectorInputPort(name="calling", size=1)
             never: Any = np.array([-1.0])  # untyped: Drake's stubs take ndarray amiss
             self.DeclareDiscreteState(never)
         self.DeclareInitializationDiscreteUpdateEvent(update=self._start)
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=tick_s, offset_sec=0.0, update=self._remember
         )
-        self._emission: Any = self.DeclareAbstractOutputPort(
-            name="emission",
-            alloc=lambda: Value(object()),
-            calc=self._emit,
-            prerequisites_of_calc={
-                *(port.ticket() for port in self._inputs),
-                self.xd_ticket(),
-                self.time_ticket(),
-            },
-        )
+        sources = {port.ticket() for port in self._motion}
+        sources |= {self.xd_ticket(), self.time_ticket()}
+        self._emission = self.declare_output("emission", self._emit, sources)
 
     def _start(self, context: Any, discrete_state: Any) -> None:
         path = np.zeros((2, self._ticks, 2))
-        path[0] = read_arrays(context, self._inputs)[0][:2]
+        path[0] = read_arrays(context, self._motion)[0][:2]
         discrete_state.set_value(0, path.ravel())
 
     def _remember(self, context: Any, discrete_state: Any) -> None:
         emission = self._emission.Eval(context)
         path = np.concatenate((emission.p_WS[1:], emission.v_WS[1:]))
         discrete_state.set_value(0, path.ravel())
-        if self._calling is None or self._on_since(context) is not None:
+        if not self._calling or self._on_since(context) is not None:
             return
-        if self._calling.Eval(context)[0] > 0.5:
+        if self._calling[0].Eval(context)[0] > 0.5:
             discrete_state.set_value(1, np.array([context.get_time()]))
 
     def _on_since(self, context: Any) -> float | None:
@@ -293,11 +279,11 @@ class SoundEmitter(LeafSystem):
 
     def _emit(self, context: Any, output: Any) -> None:
         held, split = context.get_discrete_state(0).value(), 2 * self._ticks
-        pose_WS, velocity = read_arrays(context, self._inputs)
+        pose_WS, velocity = read_arrays(context, self._motion)
         p_WS = np.concatenate((held[:split], pose_WS[:2])).reshape(-1, 2)
         v_WS = np.concatenate((held[split:], velocity[:2])).reshape(-1, 2)
         time, sound = context.get_time(), self._sound
-        if self._calling is not None:
+        if self._calling:
             sound = called_sound(sound, self._on_since(context))
         output.set_value(
             make_emission(time, self._waveform, sound, p_WS, v_WS, self._tick_s)

@@ -100,6 +100,7 @@ def _tracker(scenario: Scenario) -> Any:
         tracker=tracker,
         measurement_age_s=age,
         frame_s=frame,
+        initial_pose=scenario.start.pose,
         tick_s=tick,
     )
 

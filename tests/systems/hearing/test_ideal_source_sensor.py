@@ -110,8 +110,7 @@ def test_noise_has_the_covariance_that_the_block_gives(bench):
     expected += np.outer(across, across) * across_std**2
     np.testing.assert_allclose(measured, expected, atol=0.15 * along_std**2)
 
-    at.context.SetDiscreteState(0, [2.0, 1.0])
-    at.context.SetDiscreteState(1, [1.0])
+    at.context.SetDiscreteState(0, [2.0, 1.0, 1.0])
     np.testing.assert_allclose(at.output("covariance"), expected.ravel())
     np.testing.assert_allclose(np.mean(samples, axis=0), [2.0, 1.0], atol=0.01)
 

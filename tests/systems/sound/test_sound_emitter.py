@@ -27,7 +27,7 @@ pytestmark = pytest.mark.drake
 FS = 100_000
 
 
-def emission_at(times, *, sound=None, source=None, maximum_range_m=30.0):
+def emission_at(times, *, sound=SoundParameters(), source=None, maximum_range_m=30.0):
     """Emissions of a moving source at ticks of a simulation."""
     builder = DiagramBuilder()
     robot = builder.AddSystem(SourceRobot(source=source or SourceRobotParameters()))

@@ -13,10 +13,10 @@ from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TrackerParameters
 from systems.hearing.tracking.source_tracker import SourceTracker
 from systems.hearing.tracking.tracker_model import (
-    Measurement,
-    Track,
-    TrackerModel,
+    blank_track,
     past_pose,
+    track_step,
+    tracker_numbers,
 )
 
 pytestmark = pytest.mark.drake
@@ -47,10 +47,28 @@ def plain(**changes):
 
 def track_state(tracker, pose_1, pose_2=None, *, robot=None):
     """State of a tracker that has heard nothing, with both past poses."""
-    model = TrackerModel(tracker, robot or RobotParameters(), 0.025)
-    track = model.start(pose_1)
-    past_poses = np.array([pose_1, pose_2 or pose_1])
-    return track._replace(past_poses=past_poses).pack()
+    numbers = tracker_numbers(tracker, robot or RobotParameters(), 0.025)
+    state = blank_track(numbers, pose_1)
+    state[3:6] = pose_2 or pose_1
+    return state
+
+
+class Steps:
+    """Does one step after the other; the estimates have a range."""
+
+    def __init__(self, tracker, robot, age, pose):
+        self.numbers = tracker_numbers(tracker, robot, age)
+        self.state, self.ticks = blank_track(self.numbers, pose), 0
+
+    def step(self, pose, p_PS_B=None, covariance=(0.0,) * 4):
+        """Target after an estimate, or after none."""
+        flag = np.ones(1) * (p_PS_B is not None)
+        estimate = np.zeros(2) if p_PS_B is None else np.array(p_PS_B)
+        inputs = estimate, np.array(covariance), flag, flag, np.array(pose)
+        outputs = tuple(map(np.zeros, (2, 2, 4, 1, 1)))
+        track_step(self.ticks, self.state, inputs, outputs, self.numbers)
+        self.ticks += 1
+        return outputs[0]
 
 
 def make_bench(bench, tracker=PLAIN, *, pose=NORTH, heard=True, state=None, age=0.025):
@@ -106,7 +124,7 @@ def test_an_estimate_belongs_to_the_pose_of_its_moment(bench):
 )
 def test_past_pose_lies_on_a_line_between_ticks(ticks, x):
     poses = np.outer([4.0, 3.0, 1.0, -1.0], [1.0, 0.0, 0.1])
-    pose = past_pose(poses, ticks)
+    pose = past_pose(poses[0], poses[1:].ravel(), ticks)
     assert pose == pytest.approx([x, 0.0, x / 10])
 
 
@@ -232,18 +250,17 @@ def test_a_bearing_moves_the_target_across_itself(bench):
 @given(st.lists(st.floats(-0.02, 0.02), min_size=1, max_size=8))
 def test_exact_estimates_are_the_target(steps):
     """With no covariance the output is the last estimate, to rounding."""
-    model = TrackerModel(PLAIN, RobotParameters(), 0.025)
-    track, x = model.start([0.0, 0.0, 0.3]), 2.0
+    before, x = [0.0, 0.0, 0.3], 2.0
+    tracker = Steps(PLAIN, RobotParameters(), 0.025, before)
     for step in steps:
         x += step
-        pose = np.array([step, x - 2.0, 0.3 + step])
-        estimate = Measurement(np.array([x, 1.0]), np.zeros(4), ranged=True)
-        track = model.hear(track, estimate, pose)
-        a, b, theta = past_pose(np.vstack((pose, track.past_poses)), 1.0)
+        pose = [step, x - 2.0, 0.3 + step]
+        target = tracker.step(pose, [x, 1.0])
+        a, b, theta = before
         c, s = math.cos(theta), math.sin(theta)
         expected = [a + c * (x + 0.175) - s, b + s * (x + 0.175) + c]
-        np.testing.assert_allclose(model.position(track, pose), expected, atol=1e-13)
-        track = model.older(track, pose)
+        np.testing.assert_allclose(target, expected, atol=1e-13)
+        before = pose
 
 
 def test_exact_estimates_have_the_derivative_of_the_target(bench):
@@ -316,7 +333,7 @@ def test_without_a_question_every_source_is_where_it_is_heard(bench, tracker):
     robot = RobotParameters(microphones_m=triangle)
     block = SourceTracker(robot=robot, tracker=tracker)
     sizes = {
-        len(Track.unpack(track_state(t, [0.0] * 3, robot=r), 2).memory)
+        len(track_state(t, [0.0] * 3, robot=r))
         for t, r in ((tracker, robot), (PLAIN, RobotParameters()))
     }
     assert len(sizes) == 1, "one hypothesis each"
@@ -332,16 +349,14 @@ def test_a_measurement_cannot_be_older_than_two_seconds():
 
 def warm_memory(tracker, robot):
     """A memory with tracks, velocities, costs and one doubtful frame."""
-    model = TrackerModel(tracker, robot, 0.0375)
-    track = model.start([0.05, 0.1, 0.25])
+    steps = Steps(tracker, robot, 0.0375, [0.05, 0.1, 0.25])
     rng = np.random.default_rng(5)
     for k in range(12):
         pose = [0.05 + 0.004 * k, 0.1 + 0.008 * k, 0.25 + 0.01 * k]
         x, y = rng.normal([1.7, 0.6], 0.01) if k != 11 else (3.4, 0.6)
-        covariance = np.array([1e-4, 2e-5, 2e-5, 2e-4])
-        estimate = Measurement(np.array([x, y]), covariance, ranged=True)
-        track = model.older(model.hear(track, estimate, pose), pose)
-    return model.older(track, pose).pack()
+        steps.step(pose, [x, y], [1e-4, 2e-5, 2e-5, 2e-4])
+    steps.step(pose)
+    return steps.state
 
 
 @pytest.mark.parametrize("hold", HOLDS)
