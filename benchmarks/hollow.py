@@ -21,18 +21,16 @@ from pydrake.systems.primitives import LogVectorOutput, Multiplexer
 
 from diagrams import SoundFollower
 from diagrams.building.robot import connect_by_name
-from systems.framework.block_facts import block_facts
+from systems.framework.block import part_of
 
 
 class _Hollow(LeafSystem):
     """A block with the ports, states and events of another, and nothing else."""
 
-    FACTS: Any = None
-
     def __init__(self, block: Any) -> None:
         super().__init__()
         self.set_name(block.get_name())
-        self.FACTS = block_facts(block)
+        self.part, self.columns = part_of(block), getattr(block, "columns", {})
         self._inputs = [
             self._input(block.get_input_port(k)) for k in range(block.num_input_ports())
         ]

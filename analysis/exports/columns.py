@@ -1,6 +1,6 @@
 """What each column of a run's table means, and its unit.
 
-Blocks name their columns in ``FACTS``; units are those of their port tables, and
+Blocks name the columns of their output ports; units are those of their port tables, and
 ``tests/analysis/exports/test_columns.py`` holds both against this list.
 """
 

@@ -34,7 +34,6 @@ from diagrams.building.robot import parts_of
 from diagrams.running.simulation import simulator_config
 from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.scenario import Scenario
-from systems.framework.block_facts import block_facts
 from systems.framework.input_error import InputError
 
 #: The tracker's slowest mode decays as 0.27 a tick where hearing is exact.
@@ -167,7 +166,7 @@ class IdealLoop:
         discrete: list[str] = []
         for part, block in self.follower.only.blocks.items():
             own = block.GetMyContextFromRoot(context)
-            size, names = own.num_total_states(), block_facts(block).states
+            size, names = own.num_total_states(), getattr(block, "states", ())
             if len(names) != size:
                 names = tuple(f"state_{k}" for k in range(size))
             kind = continuous if own.num_continuous_states() else discrete

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from diagrams import RunResult, Scenario
 from diagrams.scenario.own_code import import_own
-from systems.framework.step_block import RunFacts
+from systems.framework.block import RunFacts
 from systems.safety.free_space import FIRST_I, FIRST_J, ROLLED, FreeSpace
 from systems.safety.free_space_map import FreeSpaceMap
 

@@ -19,7 +19,7 @@ from systems import DiffDrivePlant
 from systems.base.parameters import OdometryParameters
 from systems.base.wheel_odometry import WheelOdometry_
 from systems.base.wheel_speed_command import WheelCommand_
-from systems.framework.block_facts import block_facts
+from systems.framework.block import Block
 from systems.framework.input_error import InputError
 from systems.laws.catalogue import LAWS
 from systems.laws.trajectory.parameters import TrajectoryImpedanceParameters
@@ -267,10 +267,9 @@ def _blocks(scenario: Scenario, point: RoutePoint) -> tuple[LinearModel, ...]:
     return (*named, _seen_wall(scenario, point))
 
 
-def _named(block: object, model: LinearModel) -> LinearModel:
-    facts = block_facts(block)
-    states = tuple(f"{facts.part}.{name}" for name in facts.states)
-    return replace(model, name=facts.part, state_names=states if len(model.A) else ())
+def _named(block: Block, model: LinearModel) -> LinearModel:
+    states = tuple(f"{block.part}.{name}" for name in block.states)
+    return replace(model, name=block.part, state_names=states if len(model.A) else ())
 
 
 def _push(own: TrajectoryImpedanceParameters, distance_m: float) -> float:

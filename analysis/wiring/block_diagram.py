@@ -16,7 +16,7 @@ from typing import Any
 from pydrake.systems.framework import Diagram
 
 from analysis.wiring.wires import Wire, blocks, wires
-from systems.framework.block_facts import STAGES, Stage, block_facts
+from systems.framework.block import STAGES, Stage, part_of
 
 #: Fill of the stages' blocks.
 FILLS: dict[Stage, str] = {
@@ -145,8 +145,7 @@ def _class_name(block: Any) -> str:
 
 
 def _box(block: Any) -> _Box:
-    facts = block_facts(block)
-    stage: Stage = facts.stage
+    stage: Stage = getattr(block, "stage", "control")
     if isinstance(block, Diagram):
         stage = "robot" if block.HasOutputPort("pose_WB") else "world"
     elif type(block).__module__.startswith("pydrake."):  # joins ports
@@ -155,7 +154,7 @@ def _box(block: Any) -> _Box:
         block.get_name(),
         _class_name(block),
         stage,
-        facts.part == "obstacles" or stage == "obstacle sensing",
+        part_of(block) == "obstacles" or stage == "obstacle sensing",
         [block.get_input_port(k).get_name() for k in range(block.num_input_ports())],
         [block.get_output_port(k).get_name() for k in range(block.num_output_ports())],
     )

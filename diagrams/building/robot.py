@@ -29,11 +29,9 @@ from systems import (
     SourceRobot,
     WheelOdometry,
 )
-from systems.framework.block import Block
-from systems.framework.block_facts import block_facts
+from systems.framework.block import Block, part_of
 from systems.framework.input_error import InputError
 from systems.framework.signals import TICK_S
-from systems.framework.step_block import StepBlock
 from systems.laws.impedance_controller import LAW_COLUMNS
 from systems.sound.mic_array import microphone_reach
 from systems.sound.parameters import SoundParameters
@@ -48,7 +46,7 @@ class Parts:
 
     diagram: Diagram
     blocks: Mapping[str, Any]
-    """Blocks by part, as ``plant``: what each says of itself (``block_facts``)."""
+    """Blocks by part, as ``plant``."""
     log: VectorLogSink | None = None
     """Rows of the logged ports, one after the other; none unless asked for."""
     logged: Mapping[tuple[str, str], tuple[str, ...]] = field(default_factory=dict)
@@ -74,7 +72,7 @@ def parts_of(diagram: Diagram) -> Parts:
         if isinstance(system, VectorLogSink):
             log = system
         elif not isinstance(system, Multiplexer):
-            blocks[block_facts(system).part] = system
+            blocks[part_of(system)] = system
     if log is not None:
         logged = columns_of(blocks)
     return Parts(diagram, blocks, log, logged)
@@ -106,7 +104,7 @@ def publishes_state(block: Any, port: str) -> bool:
     Returns:
         False where it is made of the present inputs, or moves between ticks.
     """
-    if isinstance(block, StepBlock) or block.num_continuous_states():
+    if block.num_continuous_states():
         return False
     if isinstance(block, Block) and hasattr(block, "step"):
         return block.step.publish is not None
@@ -215,7 +213,7 @@ def robot_blocks(
         _driving(scenario, controller),
     ]
     return with_own_blocks(
-        {block_facts(block).part: block for block in ours},
+        {part_of(block): block for block in ours},
         scenario.blocks,
         {
             "scenario": scenario,
@@ -516,7 +514,7 @@ def require_published(blocks: Iterable[Any], outside: Sequence[str]) -> dict[str
 
 def _columns(block: Any) -> dict[str, tuple[str, ...]]:
     """Output ports of a block that have columns, of a user's own as far as it has."""
-    columns = block_facts(block).columns or LAW_COLUMNS
+    columns = getattr(block, "columns", None) or LAW_COLUMNS
     ports = {
         port.get_name(): port.size()
         for port in map(block.get_output_port, range(block.num_output_ports()))

@@ -55,6 +55,9 @@ class Port(NamedTuple):
 
         Args:
             sizes: The sizes that the block knows, by name.
+
+        Returns:
+            The number; that of a port that carries an object is not known.
         """
         if isinstance(self.size, int):
             return self.size
@@ -66,6 +69,9 @@ class Port(NamedTuple):
 
         Args:
             sizes: The sizes that the block knows, by name.
+
+        Returns:
+            One name per element; empty if the port is not in the table.
         """
         if isinstance(self.columns, str):
             count = self.elements(sizes)
@@ -136,6 +142,9 @@ def copied(state: Any) -> Any:
 
     Args:
         state: Its fields may also be numbers, which a step cannot change.
+
+    Returns:
+        A state that shares no array with the first one.
     """
     if has_arrays(state):
         return type(state)(*map(copied, state))
@@ -150,9 +159,9 @@ class _Declared:
     another one by having the same part."""
     stage: ClassVar[Stage] = "control"
     """The place of the block in the signal chain."""
-    inputs: ClassVar[Sequence[Port]] = ()
+    inputs: Sequence[Port] = ()
     """Input ports, in the order of the step."""
-    outputs: ClassVar[Sequence[Port]] = ()
+    outputs: Sequence[Port] = ()
     """Output ports, in the order of the step. One that carries an object publishes the
     field of that name of a state of arrays; the step does not fill it."""
     states: Sequence[str] = ()

@@ -16,7 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from systems.framework.step_block import Step
+from systems.framework.block import Step
 
 #: Reads the inputs of a tick and fills the outputs of the next, each one after the
 #: other as the ports are.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -155,7 +156,7 @@ class TDOAEstimator(Block):
     """
 
     part, stage = "hearing", "hearing"
-    inputs = (Port("audio", OBJECT, "AudioFrame"),)
+    inputs: Sequence[Port] = (Port("audio", OBJECT, "AudioFrame"),)
     outputs = (
         Port("source_bearing", 1, "rad"),
         Port("source_range", 1, "m"),

@@ -275,7 +275,7 @@ class CollisionNumbers(NamedTuple):
 def collision_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Collision vectors of one tick; see ``systems.framework.step_block.Step``.
+    """Collision vectors of one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Not used.

@@ -72,7 +72,7 @@ class ObstacleNumbers(NamedTuple):
 def ideal_obstacle_step(
     tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any
 ) -> None:
-    """Nearest points of one tick; see ``systems.framework.step_block.Step``.
+    """Nearest points of one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Not used.

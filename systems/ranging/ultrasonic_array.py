@@ -174,7 +174,7 @@ class UltrasonicNumbers(NamedTuple):
 def ultrasonic_step(
     tick: int, state: Any, inputs: Any, outputs: Any, numbers: UltrasonicNumbers
 ) -> None:
-    """Ranges of one tick; see ``systems.framework.step_block.Step``.
+    """Ranges of one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Number of the tick.

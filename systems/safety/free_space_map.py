@@ -68,7 +68,7 @@ class MapState(NamedTuple):
 def map_step(
     tick: int, state: MapState, inputs: Any, outputs: Any, numbers: MapNumbers
 ) -> None:
-    """What is known at one tick; see ``systems.framework.step_block.Step``.
+    """What is known at one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Number of the tick.

@@ -48,7 +48,7 @@ class GuardNumbers(NamedTuple):
 
 
 def guard_step(tick: Any, state: Any, inputs: Any, outputs: Any, numbers: Any) -> None:
-    """Wheel speeds of one tick; see ``systems.framework.step_block.Step``.
+    """Wheel speeds of one tick; see ``systems.framework.block.Step``.
 
     Args:
         tick: Number of the tick.

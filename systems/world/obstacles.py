@@ -2,55 +2,52 @@
 
 from __future__ import annotations
 
-import numpy as np
-from pydrake.systems.framework import LeafSystem_
+from collections.abc import Sequence
+from typing import Any
 
-from systems.framework.block_facts import BlockFacts
+import numpy as np
+
+from systems.framework.block import Block_, Port
 from systems.framework.scalar_types import define_for_scalars
+from systems.world.parameters import ObstacleParameters
 from systems.world.paths import seconds
 
 
 @define_for_scalars("Obstacles_", __name__)
 def Obstacles_(T):
-    class Impl(LeafSystem_[T]):
+    class Impl(Block_[T]):
         """Publishes where the boxes are, and how large.
 
-        .. pydrake_system::
+        The ports list the obstacles one after the other. A function of time alone: no
+        state, no latency.
 
-            name: Obstacles
-            output_ports:
-            - poses_WO [m, m, rad each]
-            - velocities_WO [m/s, m/s, rad/s each]
-            - sizes [m, m each]
-
-        With n obstacles the ports have 3 n, 3 n and 2 n elements, obstacle
-        after obstacle. A function of time alone: no state, no latency.
-
-        Parameters: a sequence of ``ObstacleParameters``.
+        Args:
+            obstacles: A sequence of ``ObstacleParameters``.
         """
 
-        FACTS = BlockFacts("obstacles", "world")
+        part, stage = "obstacles", "world"
+        outputs = (
+            Port("poses_WO", "3 obstacles", "m, m, rad each"),
+            Port("velocities_WO", "3 obstacles", "m/s, m/s, rad/s each"),
+            Port("sizes", "2 obstacles", "m, m each"),
+        )
 
-        def _construct(self, *, obstacles=(), converter=None):
+        def _construct(
+            self,
+            *,
+            obstacles: Sequence[ObstacleParameters] = (),
+            converter: Any = None,
+        ) -> None:
             super().__init__(converter=converter)
-            self._obstacles = tuple(obstacles)
-            self._paths = [obstacle.path() for obstacle in self._obstacles]
-            self._sizes = [extent for o in self._obstacles for extent in o.size_m]
             self.set_name("obstacles")
-            count = len(self._obstacles)
+            self._paths = [obstacle.path() for obstacle in obstacles]
+            self._sizes = [extent for o in obstacles for extent in o.size_m]
             moving = any(path.moves for path in self._paths)
             ticket = self.time_ticket() if moving else self.nothing_ticket()
-            self._declare("poses_WO", 3 * count, self._poses, ticket)
-            self._declare("velocities_WO", 3 * count, self._velocities, ticket)
-            self._declare("sizes", 2 * count, self._extents, self.nothing_ticket())
-
-        def _construct_copy(self, other, converter=None):
-            Impl._construct(self, obstacles=other._obstacles, converter=converter)
-
-        def _declare(self, name, size, calc, ticket):
-            self.DeclareVectorOutputPort(
-                name=name, size=size, calc=calc, prerequisites_of_calc={ticket}
-            )
+            self.declare_ports(sizes={"obstacles": len(obstacles)})
+            self.declare_output("poses_WO", self._poses, {ticket})
+            self.declare_output("velocities_WO", self._velocities, {ticket})
+            self.declare_output("sizes", self._extents, {self.nothing_ticket()})
 
         def _poses(self, context, output):
             time = seconds(context)

@@ -97,7 +97,7 @@ def test_a2_no_obstacle_is_nearer_than_a_reading_inside_its_aperture():
 def test_a2_noise_stays_below_the_margin_but_for_one_range_in_millions(noise_m):
     """The margin is 2 mm and five standard deviations: 3e-7 by Gauss."""
     sensors = UltrasonicParameters(noise_m=noise_m)
-    margin = FreeSpaceMap(sensors=sensors)._numbers.limits[2]
+    margin = FreeSpaceMap(sensors=sensors).step.numbers.limits[2]
     assert margin == pytest.approx(0.002 + 5.0 * noise_m)
     draw = np.random.default_rng(1)
     numbers = draw.standard_normal((2, 300_000))

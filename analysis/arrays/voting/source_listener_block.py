@@ -79,7 +79,7 @@ class SourceListener(Block):
         blank = _Heard(ListenerMemory.blank(self._plan), TrackedSources(0.0, ()))
         state = self.DeclareAbstractState(Value(blank))
         ticket = self.abstract_state_ticket(state)
-        self.declare_output("sources", self._publish, {ticket})
+        self.declare_output("sources", self._publish_sources, {ticket})
         self.DeclarePeriodicUnrestrictedUpdateEvent(
             period_sec=microphones.frame_s,
             offset_sec=0.0,
@@ -98,6 +98,6 @@ class SourceListener(Block):
         sources = steps[-1] if steps else before.sources
         state.get_mutable_abstract_state(0).set_value(_Heard(memory, sources))
 
-    def _publish(self, context: Any, output: Any) -> None:
+    def _publish_sources(self, context: Any, output: Any) -> None:
         heard: _Heard = context.get_abstract_state(0).get_value()
         output.set_value(heard.sources)

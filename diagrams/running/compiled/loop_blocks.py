@@ -18,7 +18,7 @@ from diagrams.building.robot import (
 from diagrams.building.world_blocks import radio_nodes, world_blocks
 from diagrams.scenario.own_code import loaded_digests
 from diagrams.scenario.scenario import Scenario
-from systems.framework.block import RunFacts, Step, _Declared
+from systems.framework.block import RunFacts, Step
 from systems.framework.input_error import InputError
 
 #: What blocks take from elsewhere: robots from the world, and it from them.
@@ -64,8 +64,6 @@ class LoopBlocks:
         """Names of each part's input ports."""
         self.outputs = {part: self._names(b, "output") for part, b in blocks.items()}
         """Names of each part's output ports."""
-        # Until all blocks are derived from ``Block``.
-        self.declared = {p for p, b in blocks.items() if isinstance(b, _Declared)}
         self.columns = columns_of(blocks)
         """What the log holds, in order: the columns of each (part, port)."""
 

@@ -140,14 +140,14 @@ class LoopPlan:
             step, made = robot.steps[part], robot.made
             inputs = tuple(
                 robot.carried[port](0)
-                if port in made.objects and step.host is None and part in made.declared
+                if port in made.objects and step.host is None
                 else robot.view(port)
                 for port in made.inputs[part]
             )
             outputs = tuple(
                 robot.view(port)
                 for port in made.outputs[part]
-                if port not in made.objects or part not in made.declared
+                if port not in made.objects
             )
             number = self._step(step, inputs, outputs)
             if step.publish is None:

@@ -178,8 +178,9 @@ def _users_helpers(
         return set()
     for name in function.__code__.co_names:
         called = function.__globals__.get(name)
-        new = isinstance(called, FunctionType) and called not in {function, *known}
-        if new and digests_of(sys.modules[called.__module__]):
+        if not isinstance(called, FunctionType) or called in {function, *known}:
+            continue
+        if digests_of(sys.modules[called.__module__]):
             known.add(called)
             _users_helpers(called, known)
     return known

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import ClassVar
 
 from systems.base.robot import RobotParameters
 from systems.framework.block import Block, Port
@@ -13,7 +12,7 @@ from systems.planning.parameters import FollowingParameters
 class BaselineController(Block):
     """The ports of every baseline: target and pose in, a twist out."""
 
-    inputs: ClassVar[Sequence[Port]] = (
+    inputs: Sequence[Port] = (
         Port("p_WS_estimated", 2, "m"),
         Port("v_WS_estimated", 2, "m/s"),
         Port("target_valid", 1, "0 or 1"),

@@ -18,13 +18,13 @@ from diagrams import Scenario, load_scenario, simulate
 from diagrams.running.compiled.loop_blocks import shared_blocks, shared_world
 from diagrams.scenario.fields.field_list import list_fields
 from diagrams.scenario.fields.shipped import scenario_schema
+from systems.framework.block import Step
 from systems.framework.noise import (
     TickNoise,
     standard_normals,
     tick_noise,
     tick_normals,
 )
-from systems.framework.step_block import Step
 
 #: Last names of fields that disturb, or decide when something is done.
 DISTURBING = re.compile(

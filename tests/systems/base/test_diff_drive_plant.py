@@ -17,7 +17,7 @@ from diagrams.scenario.run_parameters import IntegratorParameters
 from systems.base.diff_drive_plant import DiffDrivePlant
 from systems.base.parameters import PlantParameters
 from systems.base.robot import RobotParameters
-from systems.framework.step_block import RunFacts
+from systems.framework.block import RunFacts
 
 pytestmark = pytest.mark.drake
 

@@ -122,6 +122,12 @@ class Noisy(Block):
 RUN = RunFacts(5, 0.1, (0.0, 0.0, 0.0), "runge_kutta3", 0.1, lambda _: 7, {})
 
 
+def value(block: Any, port: str, context: Any) -> Any:
+    """The first element of an output."""
+    values: Any = block.GetOutputPort(port).Eval(context)
+    return values[0]
+
+
 def test_ports_columns_and_docstring_come_from_one_declaration():
     block = Sum(bodies=3)
     sizes = [block.get_input_port(k).size() for k in range(block.num_input_ports())]
@@ -146,8 +152,8 @@ def test_the_state_is_that_of_the_next_tick():
     simulator = Simulator(block)
     block.GetInputPort("speed").FixValue(simulator.get_mutable_context(), [2.0])
     simulator.AdvanceTo(0.45)
-    total = block.GetOutputPort("total").Eval(simulator.get_context())
-    assert total[0] == pytest.approx(5 * 0.1 * 2.0)
+    total = value(block, "total", simulator.get_context())
+    assert total == pytest.approx(5 * 0.1 * 2.0)
 
 
 def test_a_loop_does_the_same_step():
@@ -170,10 +176,10 @@ def test_arrays_are_done_once_a_tick_and_carried():
     for ticks in range(1, 4):
         simulator.AdvanceTo(0.1 * ticks)
         own = memory.GetMyContextFromRoot(simulator.get_context())
-        counts = [memory.GetOutputPort("count").Eval(own)[0] for _ in range(3)]
+        counts = [value(memory, "count", own) for _ in range(3)]
         assert counts == [ticks + 1.0] * 3
-    double = reader.GetOutputPort("double")
-    assert double.Eval(reader.GetMyContextFromRoot(simulator.get_context()))[0] == 8.0
+    own = reader.GetMyContextFromRoot(simulator.get_context())
+    assert value(reader, "double", own) == 8.0
 
 
 def test_each_run_of_a_loop_has_arrays_of_its_own():
@@ -191,7 +197,7 @@ def test_a_run_gives_its_seed_to_the_noise():
     assert out[0] == standard_normals((1, 1), 7, 4)[0, 0]
     context = block.CreateDefaultContext()
     context.SetTime(0.4)
-    drawn = block.GetOutputPort("noise").Eval(context)[0]
+    drawn = value(block, "noise", context)
     assert drawn == standard_normals((1, 1), 3, 4)[0, 0]
 
 

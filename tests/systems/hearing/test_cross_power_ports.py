@@ -12,9 +12,9 @@ from pydrake.common.value import Value
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder, LeafSystem
 
+from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
-from systems.framework.step_block import RunFacts
 from systems.hearing.cross_power_estimator import CrossPowerEstimator
 from systems.hearing.parameters import CrossPowerParameters
 from systems.sound.parameters import MicArrayParameters

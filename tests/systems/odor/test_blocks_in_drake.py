@@ -11,7 +11,7 @@ from numba import njit
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from systems.framework.step_block import RunFacts
+from systems.framework.block import RunFacts
 from systems.odor.airflow_sensors import AirflowSensors
 from systems.odor.gas_sensor_array import GasSensorArray
 from systems.odor.odor_plume import PLUME_SIZE, OdorPlume

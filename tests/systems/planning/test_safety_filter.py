@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from systems.base.robot import RobotParameters
-from systems.framework.step_block import Step
+from systems.framework.block import Step
 from systems.planning.parameters import SafetyFilterParameters
 from systems.planning.safety_filter import SafetyFilter
 from systems.planning.velocity_filter import (

@@ -13,8 +13,8 @@ from diagrams import Scenario, load_scenario, simulate
 from systems import FreeSpaceMap, MotionGuard, WheelCommand
 from systems.base.parameters import OdometryParameters
 from systems.base.robot import body_radius
+from systems.framework.block import RunFacts
 from systems.framework.input_error import InputError
-from systems.framework.step_block import RunFacts
 from systems.safety.braking import HALTED
 from systems.safety.free_space import ROLLED, cell_is_free, clear_disc, make_free_space
 from systems.safety.free_space_map import map_step
@@ -26,10 +26,7 @@ pytestmark = pytest.mark.drake
 OWN_LAWS = """
 import math
 
-from pydrake.systems.framework import LeafSystem
-
-from systems.framework.block_facts import BlockFacts
-from systems.framework.step_block import Step, StepBlock
+from systems import Block, Port, Step
 
 
 def pushing(tick, state, inputs, outputs, numbers):
@@ -37,16 +34,16 @@ def pushing(tick, state, inputs, outputs, numbers):
     outputs[0][1] = numbers[1] + numbers[3] * math.sin(numbers[2] * tick)
 
 
-class Pushing(LeafSystem, StepBlock):
-    FACTS = BlockFacts("controller", "control")
+class Pushing(Block):
+    part = "controller"
+    inputs = (Port("pose_WB_estimated", 3, "m, m, rad"),)
+    outputs = (Port("twist_B", 2, "m/s, rad/s"),)
     NUMBERS = (0.5, 0.3, 0.0, 0.0)
 
     def __init__(self, tick_s):
         super().__init__()
         self.set_name("pushing")
-        step = Step(pushing, self.NUMBERS)
-        inputs = [("pose_WB_estimated", 3)]
-        self.declare_step(float, step, inputs, [("twist_B", 2)], tick_s)
+        self.declare(Step(pushing, self.NUMBERS), tick_s=tick_s)
 
 
 class Backing(Pushing):

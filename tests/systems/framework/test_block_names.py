@@ -1,4 +1,4 @@
-"""What blocks say of themselves agrees with their ports and states."""
+"""The names of columns and states agree with the ports and states."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 from pydrake.systems.primitives import Gain
 
 from diagrams import build_sound_follower, load_scenario
-from systems.framework.block_facts import BlockFacts, block_facts
+from systems.framework.block import part_of
 
 pytestmark = pytest.mark.drake
 
@@ -40,12 +40,12 @@ def test_each_state_that_is_named_is_named_once(overrides):
     unnamed = set()
     for part, block in follower.robots["robot"].blocks.items():
         own = block.GetMyContextFromRoot(context)
-        states = block_facts(block).states
+        states = getattr(block, "states", ())
         assert len(set(states)) == len(states)
         if len(states) != own.num_total_states():
             unnamed.add(part)
     assert unnamed <= {"emitter", "microphones", "hearing", "ultrasonic", "collision"}
 
 
-def test_a_block_that_says_nothing_is_a_controller():
-    assert block_facts(Gain(1.0, 1)) == BlockFacts("controller", "control")
+def test_a_system_that_states_no_part_is_a_controller():
+    assert part_of(Gain(1.0, 1)) == "controller"
