@@ -149,7 +149,7 @@ class _Declared:
     another one by having the same part."""
     stage: ClassVar[Stage] = "control"
     """The place of the block in the signal chain."""
-    inputs: ClassVar[Sequence[Port]] = ()
+    inputs: Sequence[Port] = ()
     """Input ports, in the order of the step."""
     outputs: ClassVar[Sequence[Port]] = ()
     """Output ports, in the order of the step. One that carries an object publishes the

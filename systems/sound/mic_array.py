@@ -90,7 +90,7 @@ class MicArray(Block):
     """
 
     part, stage = "microphones", "hearing"
-    inputs = (
+    inputs: Sequence[Port] = (
         Port("emission", OBJECT, "Emission"),
         Port("pose_WB", 3, "m, m, rad"),
         Port("velocity_WB", 3, "m/s, m/s, rad/s"),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cache
 from typing import Any
 
@@ -218,7 +218,7 @@ class SoundEmitter(Block):
     """
 
     part, stage = "emitter", "hearing"
-    inputs = (
+    inputs: Sequence[Port] = (
         Port("pose_WS", 3, "m, m, rad"),
         Port("v_WS", 3, "m/s, m/s, rad/s"),
     )
