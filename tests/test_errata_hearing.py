@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from systems.delays.delay_search import amdf
 from systems.framework.signals import SAMPLE_RATE_HZ, TICK_S, Emission
 from systems.hearing.near_field import source_from_delays
+from systems.hearing.source_fix import RANGED
 from systems.sound.propagation import propagate
 
 SPACING = 0.4
@@ -36,8 +37,8 @@ def differences(range_: float, bearing: float) -> tuple[float, float]:
     return R2 - R1, R3 - R1
 
 
-def ours(a: float, b: float) -> tuple[float, float, bool]:
-    """Bearing, range and its validity from c Delta t_12 and c Delta t_13."""
+def ours(a: float, b: float) -> tuple[float, float, int]:
+    """Bearing, range and its status from c Delta t_12 and c Delta t_13."""
     return source_from_delays(a / SPEED, b / SPEED, SPACING, SPEED)
 
 
@@ -145,8 +146,8 @@ def test_han_eq_8_leads_to_apollonius_and_our_range(source) -> None:
     assert 16.0 * (areas[0] ** 2 - areas[1] ** 2) == pytest.approx(
         (R1**2 - R3**2) * (2.0 * R2**2 + 2.0 * SPACING**2 - R1**2 - R3**2), abs=1e-9
     )
-    bearing, range_, valid = ours(R2 - R1, R3 - R1)
-    assert valid
+    bearing, range_, status = ours(R2 - R1, R3 - R1)
+    assert status == RANGED
     assert (range_, bearing) == pytest.approx(source, rel=1e-5, abs=1e-6)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.hearing.multilateration import angles_of, whitening_matrix
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import PLANE_WAVE, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 _STEPS = 8
@@ -64,7 +64,7 @@ def locate_far_source(
         elevation=elevation,
         elevation_std=elevation_std,
         range=0.0,
-        range_valid=False,
+        range_status=PLANE_WAVE,
         range_std=math.inf,
         p_AS=u,
         covariance=of_u,

@@ -85,6 +85,15 @@ _HEARING = [
         "0 or 1",
         detected="whether the source was heard in the last frame",
         range_valid="whether its range was heard in the last frame",
+    ),
+    *_of(
+        "number",
+        range_status="0 nothing heard, 1 there is a range; the others are reasons for "
+        "no range: 2 plane wave, 3 no position fits, 4 too uncertain, 5 too few "
+        "microphones, 6 sound rejected",
+    ),
+    *_of(
+        "0 or 1",
         target_valid="whether there is a valid target",
         ambiguous="whether another direction fits the sound as well",
     ),

@@ -30,8 +30,10 @@ from systems.hearing.cross_powers import (
     signal_powers,
 )
 from systems.hearing.parameters import CrossPowerParameters
+from systems.hearing.source_fix import RANGED, range_status
 from systems.hearing.spherical_interpolation import (
     interpolate_sphere,
+    inverse_of,
     near_or_far,
     plane_wave_bearing,
 )
@@ -58,6 +60,8 @@ class Direction(NamedTuple):
 
     bearing: float
     """From the middle microphone, CCW from x of B, rad."""
+    range_status: int
+    """Whether there is a range, or why there is none, see ``range_status``."""
     place: NDArray[np.float64] | None = None
     """(2,) from the middle microphone in B, m; None where only the bearing is known."""
     ambiguous: bool = False
@@ -183,11 +187,11 @@ class ArrayListener:
         if found.response < max(_COHERENT * bins, chance):
             return None
         delays = self._refined(correlations, found.delays)
-        bearing, place = self._interpolated(pairs, delays, lost)
+        bearing, place, status = self._interpolated(pairs, delays, lost)
         if self._own.method == "srp_near":
             bearing = found.bearing
         ambiguous = narrow or found.other_share >= self._own.ambiguous_share
-        return Direction(bearing, place, ambiguous, found.other)
+        return Direction(bearing, status, place, ambiguous, found.other)
 
     def _bandwidth(self, occupied: NDArray[np.bool_]) -> float:
         """Hz that the sound fills, on the median pair."""
@@ -215,8 +219,8 @@ class ArrayListener:
         pairs: list[tuple[int, int]],
         delays: NDArray[np.float64],
         lost: list[int],
-    ) -> tuple[float, NDArray[np.float64] | None]:
-        """Bearing and place from delays of pairs t_j - t_i, s."""
+    ) -> tuple[float, NDArray[np.float64] | None, int]:
+        """Bearing, place and status of the range from delays of pairs t_j - t_i, s."""
         others = [k for k in range(self.facts.channels) if k not in lost]
         base, *rest = others
         rows = np.zeros((len(pairs), len(rest)))
@@ -227,8 +231,9 @@ class ArrayListener:
                 row[rest.index(i)] -= 1.0
         d = self._c * (np.linalg.pinv(rows) @ delays)
         p_RM = self.p_RM[rest] - self.p_RM[base]
-        if lost:  # three microphones know no range, and the middle may be gone
-            return plane_wave_bearing(p_RM, d), None
+        if lost:  # the middle microphone may be among them
+            status = range_status(0.0, enough=False)
+            return plane_wave_bearing(p_RM, d), None, status
         return near_or_far(p_RM, d)
 
     def _printed(
@@ -249,11 +254,11 @@ class ArrayListener:
                 best = lags[int(correlations[k][lags].argmax())]
                 d.append(self._c * best / facts.rate_hz)
         place, distance = interpolate_sphere(self.p_RM[1:], d)
+        status = range_status(inverse_of(distance))
         if not math.isfinite(distance):
-            return Direction(plane_wave_bearing(self.p_RM[1:], d))
+            return Direction(plane_wave_bearing(self.p_RM[1:], d), status)
         bearing = math.atan2(place[1], place[0])
-        known = place if distance > 0.0 else None
-        return Direction(bearing, known)
+        return Direction(bearing, status, place if status == RANGED else None)
 
 
 #: Output ports.
@@ -266,6 +271,7 @@ _PORTS = (
     Port("ambiguous", 1, "0 or 1", "ambiguous"),
     Port("alternative_bearing", 1, "rad"),
     Port("lost_microphone", 1, "number, 0 none", "lost_microphone"),
+    Port("range_status", 1, "number, 0 nothing heard", "range_status"),
 )
 _SIZE = sum(port.elements({}) for port in _PORTS)
 # Groups of the discrete state.
@@ -293,7 +299,8 @@ class CrossPowerEstimator(Block):
     what was gathered is put out, and stands until it asks again. Then, and where
     nothing was heard, all outputs are zero but ``lost_microphone``, the first channel
     that hears nothing at all. Bearing and range count from the middle microphone, the
-    first; p_PS_B from P, a unit vector where the range is not known. ``ambiguous`` says
+    first; p_PS_B from P, a unit vector where the range is not known.
+    ``range_status`` says why (``systems.hearing.source_fix``). ``ambiguous`` says
     that another direction, ``alternative_bearing``, fits as well, or that the sound
     fills so little of the band that any would.
 
@@ -404,6 +411,7 @@ class CrossPowerEstimator(Block):
             outputs[1], outputs[5] = float(np.linalg.norm(found.place)), 1.0
             outputs[2:4] = listener.p_PR_B + found.place
         outputs[6], outputs[7] = float(found.ambiguous), found.other
+        outputs[9] = found.range_status
         return outputs
 
     def _listen(self, context: Any, discrete_state: Any) -> None:

@@ -25,6 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
+from systems.hearing.source_fix import RANGED, range_status
 
 _STEPS = 30
 _SETTLED = 1e-9
@@ -486,6 +487,7 @@ def fit_delays(
     NDArray[np.float64],
     float,
     NDArray[np.float64],
+    int,
 ]:  # pragma: no cover  (compiled)
     """Place, its errors and its twin.
 
@@ -496,7 +498,8 @@ def fit_delays(
 
     Returns:
         u (d,), w and its variance (infinite: no range), covariances (d, d) of
-        u and of the position, chi-square, and the twin's place (0: none).
+        u and of the position, chi-square, the twin's place (0: none), and the
+        status of the range (``range_status``).
     """
     us, ws, costs = _search(problem)
     n, dim = problem.p.shape
@@ -510,18 +513,22 @@ def fit_delays(
             for i in range(dim):
                 twin[i] = us[1 - main, i] / ws[1 - main]
     u, w, cost = us[main].copy(), ws[main], costs[main]
-    if w > 0.0:
+    unknowns = problem.span.shape[0] + (0 if _is_bound(problem) else 1)
+    status = range_status(w, 0.0, 1.0, n - 1 >= unknowns)
+    if status == RANGED:
         C, by, k = _covariance(problem, u, w, 0.0)
-        if C[k, k] < w * w and n - 1 >= k + 1:
+        status = range_status(w, C[k, k], w * w)
+        if status == RANGED:
             of_u = _carried(by, C, k)
             to_p = np.empty((dim, 4))
             for i in range(dim):
                 for j in range(k):
                     to_p[i, j] = by[i, j] / w
                 to_p[i, k] = -u[i] / (w * w)
-            return u, w, C[k, k], of_u, _carried(to_p, C, k + 1), cost, twin
+            of_p = _carried(to_p, C, k + 1)
+            return u, w, C[k, k], of_u, of_p, cost, twin, status
     far = n > 0  # a literal True would be compiled anew
     u, _, cost_far = _descend_within(problem, u, 0.0, far)
     C, by, k = _covariance(problem, u, 0.0, 1.0 / (prior_w * prior_w))
     of_u = _carried(by, C, k)
-    return u, 0.0, np.inf, of_u, of_u, min(cost, cost_far), twin
+    return u, 0.0, np.inf, of_u, of_u, min(cost, cost_far), twin, status

@@ -137,14 +137,15 @@ def ideal_source_step(
 
 def _publish_ideal_source(state, outputs, numbers):
     """The outputs of ``ideal_source_step``'s state."""
-    bearing, distance, p_PS_B, covariance, detected, range_valid = outputs
+    bearing, distance, p_PS_B, covariance, detected, range_valid, status = outputs
     x, y = state[0], state[1]
     bearing[0], distance[0] = atan2(y, x), safe_norm(x, y)
     p_PS_B[0], p_PS_B[1] = x, y
     stated = stated_covariance(x, y, numbers.hearing)
     for k in range(4):
         covariance[k] = stated[k]
-    detected[0] = range_valid[0] = state[2]
+    # What is heard has a range: NOTHING_HEARD is 0 and RANGED is 1.
+    detected[0] = range_valid[0] = status[0] = state[2]
 
 
 @define_for_scalars("IdealSourceSensor_", __name__)
@@ -177,6 +178,7 @@ def IdealSourceSensor_(T):
             Port("covariance", 4, "m^2, of p_PS_B, row by row"),
             Port("detected", 1, "0 or 1", "detected"),
             Port("range_valid", 1, "0 or 1", "range_valid"),
+            Port("range_status", 1, "number, 0 nothing heard", "range_status"),
         )
         states = ("p_PS_B_x", "p_PS_B_y", "detected")
 

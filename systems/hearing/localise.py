@@ -464,6 +464,5 @@ class Localiser:
             )
         if fix.bearing_std > math.radians(parameters.maximum_bearing_std_deg):
             return None
-        if fix.range_std > parameters.maximum_relative_range_std * fix.range:
-            fix = fix.without_range()
+        fix = fix.within_error(parameters.maximum_relative_range_std)
         return Candidate(fix, delays.tau, covariance, delays.correlation)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from systems.hearing import near_field
 from systems.hearing.delay_fit import DelayProblem, fit_delays
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import RANGED, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 # Keeps errors of the azimuth finite right above an array.
@@ -42,9 +42,8 @@ def locate_source(
     """
     if shape.equal_row is not None and shape.angles == ("bearing",):
         fix = near_field.locate_in_row(tau, covariance, shape.equal_row, c)
-        uncertain = fix.range_valid and fix.range_std >= fix.range
-        return fix.without_range() if uncertain else fix
-    u, w, variance, of_u, of_p, chi_square, twin = fit_delays(
+        return fix.within_error(1.0)
+    u, w, variance, of_u, of_p, chi_square, twin, status = fit_delays(
         DelayProblem(
             c * np.asarray(tau, dtype=np.float64),
             whitening_matrix(covariance) / c,
@@ -54,7 +53,7 @@ def locate_source(
         ),
         0.5 / shape.aperture_m,
     )
-    valid = math.isfinite(variance)
+    valid = status == RANGED
     bearing_std, elevation, elevation_std = angles_of(u, of_u, shape)
     return SourceFix(
         bearing=math.atan2(u[1], u[0]),
@@ -62,7 +61,7 @@ def locate_source(
         elevation=elevation,
         elevation_std=elevation_std,
         range=1.0 / w if valid else 0.0,
-        range_valid=valid,
+        range_status=status,
         range_std=math.sqrt(variance) / (w * w) if valid else math.inf,
         p_AS=u / w if valid else u,
         covariance=of_p,

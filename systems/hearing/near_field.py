@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from systems.framework.compiling import njit
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import RANGED, SourceFix, range_status
 from systems.sound.array_shape import EqualRow
 
 # Below this b - 2a is zero to rounding: the range is l^2 / (b - 2a) and more.
@@ -28,20 +28,20 @@ _LEAST_COSINE = 1e-3
 @njit(cache=True)
 def _ranges(
     a: float, b: float, spacing: float
-) -> tuple[bool, float, float, float]:  # pragma: no cover  (compiled)
-    """Whether the delays have a finite range, and R1, R2, R3 in m."""
+) -> tuple[int, float, float, float]:  # pragma: no cover  (compiled)
+    """Status of the range, and R1, R2, R3 in m."""
     if b - 2.0 * a <= _LEAST_GAP_M:
-        return False, 0.0, 0.0, 0.0
+        return range_status(0.0), 0.0, 0.0, 0.0
     r1 = (2.0 * spacing**2 + 2.0 * a * a - b * b) / (2.0 * (b - 2.0 * a))
     r2, r3 = r1 + a, r1 + b
     valid = min(r1, r2, r3) > 0.0 and abs(r3 * r3 - r1 * r1) <= 4.0 * spacing * r2
-    return valid, r1, r2, r3
+    return range_status(1.0 / r2 if valid else np.nan), r1, r2, r3
 
 
 @njit(cache=True)
 def source_from_delays(
     tau_12: float, tau_13: float, spacing: float, c: float
-) -> tuple[float, float, bool]:  # pragma: no cover  (compiled)
+) -> tuple[float, float, int]:  # pragma: no cover  (compiled)
     """Bearing and range of the source from M2.
 
     Args:
@@ -51,15 +51,15 @@ def source_from_delays(
         c: Speed of sound, m/s.
 
     Returns:
-        bearing in [-pi/2, pi/2] (rad, left positive), range (m) and whether
-        the range is valid. If not, the range is 0 and the bearing is that of
-        a source far away.
+        bearing in [-pi/2, pi/2] (rad, left positive), range (m) and its status
+        (``range_status``). Without a range, the range is 0 and the bearing is that
+        of a source far away.
     """
     a, b = c * tau_12, c * tau_13
-    valid, r1, r2, r3 = _ranges(a, b, spacing)
-    if not valid:
-        return math.asin(min(1.0, max(-1.0, b / (2.0 * spacing)))), 0.0, False
-    return math.asin((r3 * r3 - r1 * r1) / (4.0 * spacing * r2)), r2, True
+    status, r1, r2, r3 = _ranges(a, b, spacing)
+    if status != RANGED:
+        return math.asin(min(1.0, max(-1.0, b / (2.0 * spacing)))), 0.0, status
+    return math.asin((r3 * r3 - r1 * r1) / (4.0 * spacing * r2)), r2, status
 
 
 @njit(cache=True)
@@ -106,15 +106,19 @@ def _locate(
     spacing: float,
     c: float,
 ) -> tuple[
-    NDArray[np.float64], NDArray[np.float64], float, float, bool, float
+    NDArray[np.float64], NDArray[np.float64], float, float, int, float
 ]:  # pragma: no cover  (compiled)
-    """Place, its covariance, and errors of bearing and range, in the array's axes."""
+    """Place in the array's axes, with errors.
+
+    Returns:
+        Place, its covariance, error of the bearing, range, its status and its error.
+    """
     tau_12 = to_delays[0, 0] * tau[0] + to_delays[0, 1] * tau[1]
     tau_13 = to_delays[1, 0] * tau[0] + to_delays[1, 1] * tau[1]
     of_delays = _spread(to_delays, covariance)
-    bearing, r2, valid = source_from_delays(tau_12, tau_13, spacing, c)
+    bearing, r2, status = source_from_delays(tau_12, tau_13, spacing, c)
     sine, cosine = math.sin(bearing), math.cos(bearing)
-    if valid:
+    if status == RANGED:
         slopes = _slopes(bearing, r2, c * tau_12, c * tau_13, spacing, c)
         place = np.array([r2 * cosine, r2 * sine])
     else:
@@ -126,9 +130,9 @@ def _locate(
     p_AS = np.zeros(axes.shape[0])
     for k in range(2):
         p_AS += axes[:, k] * place[k]
-    range_std = math.sqrt(errors[0, 0]) if valid else np.inf
+    range_std = math.sqrt(errors[0, 0]) if status == RANGED else np.inf
     of_p = _spread(axes, errors[2:, 2:])
-    return p_AS, of_p, math.sqrt(errors[1, 1]), r2, valid, range_std
+    return p_AS, of_p, math.sqrt(errors[1, 1]), r2, status, range_std
 
 
 def locate_in_row(
@@ -148,7 +152,7 @@ def locate_in_row(
     Returns:
         The source in the axes of the array.
     """
-    p_AS, of_p, bearing_std, distance, valid, range_std = _locate(
+    p_AS, of_p, bearing_std, distance, status, range_std = _locate(
         tau, covariance, row.to_delays, row.axes, row.spacing_m, c
     )
     return SourceFix(
@@ -157,7 +161,7 @@ def locate_in_row(
         elevation=None,
         elevation_std=None,
         range=distance,
-        range_valid=valid,
+        range_status=status,
         range_std=range_std,
         p_AS=p_AS,
         covariance=of_p,

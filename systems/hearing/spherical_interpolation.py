@@ -7,6 +7,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from systems.hearing.source_fix import RANGED, range_status
+
 #: Places farther than this are none: the plane wave's bearing is better, m.
 FARTHEST_M = 4.0
 #: A place counts if its bearing is this near to that of the plane wave, deg.
@@ -30,7 +32,7 @@ def interpolate_sphere(
     S, d = np.asarray(p_RM, dtype=float), np.asarray(d, dtype=float)
     inverse = np.linalg.pinv(S)
     delta = np.sum(S * S, axis=1) - d * d
-    left = d - S @ (inverse @ d)  # P d, by which the range is told
+    left = d - S @ (inverse @ d)  # P d, by which the range is known
     below = 2.0 * left @ d
     if abs(below) < 1e-15:
         return np.full(S.shape[1], np.inf), math.inf
@@ -54,7 +56,7 @@ def plane_wave_bearing(p_RM: ArrayLike, d: ArrayLike) -> float:
 
 def near_or_far(
     p_RM: ArrayLike, d: ArrayLike
-) -> tuple[float, NDArray[np.float64] | None]:
+) -> tuple[float, NDArray[np.float64] | None, int]:
     """Bearing, and the place where one can be believed.
 
     Spherical interpolation turns by 180 deg where errors change the sign of the sum of
@@ -65,14 +67,27 @@ def near_or_far(
         d: (n,) differences of range, m.
 
     Returns:
-        Bearing, rad, and (2,) the place from the reference microphone, m, or None.
+        Bearing, rad, (2,) the place from the reference microphone, m, or None, and the
+        status of the range (``range_status``).
     """
     plane = plane_wave_bearing(p_RM, d)
     place, distance = interpolate_sphere(p_RM, d)
-    if not 0.0 < distance < FARTHEST_M:
-        return plane, None
-    bearing = math.atan2(place[1], place[0])
-    off = math.remainder(bearing - plane, 2.0 * math.pi)
-    if abs(off) > math.radians(AGREEMENT_DEG):
-        return plane, None
-    return bearing, place
+    bearing, off = plane, 0.0
+    if distance < math.inf:
+        bearing = math.atan2(place[1], place[0])
+        off = math.remainder(bearing - plane, 2.0 * math.pi)
+    inverse_range = inverse_of(distance if distance < FARTHEST_M else math.inf)
+    status = range_status(inverse_range, abs(off), math.radians(AGREEMENT_DEG))
+    return (bearing, place, status) if status == RANGED else (plane, None, status)
+
+
+def inverse_of(distance: float) -> float:
+    """The inverse of a range of ``interpolate_sphere``, as ``range_status`` takes it.
+
+    Args:
+        distance: m; 0 or less where no place fits.
+
+    Returns:
+        1/m; 0 for a plane wave, NaN where no place fits.
+    """
+    return 1.0 / distance if distance > 0.0 else math.nan

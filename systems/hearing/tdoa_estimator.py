@@ -23,7 +23,7 @@ from systems.hearing.audio_port import (
 from systems.hearing.localise import HearingMemory, Localiser
 from systems.hearing.parameters import TDOAParameters
 from systems.hearing.source_choice import Belief, ChoiceMemory, SourceChoice
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import NOTHING_HEARD, REJECTED, SourceFix
 from systems.sound.acoustics import AcousticParameters
 from systems.sound.array_shape import ArrayShape
 from systems.sound.parameters import MicArrayParameters, SoundParameters
@@ -126,7 +126,8 @@ class TDOAEstimator(Block):
     p_PS_B from P. Microphones in a row cannot tell front from back: the source
     is reported in the front half plane. Where nothing is heard all outputs are
     zero. Where ``range_valid`` is 0 the range is 0, p_PS_B is the unit vector
-    along the bearing and the covariance is that of this vector. The covariance
+    along the bearing and the covariance is that of this vector; ``range_status``
+    says why (``systems.hearing.source_fix``). The covariance
     (row major, of p_PS_B) counts noise and echoes, not errors of the
     microphones' places or of the speed of sound.
 
@@ -164,6 +165,7 @@ class TDOAEstimator(Block):
         Port("covariance", 4, "m^2"),
         Port("detected", 1, "0 or 1", "detected"),
         Port("range_valid", 1, "0 or 1", "range_valid"),
+        Port("range_status", 1, "number, 0 nothing heard", "range_status"),
     )
 
     def __init__(
@@ -192,7 +194,7 @@ class TDOAEstimator(Block):
         self.declare_ports()
         self._audio, *self._belief = self._input_ports
         self.DeclareDiscreteState(sum(self._output_sizes))
-        self.DeclareDiscreteState(5)
+        self.DeclareDiscreteState(4)
         self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         if self._choice is not None:
             self.DeclareDiscreteState(self._choice.blank().pack().tolist())
@@ -203,22 +205,19 @@ class TDOAEstimator(Block):
 
     def _listen(self, context: Any, discrete_state: Any) -> None:
         audio = read_audio(context, self._audio, "TDOAEstimator")
-        before, located = self._remembered(context)
+        before = self._remembered(context)
         choice = None
         if self._choice is not None:
             state = context.get_discrete_state(_CHOICE).value()
             belief = _belief(np.concatenate(read_arrays(context, self._belief)))
             choice = ChoiceMemory.unpack(state), belief
-        fix, after, chosen = self.hear(audio, before, choice)
-        flags = after.echoes is not None, after.heard, fix is not None
+        values, after, chosen = self.hear(audio, before, choice)
+        flags = after.echoes is not None, after.heard
         discrete_state.set_value(_MEMORY, np.array((*after[:2], *flags)))
         if after.echoes is not None and after.echoes is not before.echoes:
             discrete_state.set_value(_ECHOES, after.echoes.ravel())
         if chosen is not None:
             discrete_state.set_value(_CHOICE, chosen.pack())
-        if fix is None and not located:
-            return  # silence goes on, and the outputs are zero already
-        values = np.concatenate(port_values(fix, self._p_PA_B))
         discrete_state.set_value(_OUTPUTS, values)
 
     def hear(
@@ -226,7 +225,7 @@ class TDOAEstimator(Block):
         audio: AudioFrame,
         memory: HearingMemory,
         choice: tuple[ChoiceMemory, Belief] | None = None,
-    ) -> tuple[SourceFix | None, HearingMemory, ChoiceMemory | None]:
+    ) -> tuple[NDArray[np.float64], HearingMemory, ChoiceMemory | None]:
         """Where the sound of a frame comes from.
 
         Args:
@@ -235,7 +234,7 @@ class TDOAEstimator(Block):
             choice: What it left for ``choose: followed``, and what is believed now.
 
         Returns:
-            The source, or None where nothing is heard, and the new memories.
+            Values of the output ports, one after the other, and the new memories.
 
         Raises:
             InputError: The frame has another rate, or is none of this array.
@@ -249,10 +248,15 @@ class TDOAEstimator(Block):
         )
         if self._choice is None or choice is None:
             fix, after = self._localiser.localise(audio.counts, memory)
-            return fix if sounds else None, after, None
-        found, after = self._localiser.candidates(audio.counts, memory)
-        best, chosen = self._choice.choose(found, *choice, may_sound=sounds)
-        return None if best is None else found[best].fix, after, chosen
+            chosen = None
+        else:
+            found, after = self._localiser.candidates(audio.counts, memory)
+            best, chosen = self._choice.choose(found, *choice, may_sound=sounds)
+            fix = None if best is None else found[best].fix
+        # A frame with a silent channel leaves the memory as it is.
+        heard = sounds and after.heard and after is not memory
+        values = port_values(fix if sounds else None, self._p_PA_B, heard=heard)
+        return np.concatenate(values), after, chosen
 
     def step_for(self, run: RunFacts) -> Step:
         """What the block does in each frame of a compiled loop.
@@ -267,32 +271,27 @@ class TDOAEstimator(Block):
             InputError: No block with a step publishes audio.
         """
         audio = audio_of_run(run)
-        memory, located = self._localiser.blank(), False
+        memory = self._localiser.blank()
         chosen = None if self._choice is None else self._choice.blank()
 
         def listen(tick: int, inputs: Any, outputs: Any) -> None:
-            nonlocal memory, located, chosen
+            nonlocal memory, chosen
             choice = None if chosen is None else (chosen, _belief(inputs))
-            fix, memory, chosen = self.hear(audio(tick), memory, choice)
-            if fix is not None:
-                outputs[:] = np.concatenate(port_values(fix, self._p_PA_B))
-            elif located:
-                outputs[:] = 0.0
-            located = fix is not None
+            outputs[:], memory, chosen = self.hear(audio(tick), memory, choice)
 
         inputs = sum(port.size() for port in self._belief)
         period = round(self._microphones.frame_s / run.tick_s)
         return host_step(listen, inputs, sum(self._output_sizes), period)
 
-    def _remembered(self, context: Any) -> tuple[HearingMemory, bool]:
-        """What the last frame left, and whether it held a place."""
+    def _remembered(self, context: Any) -> HearingMemory:
+        """The memory that the last frame left."""
         numbers = context.get_discrete_state(_MEMORY).value().tolist()
-        energy, noise_energy, echoing, heard, located = numbers
+        energy, noise_energy, echoing, heard = numbers
         echoes = None
         if echoing:
             held = context.get_discrete_state(_ECHOES).value()
             echoes = held.astype(np.float32).reshape(self._localiser.echo_shape)
-        return HearingMemory(energy, noise_energy, echoes, bool(heard)), bool(located)
+        return HearingMemory(energy, noise_energy, echoes, bool(heard))
 
 
 def _belief(values: NDArray[np.float64]) -> Belief:
@@ -305,26 +304,25 @@ def _belief(values: NDArray[np.float64]) -> Belief:
     )
 
 
-#: Values of the output ports where nothing is heard.
-_NOTHING = tuple(np.zeros(port.elements({})) for port in TDOAEstimator.outputs)
-
-
 def port_values(
-    fix: SourceFix | None, p_PA_B: NDArray[np.float64]
+    fix: SourceFix | None, p_PA_B: NDArray[np.float64], *, heard: bool = False
 ) -> tuple[NDArray[np.float64], ...]:
     """Values of the output ports, in order.
 
     Args:
-        fix: What was heard.
+        fix: Estimate of the source, if there is one.
         p_PA_B: (2,) the microphones' centroid from P in B axes, m.
+        heard: Whether the frame has a sound, if there is no estimate.
 
     Returns:
         Bearing (1,), rad, range (1,), m, p_PS_B (2,), m, or a unit vector where the
-        range is not known, its covariance (4,), m^2, and (1,) flags 0 or 1: heard, and
-        range known.
+        range is not known, its covariance (4,), m^2, (1,) flags 0 or 1: heard, and
+        range known, and (1,) the status of the range.
     """
     if fix is None:
-        return _NOTHING
+        sizes = (port.elements({}) for port in TDOAEstimator.outputs)
+        *silence, _ = map(np.zeros, sizes)
+        return (*silence, np.array([float(REJECTED if heard else NOTHING_HEARD)]))
     return (
         np.array([fix.bearing]),
         np.array([fix.range]),
@@ -332,4 +330,5 @@ def port_values(
         fix.covariance.ravel(),
         np.ones(1),
         np.array([float(fix.range_valid)]),
+        np.array([float(fix.range_status)]),
     )

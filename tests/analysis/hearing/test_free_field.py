@@ -17,7 +17,7 @@ from analysis.hearing.free_field import (
 )
 from systems.base.robot import RobotParameters
 from systems.hearing.parameters import TDOAParameters
-from systems.hearing.source_fix import SourceFix
+from systems.hearing.source_fix import RANGED, SourceFix
 from systems.sound.array_shape import ArrayShape
 
 C = 340.0
@@ -73,7 +73,7 @@ def test_errors_and_bounds_of_an_estimator_that_knows():
     sigma = 0.01
     template = SourceFix(
         bearing=angle, bearing_std=sigma / 2.0, elevation=None, elevation_std=None,
-        range=2.0, range_valid=True, range_std=sigma, p_AS=truth,
+        range=2.0, range_status=RANGED, range_std=sigma, p_AS=truth,
         covariance=sigma**2 * np.eye(2),
     )  # fmt: skip
 

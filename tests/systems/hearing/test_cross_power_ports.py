@@ -17,6 +17,11 @@ from systems.framework.input_error import InputError
 from systems.framework.signals import AudioFrame
 from systems.hearing.cross_power_estimator import CrossPowerEstimator
 from systems.hearing.parameters import CrossPowerParameters
+from systems.hearing.source_fix import (
+    NOTHING_HEARD,
+    RANGED,
+    TOO_FEW_MICROPHONES,
+)
 from systems.sound.parameters import MicArrayParameters
 
 RATE = 32_000.0
@@ -31,6 +36,7 @@ PORTS = (
     "ambiguous",
     "alternative_bearing",
     "lost_microphone",
+    "range_status",
 )
 
 
@@ -77,7 +83,7 @@ def block(**parameters: Any) -> CrossPowerEstimator:
 
 
 def in_drake(dead: int = 0, **parameters: Any) -> tuple[Any, list[int]]:
-    """(ticks, 9) outputs after each tick, and the ticks that were recorded."""
+    """(ticks, 10) outputs after each tick, and the ticks that were recorded."""
     builder = DiagramBuilder()
     played, estimator = Played(dead), block(**parameters)
     for system in (played, estimator):
@@ -137,9 +143,11 @@ def test_the_estimate_stands_from_the_tick_after_listening_until_it_begins_again
     assert not detected[again:].any()  # three frames are too few for another
     held = rows[over:again]
     np.testing.assert_array_equal(held, np.tile(held[0], (4, 1)))
-    bearing, distance, x, y, _, ranged, ambiguous, _, lost = held[0]
+    bearing, distance, x, y, _, ranged, ambiguous, _, lost, status = held[0]
     assert abs(math.degrees(bearing)) < 3.0
     assert (ambiguous, lost) == (0.0, 0.0)
+    assert ranged == (status == RANGED)
+    np.testing.assert_array_equal(rows[:, 9] != NOTHING_HEARD, detected == 1.0)
     if not ranged:
         assert (distance, math.hypot(x, y)) == pytest.approx((0.0, 1.0))
     # What is not asked for is not recorded.
@@ -161,7 +169,8 @@ def test_a_lost_microphone_is_named_and_three_still_hear(dead):
     rows, _ = in_drake(dead)
     assert rows[15, 8] == dead
     assert rows[15, 4] == 1.0
-    assert rows[15, 5] == 0.0  # three know no range
+    assert rows[15, 5] == 0.0
+    assert rows[15, 9] == TOO_FEW_MICROPHONES
     assert abs(math.degrees(rows[15, 0])) < 5.0
 
 

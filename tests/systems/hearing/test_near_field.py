@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from systems.hearing.near_field import locate_in_row, source_from_delays
+from systems.hearing.source_fix import NO_PLACE, PLANE_WAVE, RANGED
 from systems.sound.array_shape import EqualRow
 
 L, C = 0.4, 340.0
@@ -28,8 +29,8 @@ def delays(bearing, distance):
 @given(bearings, ranges)
 def test_inverts_the_geometry(bearing, distance):
     tau_12, tau_13 = delays(bearing, distance)
-    found, found_range, valid = source_from_delays(tau_12, tau_13, L, C)
-    assert valid
+    found, found_range, status = source_from_delays(tau_12, tau_13, L, C)
+    assert status == RANGED
     # Rounding of the delays is magnified by R^2 / (l cos)^2.
     magnified = 1.0 + (distance / (L * math.cos(bearing))) ** 2
     assert found == pytest.approx(bearing, abs=1e-12 * magnified)
@@ -58,23 +59,23 @@ def test_channels_in_another_order():
 def test_two_metres_broadside_in_numbers():
     """R1 = sqrt(4.16): a = 2 - R1, b = 0."""
     a = 2.0 - math.sqrt(4.16)
-    bearing, distance, valid = source_from_delays(a / C, 0.0, L, C)
-    assert (bearing, valid) == (0.0, True)
+    bearing, distance, status = source_from_delays(a / C, 0.0, L, C)
+    assert (bearing, status) == (0.0, RANGED)
     assert distance == pytest.approx(2.0, rel=1e-12)
 
 
 @pytest.mark.parametrize(
-    ("a", "b"),
+    ("a", "b", "expected"),
     [
-        (0.1, 0.2),  # b = 2 a: a plane wave
-        (0.2, 0.3),  # b < 2 a: curved the wrong way
-        (0.0, 0.9),  # longer than the array
-        (-0.6, 0.2),  # R2 would be negative
+        (0.1, 0.2, PLANE_WAVE),  # b = 2 a
+        (0.2, 0.3, PLANE_WAVE),  # b < 2 a: curved the wrong way
+        (0.0, 0.9, NO_PLACE),  # longer than the array
+        (-0.6, 0.2, NO_PLACE),  # R2 would be negative
     ],
 )
-def test_no_finite_range_means_bearing_only(a, b):
-    bearing, distance, valid = source_from_delays(a / C, b / C, L, C)
-    assert (distance, valid) == (0.0, False)
+def test_no_finite_range_means_bearing_only(a, b, expected):
+    bearing, distance, status = source_from_delays(a / C, b / C, L, C)
+    assert (distance, status) == (0.0, expected)
     assert bearing == pytest.approx(math.asin(min(1.0, b / (2 * L))))
 
 
