@@ -426,7 +426,7 @@ class Block(LeafSystem, _Declared):
     _scalar = float
 
 
-class _DifferentiableBlock(LeafSystem_[AutoDiffXd], _Declared):  # type: ignore[misc]
+class _DifferentiableBlock(LeafSystem_[AutoDiffXd], _Declared):
     _scalar = AutoDiffXd
 
 
