@@ -387,7 +387,7 @@ def DiffDrivePlant_(T):
             at_rest = [0.0] * (len(self.states) - 3)
             state = [T(value) for value in (*initial_pose, *at_rest)]
             self.DeclareContinuousState(BasicVector_[T](state))
-            self.declare_ports()
+            (self._wheel_speeds,) = self.declare_ports()
             for name, calc in (
                 ("pose_WB", self._pose),
                 ("velocity_WB", self._velocity),
@@ -397,15 +397,14 @@ def DiffDrivePlant_(T):
                 self.declare_output(name, calc, {self.xc_ticket()})
 
         def DoCalcTimeDerivatives(self, context, derivatives):
-            (wheel_speeds,) = self._input_ports
-            motion = self._state(context), wheel_speeds.Eval(context)
+            motion = self._state(context), self._wheel_speeds.Eval(context)
             of_plant, finite = self._numbers.of_plant, False
             if T is float:
                 rates, finite = self._checked(*motion, *of_plant)
             else:
                 rates = self._numbers.derivatives.py_func(*motion, *of_plant)
             if not finite:
-                check_port(context, wheel_speeds, motion[1])
+                check_port(context, self._wheel_speeds, motion[1])
                 check_finite("DiffDrivePlant: state", motion[0])
             derivatives.SetFromVector(rates)
 

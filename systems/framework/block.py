@@ -152,7 +152,10 @@ def copied(state: Any) -> Any:
 
 
 class _Declared:
-    """The declaration of a block, and what is made of it."""
+    """The declaration of a block, and what is made of it.
+
+    Its private names are mangled, so that blocks can use any name of their own.
+    """
 
     part: ClassVar[str] = ""
     """The role of the block in its robot, as ``plant`` or ``tracker``. A block replaces
@@ -180,7 +183,7 @@ class _Declared:
         *,
         sizes: Mapping[str, int] | None = None,
         omit: Collection[str] = (),
-    ) -> None:
+    ) -> list[Any]:
         """Declares the input ports and the columns of a block that computes by itself.
 
         Such a block adds its output ports by ``declare_output``.
@@ -188,20 +191,26 @@ class _Declared:
         Args:
             sizes: The sizes that the ports refer to.
             omit: Names of ports that this block does not have.
+
+        Returns:
+            The input ports.
         """
-        self._sizes = {**(sizes or {})}
-        self._input_ports = [
-            self._declare_input(port) for port in self.inputs if port.name not in omit
+        self.__sizes = {**(sizes or {})}
+        self.__input_ports = [
+            self.__declare_input(port) for port in self.inputs if port.name not in omit
         ]
-        self._outputs = [port for port in self.outputs if port.name not in omit]
-        self._output_sizes = [
-            port.elements(self._sizes) for port in self._outputs if port.size != OBJECT
+        self.__outputs = [port for port in self.outputs if port.name not in omit]
+        self.__output_sizes = [
+            port.elements(self.__sizes)
+            for port in self.__outputs
+            if port.size != OBJECT
         ]
         self.columns = {
-            port.name: port.column_names(self._sizes)
-            for port in self._outputs
+            port.name: port.column_names(self.__sizes)
+            for port in self.__outputs
             if port.columns
         }
+        return list(self.__input_ports)
 
     def declare_output(
         self: Any, name: str, calc: Callable[[Any, Any], None], prerequisites: set[Any]
@@ -216,7 +225,7 @@ class _Declared:
         Returns:
             The port.
         """
-        (port,) = (port for port in self._outputs if port.name == name)
+        (port,) = (port for port in self.__outputs if port.name == name)
         if port.size == OBJECT:
             return self.DeclareAbstractOutputPort(
                 name=name,
@@ -226,7 +235,7 @@ class _Declared:
             )
         return self.DeclareVectorOutputPort(
             name=name,
-            size=port.elements(self._sizes),
+            size=port.elements(self.__sizes),
             calc=calc,
             prerequisites_of_calc=prerequisites,
         )
@@ -254,51 +263,51 @@ class _Declared:
                 because it calls compiled functions.
         """
         self.declare_ports(sizes=sizes, omit=omit)
-        self.step, self._tick_s = step, tick_s
-        self._as_arrays = arrays or has_arrays(step.state)
-        self._read_ports = [
-            port for port in self._input_ports if port.get_name() not in unread
+        self.step, self.__tick_s = step, tick_s
+        self.__as_arrays = arrays or has_arrays(step.state)
+        self.__read_ports = [
+            port for port in self.__input_ports if port.get_name() not in unread
         ]
-        self._objects = [
+        self.__objects = [
             place
-            for place, port in enumerate(self._read_ports)
-            if port.get_name() in self._object_names()
+            for place, port in enumerate(self.__read_ports)
+            if port.get_name() in self.__object_names()
         ]
-        sources = {port.ticket() for port in self._read_ports}
+        sources = {port.ticket() for port in self.__read_ports}
         sources.add(self.time_ticket())
         if has_arrays(step.state):
             # The tick that the state belongs to, the state, and the outputs of the tick
             # before, which hold until the next one begins.
             self.DeclareAbstractState(Value((-1, copied(step.state), None)))
             self.DeclarePeriodicUnrestrictedUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._replace_arrays
+                period_sec=tick_s, offset_sec=0.0, update=self.__replace_arrays
             )
             sources.add(self.xa_ticket())
             if step.publish is not None:
                 # Drake replaces abstract states before the blocks that have a discrete
                 # state read their inputs, which must be those of the tick before.
                 # Therefore published values are a discrete state, too.
-                published = self._publish(step.state)
-                self._ends = np.cumsum(self._output_sizes)[:-1]
+                published = self.__publish(step.state)
+                self.__ends = np.cumsum(self.__output_sizes)[:-1]
                 self.DeclareDiscreteState(np.concatenate(published))
                 self.DeclarePeriodicDiscreteUpdateEvent(
-                    period_sec=tick_s, offset_sec=0.0, update=self._replace_published
+                    period_sec=tick_s, offset_sec=0.0, update=self.__replace_published
                 )
         elif len(step.state):
             self.DeclareDiscreteState([self._scalar(x) for x in step.state])
             self.DeclarePeriodicDiscreteUpdateEvent(
-                period_sec=tick_s, offset_sec=0.0, update=self._replace_state
+                period_sec=tick_s, offset_sec=0.0, update=self.__replace_state
             )
             sources.add(self.xd_ticket())
-        self._computed = declare_cache(self, "step", self._compute, sources)
-        shown = self._computed
+        self.__computed = declare_cache(self, "step", self.__compute, sources)
+        shown = self.__computed
         if step.publish is not None:
             state = {self.xd_ticket()}
-            shown = declare_cache(self, "published", self._published, state)
+            shown = declare_cache(self, "published", self.__published, state)
         index = 0
-        for port in self._outputs:
+        for port in self.__outputs:
             if port.size == OBJECT:
-                self._declare_object_output(port.name)
+                self.__declare_object_output(port.name)
                 continue
 
             def calc(context: Any, output: Any, index: int = index) -> None:
@@ -307,11 +316,11 @@ class _Declared:
             self.declare_output(port.name, calc, {shown.ticket()})
             index += 1
 
-    def _declare_object_output(self: Any, name: str) -> None:
+    def __declare_object_output(self: Any, name: str) -> None:
         def calc(context: Any, output: Any) -> None:
-            output.set_value(getattr(self._computed.Eval(context)[1], name))
+            output.set_value(getattr(self.__computed.Eval(context)[1], name))
 
-        self.declare_output(name, calc, {self._computed.ticket()})
+        self.declare_output(name, calc, {self.__computed.ticket()})
 
     def step_for(self: Any, run: RunFacts) -> Step:
         """What the block computes in each tick of a compiled loop.
@@ -339,45 +348,45 @@ class _Declared:
             state = copied(step.state)
             carries = {
                 port.name: partial(_field_at, state, port.name)
-                for port in self._outputs
+                for port in self.__outputs
                 if port.size == OBJECT
             }
             step = step._replace(state=state, carries=carries)
         return step
 
-    def _object_names(self: Any) -> set[str]:
+    def __object_names(self: Any) -> set[str]:
         return {port.name for port in self.inputs if port.size == OBJECT}
 
-    def _declare_input(self: Any, port: Port) -> Any:
+    def __declare_input(self: Any, port: Port) -> Any:
         if port.size == OBJECT:
             return self.DeclareAbstractInputPort(
                 name=port.name, model_value=Value(object())
             )
         return self.DeclareVectorInputPort(
-            name=port.name, size=port.elements(self._sizes)
+            name=port.name, size=port.elements(self.__sizes)
         )
 
-    def _read(self: Any, context: Any) -> list[Any]:
+    def __read(self: Any, context: Any) -> list[Any]:
         """One entry per input port; that of an unread port is empty."""
-        ports, objects = self._read_ports, self._objects
-        read = read_arrays if self._as_arrays else read_lists
+        ports, objects = self.__read_ports, self.__objects
+        read = read_arrays if self.__as_arrays else read_lists
         numbers = [port for k, port in enumerate(ports) if k not in objects]
         inputs: list[Any] = read(context, numbers)
         for place in objects:
             inputs.insert(place, ports[place].Eval(context))
-        return inputs + [[]] * (len(self._input_ports) - len(inputs))
+        return inputs + [[]] * (len(self.__input_ports) - len(inputs))
 
-    def _blank_outputs(self: Any) -> list[Any]:
+    def __blank_outputs(self: Any) -> list[Any]:
         """One entry per output port that carries numbers."""
-        if self._as_arrays:
-            return [np.full(n, self._scalar(0.0)) for n in self._output_sizes]
-        return [[self._scalar(0.0)] * count for count in self._output_sizes]
+        if self.__as_arrays:
+            return [np.full(n, self._scalar(0.0)) for n in self.__output_sizes]
+        return [[self._scalar(0.0)] * count for count in self.__output_sizes]
 
-    def _compute(self: Any, context: Any) -> tuple[Any, Any]:
+    def __compute(self: Any, context: Any) -> tuple[Any, Any]:
         """The outputs, and the state of the next tick."""
         step: Step = self.step
-        tick = round(float_of(context.get_time()) / self._tick_s)
-        outputs = () if step.publish is not None else self._blank_outputs()
+        tick = round(float_of(context.get_time()) / self.__tick_s)
+        outputs = () if step.publish is not None else self.__blank_outputs()
         state: Any = []
         if has_arrays(step.state):
             done, state, known = context.get_abstract_state(0).get_value()
@@ -386,36 +395,36 @@ class _Declared:
                 return known, state
             state = copied(state)
         elif len(step.state):
-            state = self._state(context)
-        step.step(tick, state, self._read(context), outputs, step.numbers)
+            state = self.__state(context)
+        step.step(tick, state, self.__read(context), outputs, step.numbers)
         return outputs, state
 
-    def _publish(self: Any, state: Any) -> list[Any]:
+    def __publish(self: Any, state: Any) -> list[Any]:
         step: Step = self.step
         assert step.publish is not None
-        outputs: list[Any] = self._blank_outputs()
+        outputs: list[Any] = self.__blank_outputs()
         step.publish(state, outputs, step.numbers)
         return outputs
 
-    def _published(self: Any, context: Any) -> tuple[Any, None]:
+    def __published(self: Any, context: Any) -> tuple[Any, None]:
         if has_arrays(self.step.state):
-            return np.split(self._state(context), self._ends), None
-        return self._publish(self._state(context)), None
+            return np.split(self.__state(context), self.__ends), None
+        return self.__publish(self.__state(context)), None
 
-    def _state(self: Any, context: Any) -> Any:
+    def __state(self: Any, context: Any) -> Any:
         state = context.get_discrete_state(0).CopyToVector()
-        return state if self._as_arrays else state.tolist()
+        return state if self.__as_arrays else state.tolist()
 
-    def _replace_state(self: Any, context: Any, discrete_state: Any) -> None:
-        discrete_state.set_value(0, np.array(self._computed.Eval(context)[1]))
+    def __replace_state(self: Any, context: Any, discrete_state: Any) -> None:
+        discrete_state.set_value(0, np.array(self.__computed.Eval(context)[1]))
 
-    def _replace_published(self: Any, context: Any, discrete_state: Any) -> None:
+    def __replace_published(self: Any, context: Any, discrete_state: Any) -> None:
         state = context.get_abstract_state(0).get_value()[1]
-        discrete_state.set_value(0, np.concatenate(self._publish(state)))
+        discrete_state.set_value(0, np.concatenate(self.__publish(state)))
 
-    def _replace_arrays(self: Any, context: Any, state: Any) -> None:
-        outputs, arrays = self._computed.Eval(context)
-        tick = round(float_of(context.get_time()) / self._tick_s)
+    def __replace_arrays(self: Any, context: Any, state: Any) -> None:
+        outputs, arrays = self.__computed.Eval(context)
+        tick = round(float_of(context.get_time()) / self.__tick_s)
         value = tick, arrays, outputs
         state.get_mutable_abstract_state(0).set_value(value)
 

@@ -84,12 +84,12 @@ def declare_state_outputs(block: Any) -> None:
             after the other.
     """
     first = 0
-    for port, size in zip(block.outputs, block._output_sizes, strict=True):
+    for port in block.outputs:
 
         def calc(
-            context: Any, output: Any, part: Any = slice(first, first + size)
+            context: Any, output: Any, part: Any = slice(first, first + port.size)
         ) -> None:
             output.SetFromVector(context.get_discrete_state(0).value()[part])
 
         block.declare_output(port.name, calc, {block.xd_ticket()})
-        first += size
+        first += port.size

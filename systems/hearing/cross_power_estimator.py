@@ -340,8 +340,7 @@ class CrossPowerEstimator(Block):
         self._microphones = microphones
         self._listener = ArrayListener(parameters, robot, acoustics.c, microphones)
         self.set_name("cross_power_estimator")
-        self.declare_ports()
-        self._audio, self._listening = self._input_ports
+        self._audio, self._listening = self.declare_ports()
         facts = self._listener.facts
         self.DeclareDiscreteState(_SIZE)
         self.DeclareDiscreteState(1 + facts.channels * facts.samples)

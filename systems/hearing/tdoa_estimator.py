@@ -191,9 +191,9 @@ class TDOAEstimator(Block):
                 self._localiser, robot, self._p_PA_B, microphones.frame_s
             )
             self.inputs = (*self.inputs, *_BELIEF)
-        self.declare_ports()
-        self._audio, *self._belief = self._input_ports
-        self.DeclareDiscreteState(sum(self._output_sizes))
+        self._audio, *self._belief = self.declare_ports()
+        self._output_size = sum(int(port.size) for port in self.outputs)
+        self.DeclareDiscreteState(self._output_size)
         self.DeclareDiscreteState(4)
         self.DeclareDiscreteState(math.prod(self._localiser.echo_shape))
         if self._choice is not None:
@@ -281,7 +281,7 @@ class TDOAEstimator(Block):
 
         inputs = sum(port.size() for port in self._belief)
         period = round(self._microphones.frame_s / run.tick_s)
-        return host_step(listen, inputs, sum(self._output_sizes), period)
+        return host_step(listen, inputs, self._output_size, period)
 
     def _remembered(self, context: Any) -> HearingMemory:
         """The memory that the last frame left."""

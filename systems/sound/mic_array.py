@@ -124,8 +124,8 @@ class MicArray(Block):
         followed, *motion = self.inputs
         further = [followed._replace(name=f"emission_{name}") for name in others]
         self.inputs = (followed, *further, *motion)
-        self.declare_ports()
-        *self._sources, pose, velocity = self._input_ports
+        ports = self.declare_ports()
+        *self._sources, pose, velocity = ports
         self._motion = [pose, velocity]
         group: Any
         for group in self._recorder.blank:
@@ -134,7 +134,7 @@ class MicArray(Block):
         self.DeclarePeriodicDiscreteUpdateEvent(
             period_sec=parameters.frame_s, offset_sec=0.0, update=self._remember
         )
-        sources = {port.ticket() for port in self._input_ports}
+        sources = {port.ticket() for port in ports}
         sources |= {self.time_ticket(), self.xd_ticket(), self._array.ticket()}
         self.declare_output("audio", self._record, sources)
 

@@ -244,8 +244,8 @@ class SoundEmitter(Block):
         self.set_name("sound_emitter")
         if called:
             self.inputs = (*self.inputs, Port("calling", 1, "0 or 1"))
-        self.declare_ports()
-        self._motion, self._calling = self._input_ports[:2], self._input_ports[2:]
+        ports = self.declare_ports()
+        self._motion, self._calling = ports[:2], ports[2:]
         self.DeclareDiscreteState(4 * self._ticks)
         if called:
             never: Any = np.array([-1.0])  # untyped: Drake's stubs take ndarray amiss
