@@ -36,8 +36,9 @@ def load_scenario(
 
     Args:
         source: A name of the library (``phonotaxis scenarios``) or a path.
-        overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``
-            or ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML. Or a mapping of
+        overrides: ``key=value`` with a dotted key, as ``source.speed_m_s=0.2``,
+            ``obstacles.cart.size_m=[0.2, 0.1]`` for the obstacle of that name, or
+            ``obstacles.0.size_m=[0.2, 0.1]``; values are YAML. Or a mapping of
             dotted keys to values, as ``{"source.speed_m_s": 0.2}``.
 
     Returns:
@@ -200,11 +201,13 @@ def set_fields(data: dict[str, Any], fields: Iterable[tuple[str, Any]]) -> None:
 
     Args:
         data: Fields of a scenario, changed in place.
-        fields: Dotted paths, with indices of lists (``obstacles.0.size_m``), and
-            plain values; of two of one path the later one wins.
+        fields: Dotted paths and plain values. An entry of a list is given by its index
+            (``obstacles.0.size_m``) or by its name (``obstacles.cart.size_m``). If two
+            paths are the same, the later value wins.
 
     Raises:
-        InputError: A path leads into a plain value, or past a list's end.
+        InputError: A path leads into a plain value or past the end of a list, or a
+            list has no entry, or several entries, of a name.
     """
     for key, value in sorted(fields, key=lambda field: not _is_preset(*field)):
         _set_field(data, key, value)
@@ -242,6 +245,17 @@ def _descend(node: Any, part: str, key: str) -> Any:
 def _index(node: list[Any], part: str, key: str) -> int:
     if part.isdigit() and int(part) < len(node):
         return int(part)
+    names = [each.get("name") for each in node if isinstance(each, dict)]
+    found = [k for k, each in enumerate(names) if each == part]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        raise InputError(
+            key, f"{len(found)} entries have the name {part!r}; use an index, from 0"
+        )
+    known = ", ".join(repr(name) for name in names if name)
     raise InputError(
-        key, f"{part!r} is not an index of a list of {len(node)}; count from 0"
+        key,
+        f"{part!r} is neither an index of a list of {len(node)} nor the name of an "
+        f"entry; count from 0{f', or use {known}' if known else ''}",
     )

@@ -270,8 +270,8 @@ def test_unknown_scenarios_say_where_the_known_are(source, message):
         ("seed=[1", "seed", "is not valid YAML"),
         ("seed.x=1", "seed.x", "plain value; shorten"),
         ("seed.x.y=1", "seed.x", "plain value; shorten"),
-        ("obstacles.1.name=a", "obstacles.1", "not an index of a list of 1"),
-        ("obstacles.x=1", "obstacles.x", "not an index"),
+        ("obstacles.1.name=a", "obstacles.1", "an index of a list of 1"),
+        ("obstacles.x=1", "obstacles.x", "neither an index"),
     ],
 )
 def test_mistakes_name_the_whole_path(override, field, message):
@@ -343,3 +343,27 @@ def test_no_number_may_be_anything_else(path, value):
     with pytest.raises(InputError) as error:
         scenario_from_mapping(set_at(path, value))
     assert field_of(error).startswith(path)
+
+
+CARTS = "obstacles=[{name: box}, {name: cart, waypoints_m: [[3, 1], [3, -1]]}]"
+
+
+def test_an_obstacle_is_set_by_its_name():
+    scenario = load_scenario("default", [CARTS, "obstacles.cart.speed_m_s=0.2"])
+    assert [each.speed_m_s for each in scenario.obstacles] == [0.3, 0.2]
+
+
+@pytest.mark.parametrize(
+    ("settings", "message"),
+    [
+        ([CARTS, "obstacles.card.speed_m_s=1"], r"card' is neither .* use 'box', 'c"),
+        ([CARTS, "obstacles.2.speed_m_s=1"], r"'2' is neither an index of a list of 2"),
+        (
+            ["obstacles=[{name: box}, {name: box}]", "obstacles.box.speed_m_s=1"],
+            r"2 entries have the name 'box'; use an index",
+        ),
+    ],
+)
+def test_names_that_are_not_one_obstacle(settings, message):
+    with pytest.raises(InputError, match=rf"^obstacles\.\w+: .*{message}"):
+        load_scenario("default", settings)
